@@ -1,0 +1,49 @@
+# Targets are names only: what is up to date is decided by content, by the program itself.
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: all help setup check test test-slow bench clean
+
+VENV := .venv
+READY := $(VENV)/.ready
+RUN := $(VENV)/bin/python
+# the first Python on the path that is new enough; `make PYTHON=/path/to/python3.12` names another
+CANDIDATES := python3 python3.13 python3.12 python3.11 python3.14 python
+PYTHON ?= $(shell for p in $(CANDIDATES); do \
+	$$p -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && { command -v $$p; break; }; done)
+
+all: $(READY) ## Reproduce every figure and table of the paper: results/report/index.html
+	@$(RUN) -m stages report
+
+help: ## This list
+	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
+
+setup: $(READY) ## Create .venv with the pinned versions (done by itself when needed)
+
+check: $(READY) ## Format, lint, types and import rules
+	$(VENV)/bin/ruff format --check .
+	$(VENV)/bin/ruff check .
+	$(VENV)/bin/mypy
+	$(VENV)/bin/lint-imports
+
+test: $(READY) ## Tests, except those marked slow
+	$(RUN) -m pytest -q
+
+test-slow: $(READY) ## The tests marked slow
+	$(RUN) -m pytest -q -m slow
+
+bench: $(READY) ## Benchmarks of accuracy against cost
+	$(RUN) -m benchmarks
+
+clean: ## Remove results and caches; .venv stays
+	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	find pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Made once, and again when the versions that are asked for change.
+$(READY): pyproject.toml constraints.txt
+	@test -n "$(PYTHON)" || { echo "flexclear needs Python >= 3.11: none of '$(CANDIDATES)' is; install one or say make PYTHON=/path/to/python3"; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "flexclear needs Python >= 3.11, $(PYTHON) is older"; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian, Ubuntu: apt-get install python3-venv)"; exit 1; }
+	@echo "setting up $(VENV) with $(PYTHON); takes some minutes the first time"
+	@test -x $(RUN) || "$(PYTHON)" -m venv $(VENV)
+	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@touch $@

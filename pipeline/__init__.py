@@ -1,0 +1,48 @@
+"""flexclear: from an FE mesh to a converged answer about a mechanism with flexible bodies and clearance.
+
+The same things that the command ``flexclear`` does, from Python::
+
+    scene = pipeline.load_scene("scenes/sps4/csj.toml", override={"joint.A1.clearance": "0.2 mm"})
+    run = pipeline.run(scene)
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+
+# One thread in BLAS and OpenMP, before NumPy is loaded: the matrices are small, and sums whose
+# order depends on the number of cores would break the promise of equal bytes for equal inputs.
+for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
+    os.environ.setdefault(_variable, "1")
+
+__all__ = ["load_scene", "run"]
+
+
+def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
+    """The scene in a TOML file, with everything that it extends; `override` as dotted place -> value.
+
+    Raises InputError (exit code 2 of the command) with all mistakes at once.
+    """
+    from pipeline.core.scene.load import load_scene as load
+
+    return load(path, override)
+
+
+def run(scene: Scene | str | Path) -> xr.Dataset:
+    """Dataset of the simulate stage (schema RUN), from the cache when fresh.
+
+    Raises FlexclearError: InputError, SolverError or ResourceError.
+    """
+    # The stages stand above this package and may import it, not the other way round; the name is
+    # resolved only here, at the door.
+    stages: Any = import_module("stages.run")
+    return stages.run(load_scene(scene) if isinstance(scene, (str, Path)) else scene)

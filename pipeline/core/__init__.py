@@ -1,0 +1,1 @@
+"""What every tower shares: scenes, artifacts, workflow. Imports nothing from the towers."""

@@ -1,0 +1,106 @@
+"""Rotations in NumPy, for data and set-up; the compiled kernels have their own, on tuples.
+
+Quaternions are ``w x y z``; matrices ``R_AB`` take components in B to components in A. The
+functions broadcast over leading dimensions unless they say otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+
+def skew(v: np.ndarray) -> np.ndarray:
+    """Matrix of the cross product, ``skew(v) @ w == cross(v, w)``; shape (..., 3, 3)."""
+    v = np.asarray(v, dtype=float)
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+def quaternion_to_matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a unit quaternion, shape (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion of one rotation matrix, w >= 0, shape (4,). Stable for every angle."""
+    R = np.asarray(R, dtype=float)
+    # squared components times four; the largest is safe to divide by (Shepperd 1978)
+    squares = 1.0 + np.array([R.trace(), *(2.0 * np.diag(R) - R.trace())])
+    i = int(np.argmax(squares))
+    q = np.empty(4)
+    cross = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    if i == 0:
+        q[0], q[1:] = squares[0], cross
+    else:
+        q[0], q[1:] = cross[i - 1], R[:, i - 1] + R[i - 1, :]
+        q[i] = squares[i]
+    q /= np.linalg.norm(q)
+    return q if q[0] >= 0.0 else -q
+
+
+def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Hamilton product; ``R(a b) = R(a) R(b)``."""
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    w = a[..., :1] * b[..., :1] - np.sum(a[..., 1:] * b[..., 1:], axis=-1, keepdims=True)
+    v = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])
+    return np.concatenate([w, v], axis=-1)
+
+
+def quaternion_conjugate(q: np.ndarray) -> np.ndarray:
+    """The inverse rotation of a unit quaternion."""
+    return np.asarray(q, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotation_vector_to_quaternion(v: np.ndarray) -> np.ndarray:
+    """Quaternion of the rotation by ``|v|`` rad about ``v``; one vector, shape (4,)."""
+    v = np.asarray(v, dtype=float)
+    half = 0.5 * float(np.linalg.norm(v))
+    return np.concatenate([[np.cos(half)], 0.5 * np.sinc(half / np.pi) * v])
+
+
+def rotation_vector_to_matrix(v: np.ndarray) -> np.ndarray:
+    """Rotation matrix of the rotation by ``|v|`` rad about ``v``; one vector."""
+    return quaternion_to_matrix(rotation_vector_to_quaternion(v))
+
+
+def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Components of v, given in the rotated frame, in the parent frame."""
+    return np.einsum("...ij,...j->...i", quaternion_to_matrix(q), v)
+
+
+def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float]]) -> np.ndarray:
+    """Rotation matrix whose columns are the frame's axes in the parent.
+
+    axes: two named axes (the first exact, the second made perpendicular), or all three.
+    Raises ValueError, in words, when they define no right-handed frame.
+    """
+    if not isinstance(axes, Mapping):
+        R = np.array(axes, dtype=float).T
+        if not np.allclose(R.T @ R, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
+            raise ValueError("three axes are the unit vectors x, y, z of a right-handed frame")
+        u, _, vt = np.linalg.svd(R)
+        return u @ vt
+    if len(axes) != 2 or not set(axes) <= {"x", "y", "z"}:
+        raise ValueError("axes are two of x, y, z, each with its direction in the parent")
+    (first, a), (second, b) = ((name, np.array(v, dtype=float)) for name, v in axes.items())
+    if not np.linalg.norm(a) > 0 or np.linalg.norm(np.cross(a, b)) <= 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
+        raise ValueError("the two axes are zero or parallel")
+    a = a / np.linalg.norm(a)
+    b = b - a * (a @ b)
+    b = b / np.linalg.norm(b)
+    R = np.empty((3, 3))
+    i, j = "xyz".index(first), "xyz".index(second)
+    k = 3 - i - j
+    R[:, i], R[:, j] = a, b
+    R[:, k] = np.cross(a, b) if (j - i) % 3 == 1 else np.cross(b, a)
+    return R

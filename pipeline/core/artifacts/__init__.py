@@ -1,0 +1,1 @@
+"""The files in which the towers meet: what they hold (schema) and how they are kept (store)."""

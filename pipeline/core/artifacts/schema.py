@@ -1,0 +1,160 @@
+"""The contract of the artifacts: dimensions, units and meaning of every variable.
+
+The three towers never import each other; whoever writes a dataset calls `conform`, whoever
+reads one may rely on this page.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+CONVENTIONS = "CF-1.11"
+AXES = ("x", "y", "z")
+QUATERNION = ("w", "x", "y", "z")
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable of an artifact. `optional` ones are absent where the scene has no such part."""
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    optional: bool = False
+
+
+Schema = dict[str, Variable]
+_V = Variable
+
+#: stage 1: nodes and two-node beam cells in the mesh frame
+MESH: Schema = {
+    "node_position": _V(("node", "axis"), "m", "node position in the mesh frame"),
+    "cell": _V(("cell", "corner"), "1", "node indices of each cell, from start to end"),
+    "area": _V(("cell",), "m2", "cross-section area"),
+    "second_moment": _V(("cell", "axis"), "m4", "torsion constant and bending second moments (stiffness)"),
+    "inertia_moment": _V(("cell", "axis"), "m4", "polar and bending second moments of area (mass)"),
+    "youngs_modulus": _V(("cell",), "Pa", "Young's modulus"),
+    "shear_modulus": _V(("cell",), "Pa", "shear modulus"),
+    "density": _V(("cell",), "kg m-3", "mass density"),
+    "frame_node": _V(("frame",), "1", "node to which the named frame is tied"),
+    "frame_position": _V(("frame", "axis"), "m", "origin of the named frame in the mesh frame"),
+    "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, frame to mesh frame"),
+}
+
+#: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
+MODES: Schema = {
+    "frequency": _V(("mode",), "Hz", "natural frequency of the kept coordinate in the reduced basis"),
+    "shape": _V(("node", "dof", "mode"), "kg-0.5", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"),
+    "rigid_frequency": _V(("rigid_mode",), "Hz", "frequencies of the removed rigid-body modes", optional=True),
+    "kind": _V(("mode",), "1", "bending, torsion or axial by share of kinetic energy"),
+    "exact_euler_bernoulli": _V(("mode",), "Hz", "exact frequency of the uniform rod, Euler-Bernoulli bending", optional=True),
+    "exact_rayleigh": _V(("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia", optional=True),
+    "exact_timoshenko": _V(("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia and shear", optional=True),
+}
+
+#: stage 3: all that the dynamics needs of a flexible body, in its body frame
+BUNDLE: Schema = {
+    "mass": _V((), "kg", "mass"),
+    "first_moment": _V(("axis",), "kg m", "integral of rho X"),
+    "second_moment": _V(("axis", "axis2"), "kg m2", "integral of rho X X^T"),
+    "modal_first_moment": _V(("axis", "mode"), "kg0.5", "integral of rho S"),
+    "position_mode_moment": _V(("axis", "axis2", "mode"), "kg0.5 m", "integral of rho X_k S_lj"),
+    "mode_mode_moment": _V(("axis", "axis2", "mode", "mode2"), "1", "integral of rho S_ki S_lj"),
+    "modal_mass": _V(("mode", "mode2"), "1", "modal mass matrix"),
+    "modal_stiffness": _V(("mode", "mode2"), "rad2 s-2", "modal stiffness matrix"),
+    "frequency": _V(("mode",), "Hz", "natural frequency of the coordinate"),
+    "frame_position": _V(("frame", "axis"), "m", "undeformed origin of the named frame in the body frame"),
+    "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, named frame to body frame, undeformed"),
+    "frame_translation_shape": _V(("frame", "axis", "mode"), "kg-0.5", "displacement of the frame per modal coordinate, body axes"),
+    "frame_rotation_shape": _V(("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"),
+    "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
+    "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
+    "shape_translation": _V(("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"),
+    "shape_rotation": _V(("node", "axis", "mode"), "kg-0.5 m-1", "node rotation vector per modal coordinate, body axes"),
+    "radius": _V(("cell",), "m", "radius of the drawn section"),
+}
+
+#: stage 4: one run
+RUN: Schema = {
+    "position": _V(("time", "body", "axis"), "m", "centre of mass, world axes"),
+    "quaternion": _V(("time", "body", "quat"), "1", "unit quaternion, body to world"),
+    "velocity": _V(("time", "body", "axis"), "m s-1", "velocity of the centre of mass, world axes"),
+    "angular_velocity": _V(("time", "body", "axis"), "rad s-1", "angular velocity, world axes"),
+    "acceleration": _V(("time", "body", "axis"), "m s-2", "acceleration of the centre of mass, world axes"),
+    "angular_acceleration": _V(("time", "body", "axis"), "rad s-2", "angular acceleration, world axes"),
+    "frame_position": _V(("time", "frame", "axis"), "m", "origin of the named frame, world axes"),
+    "joint_force": _V(("time", "joint", "axis"), "N", "force on the joint's second body at its frame's origin, world axes"),
+    "joint_moment": _V(("time", "joint", "axis"), "N m", "moment on the joint's second body at its frame's origin, world axes"),
+    "modal_coordinate": _V(("time", "mode"), "kg0.5 m", "modal coordinate", optional=True),
+    "modal_velocity": _V(("time", "mode"), "kg0.5 m s-1", "rate of the modal coordinate", optional=True),
+    "drive_force": _V(("time", "drive"), "N or N m", "what the drive supplies along its coordinate", optional=True),
+    "drive_position": _V(("time", "drive"), "m or rad", "prescribed coordinate", optional=True),
+    "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
+    "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
+    "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
+    "contact_force": _V(("time", "contact", "axis"), "N", "contact force on the ball, world axes", optional=True),
+    "contact_normal_force": _V(("time", "contact"), "N", "normal contact force, >= 0", optional=True),
+    "contact_friction_power": _V(("time", "contact"), "W", "power of the friction force, <= 0", optional=True),
+    "contact_offset": _V(("time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True),
+    "kinetic": _V(("time",), "J", "kinetic energy"),
+    "potential": _V(("time",), "J", "potential energy of the loads"),
+    "elastic": _V(("time",), "J", "energy stored in flexible bodies, springs and contacts"),
+    "dissipated": _V(("time",), "J", "energy dissipated since the start"),
+    "drive_work": _V(("time",), "J", "work supplied by the drives since the start"),
+    "energy_error": _V(("time",), "J", "kinetic + potential + elastic + dissipated - drive_work, minus its start value"),
+    "constraint_error": _V(("time",), "m", "largest violation of a loop closure"),
+    "event_time": _V(("event",), "s", "time of the event", optional=True),
+    "event_contact": _V(("event",), "1", "index of the contact", optional=True),
+    "event_kind": _V(("event",), "1", "closing or opening", optional=True),
+    "event_approach_speed": _V(("event",), "m s-1", "rate of penetration at a closing, minus it at an opening", optional=True),
+    "event_peak_force": _V(("event",), "N", "largest normal force of the contact that this closing begins", optional=True),
+    "event_peak_penetration": _V(("event",), "m", "largest penetration of that contact", optional=True),
+    "event_duration": _V(("event",), "s", "duration of that contact", optional=True),
+}
+
+
+#: stage 4, for scenes with an ensemble: members on the regular output times
+ENSEMBLE: Schema = {
+    "position": _V(("member", "time", "body", "axis"), "m", "centre of mass, world axes"),
+    "quaternion": _V(("member", "time", "body", "quat"), "1", "unit quaternion, body to world"),
+    "velocity": _V(("member", "time", "body", "axis"), "m s-1", "velocity of the centre of mass, world axes"),
+    "angular_velocity": _V(("member", "time", "body", "axis"), "rad s-1", "angular velocity, world axes"),
+    "acceleration": _V(("member", "time", "body", "axis"), "m s-2", "acceleration of the centre of mass, world axes"),
+    "contact_normal_force": _V(("member", "time", "contact"), "N", "normal contact force, >= 0"),
+    "contact_offset": _V(("member", "time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes"),
+    "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
+    "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
+    "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
+}
+
+
+def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float) -> xr.Dataset:
+    """`dataset` with units, long names and coordinates of `schema`; ValueError where it differs.
+
+    Every mandatory variable must be there with its dimensions; nothing undeclared may be.
+    """
+    missing = [n for n, v in schema.items() if not v.optional and n not in dataset]
+    unknown = [str(n) for n in dataset.data_vars if n not in schema]
+    if missing or unknown:
+        raise ValueError(f"artifact lacks {missing} and has undeclared {unknown}")
+    result = dataset.copy()
+    for name in dataset.data_vars:
+        variable = schema[str(name)]
+        if dataset[name].dims != variable.dims:
+            raise ValueError(f"{name} has dimensions {dataset[name].dims}, not {variable.dims}")
+        if dataset[name].dtype.kind == "f" and not np.isfinite(dataset[name].values).all():
+            if not str(name).startswith("event_"):
+                raise ValueError(f"{name} holds values that are not finite")
+        result[name].attrs = {"units": variable.units, "long_name": variable.long_name}
+    for dim in ("axis", "axis2"):
+        if dim in result.dims:
+            result = result.assign_coords({dim: list(AXES)})
+    if "quat" in result.dims:
+        result = result.assign_coords(quat=list(QUATERNION))
+    if "time" in result.coords:
+        result["time"].attrs = {"units": "s", "long_name": "time"}
+    result.attrs = {"Conventions": CONVENTIONS, **attributes}
+    return result

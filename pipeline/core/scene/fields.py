@@ -1,0 +1,125 @@
+"""Field types that scene files and mesh recipes share: quantities, vectors, poses, sources."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
+
+from pipeline.core.algebra import axes_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
+from pipeline.core.units import quantity
+
+
+def _scalar(dimension: str) -> Any:
+    """A float field that also takes text with a unit of this dimension."""
+    return Annotated[
+        float,
+        BeforeValidator(lambda value: quantity(value, dimension)),
+        WithJsonSchema({"type": ["number", "string"], "description": f"{dimension}: SI number, or text with a unit"}),
+    ]
+
+
+def _vector(dimension: str) -> Any:
+    """Three of them."""
+
+    def read(value: Any) -> tuple[float, ...]:
+        if not isinstance(value, (list, tuple)) or len(value) != 3:
+            raise ValueError(f"expected three components [x, y, z] of a {dimension}")
+        return tuple(quantity(component, dimension) for component in value)
+
+    item = {"type": ["number", "string"]}
+    return Annotated[
+        tuple[float, float, float],
+        BeforeValidator(read),
+        WithJsonSchema({"type": "array", "items": item, "minItems": 3, "maxItems": 3, "description": dimension}),
+    ]
+
+
+Length = _scalar("length")
+Time = _scalar("time")
+Mass = _scalar("mass")
+Angle = _scalar("angle")
+Speed = _scalar("velocity")
+Pressure = _scalar("pressure")
+Density = _scalar("density")
+Number = _scalar("number")
+Position = _vector("length")
+Velocity = _vector("velocity")
+AngularVelocity = _vector("angular velocity")
+Acceleration = _vector("acceleration")
+Direction = _vector("number")
+RotationVector = _vector("angle")
+
+
+def _inertia(value: Any) -> tuple[tuple[float, float, float], ...]:
+    """``[Ixx, Iyy, Izz]`` or a full 3x3 matrix, as three rows [kg m^2]."""
+    rows = np.array([_components(row) for row in value] if isinstance(value, (list, tuple)) else [])
+    if rows.shape == (3, 1):
+        rows = np.diag(rows[:, 0])
+    if rows.shape != (3, 3):
+        raise ValueError("an inertia is [Ixx, Iyy, Izz] or a 3x3 matrix, about the centre of mass")
+    if not np.allclose(rows, rows.T, rtol=1e-12, atol=0.0):
+        raise ValueError("an inertia matrix is symmetric")
+    moments = np.linalg.eigvalsh(rows)
+    if moments[0] < 0.0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+        raise ValueError(
+            f"principal moments {moments.tolist()} kg m^2 belong to no body: each is >= 0 and at most the sum of the others"
+        )
+    return tuple(tuple(float(x) for x in row) for row in rows)  # type: ignore[return-value]
+
+
+def _components(row: Any) -> list[float]:
+    return [quantity(x, "inertia") for x in (row if isinstance(row, (list, tuple)) else [row])]
+
+
+Inertia = Annotated[
+    tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+    BeforeValidator(_inertia),
+    WithJsonSchema({"type": "array", "description": "[Ixx, Iyy, Izz] or 3x3, about the centre of mass, body axes"}),
+]
+
+#: where values come from: one text for the whole part, or one per key; "assumed: why" for assumptions
+Source = str | dict[str, str]
+
+
+class Part(BaseModel):
+    """Base of everything a scene may say: frozen, and no unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    source: Source | None = Field(default=None, description="where the values come from; 'assumed: why' for an assumption")
+
+
+class Pose(Part):
+    """Position and orientation of a frame in its parent; at most one way to say the orientation.
+
+    axes: two of the frame's axes as directions in the parent, e.g. ``{ z = [0, 1, 2], x = [1, 0, 0] }``;
+    the first is exact, the second is made perpendicular to it. Or all three, as a list [x, y, z].
+    """
+
+    position: Position = (0.0, 0.0, 0.0)
+    quaternion: tuple[float, float, float, float] | None = None
+    rotation_vector: RotationVector | None = None
+    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+
+    @model_validator(mode="after")
+    def _one_orientation(self) -> Pose:
+        given = [n for n in ("quaternion", "rotation_vector", "axes") if getattr(self, n) is not None]
+        if len(given) > 1:
+            raise ValueError(f"an orientation is given once, not by {' and '.join(given)}")
+        if self.quaternion is not None and not 0.999 < float(np.linalg.norm(self.quaternion)) < 1.001:
+            raise ValueError(f"the quaternion {list(self.quaternion)} (w, x, y, z) has not the norm 1")
+        if self.axes is not None:
+            axes_to_matrix(self.axes)
+        return self
+
+    def as_quaternion(self) -> np.ndarray:
+        """Unit quaternion w x y z, frame to parent, shape (4,)."""
+        if self.quaternion is not None:
+            return np.array(self.quaternion) / np.linalg.norm(self.quaternion)
+        if self.rotation_vector is not None:
+            return rotation_vector_to_quaternion(np.array(self.rotation_vector))
+        if self.axes is not None:
+            return matrix_to_quaternion(axes_to_matrix(self.axes))
+        return np.array([1.0, 0.0, 0.0, 0.0])

@@ -1,0 +1,179 @@
+"""Reading scenes: TOML, composition by `extends`, overrides, all mistakes reported at once."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from pipeline.core.errors import InputError, InputErrors
+from pipeline.core.registry import suggestion
+from pipeline.core.scene.schema import Scene
+
+FAMILIES = ("body", "joint", "drive", "load")
+EDITS = ("extends", "replace", "set", "remove")
+
+
+def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
+    """The scene in a TOML file, with everything that it extends.
+
+    override: dotted place -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the place's parent
+    must be there.  Raises InputError (all mistakes at once).
+    """
+    path = Path(path)
+    table = compose(path)
+    for place, value in (override or {}).items():
+        _put(table, place, value, f"override of {path}")
+    try:
+        scene = Scene.model_validate(table)
+    except ValidationError as error:
+        raise InputErrors([_input_error(path, e) for e in error.errors()]) from None
+    scene._name = scene_name(path)
+    scene._path = path
+    return scene
+
+
+def scene_name(path: Path) -> str:
+    """Path below the last folder called ``scenes``, without suffix; else the file's stem."""
+    parts = path.resolve().with_suffix("").parts
+    if "scenes" in parts:
+        last = len(parts) - 1 - parts[::-1].index("scenes")
+        return "/".join(parts[last + 1 :])
+    return parts[-1]
+
+
+def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
+    """The plain table of a scene file after `extends`, `replace`, `set` and `remove`."""
+    path = path.resolve()
+    if path in above:
+        chain = " -> ".join(p.name for p in (*above, path))
+        raise InputError(str(path), f"extends itself: {chain}", "break the circle")
+    table = read_toml(path)
+    if "extends" not in table:
+        extra = [key for key in EDITS if key in table]
+        if extra:
+            raise InputError(f"{path} [{extra[0]}]", "edits another scene, but none is extended", "add extends = \"...\"")
+        _absolute_meshes(table, path)
+        return table
+    base = compose(path.parent / str(table["extends"]), (*above, path))
+    return _edited(base, table, path)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file as a table; InputError when it cannot be read or parsed."""
+    try:
+        with path.open("rb") as file:
+            return tomllib.load(file)
+    except FileNotFoundError:
+        raise InputError(str(path), "there is no such file", _neighbours(path)) from None
+    except (IsADirectoryError, PermissionError, UnicodeDecodeError) as error:
+        raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(str(path), f"is not TOML: {error}") from None
+
+
+def _neighbours(path: Path) -> str | None:
+    names = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+    return suggestion(path.name, names) if names else None
+
+
+def _edited(base: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
+    result = copy.deepcopy(base)
+    for place in table.get("remove", []):
+        parent, key = _find(result, place, f"{path} [remove]")
+        del parent[key]
+    for edit in ("replace", "set"):
+        for family, parts in table.get(edit, {}).items():
+            _edit_family(result, family, parts, edit, path)
+    own = {key: value for key, value in table.items() if key not in EDITS}
+    _absolute_meshes(own, path)
+    for key, value in own.items():
+        if key in FAMILIES:
+            _add_parts(result, key, value, path)
+        else:
+            result[key] = value
+    return result
+
+
+def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, path: Path) -> None:
+    where = f"{path} [{edit}.{family}"
+    if family not in FAMILIES:
+        if edit == "set" and isinstance(result.get(family), dict) and isinstance(parts, dict):
+            result[family] = {**result[family], **parts}
+            return
+        raise InputError(f"{where}]", f"there is no '{family}' to {edit}", suggestion(family, list(FAMILIES)))
+    if not isinstance(parts, dict):
+        raise InputError(f"{where}]", "expected a table of named parts")
+    _absolute_meshes({family: parts}, path)
+    there = result.get(family, {})
+    for name, part in parts.items():
+        if name not in there:
+            raise InputError(f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, there))
+        there[name] = part if edit == "replace" else _merged(there[name], part)
+
+
+def _merged(old: dict[str, Any], new: dict[str, Any]) -> dict[str, Any]:
+    """`old` with the named keys changed, tables key by key."""
+    result = dict(old)
+    for key, value in new.items():
+        both = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = _merged(result[key], value) if both else value
+    return result
+
+
+def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path: Path) -> None:
+    there = result.setdefault(family, {})
+    for name, part in parts.items():
+        if name in there:
+            raise InputError(
+                f"{path} [{family}.{name}]",
+                f"the extended scene already has a {family} called '{name}'",
+                f"write [replace.{family}.{name}] or [set.{family}.{name}]",
+            )
+        there[name] = part
+
+
+def _find(table: dict[str, Any], place: object, where: str) -> tuple[dict[str, Any], str]:
+    keys = str(place).split(".")
+    for depth, key in enumerate(keys):
+        if not isinstance(table, dict) or key not in table:
+            known = table if isinstance(table, dict) else {}
+            raise InputError(where, f"there is no '{'.'.join(keys[: depth + 1])}'", suggestion(key, known) if known else None)
+        if depth < len(keys) - 1:
+            table = table[key]
+    return table, keys[-1]
+
+
+def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
+    parent, _, key = place.rpartition(".")
+    if parent:
+        owner, last = _find(table, parent, where)
+        table = owner[last]
+        if not isinstance(table, dict):
+            raise InputError(where, f"'{parent}' is a value, not a table")
+    table[key] = value
+
+
+def _absolute_meshes(table: dict[str, Any], path: Path) -> None:
+    """Recipe paths are looked for beside the scene, then in each folder above it."""
+    for body in table.get("body", {}).values():
+        mesh = body.get("mesh") if isinstance(body, dict) else None
+        if isinstance(mesh, str) and not Path(mesh).is_absolute():
+            found = (folder / mesh for folder in path.parents)
+            body["mesh"] = str(next((p for p in found if p.is_file()), path.parent / mesh))
+
+
+def _input_error(path: Path, error: Any) -> InputError:
+    place = ".".join(str(key) for key in error["loc"] if key not in ("ground", "rigid", "flexible"))
+    message = error["msg"].removeprefix("Value error, ")
+    if error["type"] == "extra_forbidden":
+        message = "unknown key"
+    if error["type"] == "missing":
+        message = "is missing"
+    value = error.get("input")
+    shown = f" (got {value!r})" if isinstance(value, (str, int, float)) and error["type"] != "missing" else ""
+    return InputError(f"{path} [{place}]", f"{message}{shown}")

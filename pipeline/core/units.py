@@ -1,0 +1,94 @@
+"""Quantities as users write them, converted to SI once, at the edge."""
+
+from __future__ import annotations
+
+import math
+import re
+
+#: factor to SI and physical dimension of every unit that a scene or recipe may use
+UNITS: dict[str, tuple[float, str]] = {
+    "m": (1.0, "length"),
+    "mm": (1e-3, "length"),
+    "um": (1e-6, "length"),
+    "cm": (1e-2, "length"),
+    "in": (0.0254, "length"),
+    "s": (1.0, "time"),
+    "ms": (1e-3, "time"),
+    "us": (1e-6, "time"),
+    "kg": (1.0, "mass"),
+    "g": (1e-3, "mass"),
+    "t": (1e3, "mass"),
+    "rad": (1.0, "angle"),
+    "mrad": (1e-3, "angle"),
+    "deg": (math.pi / 180.0, "angle"),
+    "N": (1.0, "force"),
+    "kN": (1e3, "force"),
+    "N m": (1.0, "torque"),
+    "N mm": (1e-3, "torque"),
+    "Pa": (1.0, "pressure"),
+    "MPa": (1e6, "pressure"),
+    "GPa": (1e9, "pressure"),
+    "Hz": (2.0 * math.pi, "angular velocity"),
+    "rpm": (math.pi / 30.0, "angular velocity"),
+    "rad/s": (1.0, "angular velocity"),
+    "deg/s": (math.pi / 180.0, "angular velocity"),
+    "m/s": (1.0, "velocity"),
+    "mm/s": (1e-3, "velocity"),
+    "m/s^2": (1.0, "acceleration"),
+    "mm/s^2": (1e-3, "acceleration"),
+    "kg/m^3": (1.0, "density"),
+    "g/cm^3": (1e3, "density"),
+    "kg m^2": (1.0, "inertia"),
+    "kg mm^2": (1e-6, "inertia"),
+    "g mm^2": (1e-9, "inertia"),
+    "m^2": (1.0, "area"),
+    "mm^2": (1e-6, "area"),
+    "m^4": (1.0, "second moment of area"),
+    "mm^4": (1e-12, "second moment of area"),
+    "N/m": (1.0, "stiffness"),
+    "N/mm": (1e3, "stiffness"),
+    "N/m^1.5": (1.0, "Hertz stiffness"),
+    "N s/m": (1.0, "damping"),
+    "N m/rad": (1.0, "torsional stiffness"),
+    "N m s/rad": (1.0, "torsional damping"),
+    "%": (1e-2, "number"),
+}
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
+
+
+def quantity(value: object, dimension: str) -> float:
+    """SI value of a bare number or a string like ``"20.5 mm"``.
+
+    Raises ValueError, in words, when the text is no quantity, the unit is unknown, the unit
+    belongs to another dimension, or the number is not finite.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"expected a {dimension}, a number or text like '1 {_example(dimension)}'")
+    if isinstance(value, str):
+        match = _QUANTITY.match(value)
+        if match is None:
+            raise ValueError(f"'{value}' is not a number with a unit")
+        number, unit = float(match[1]), match[2]
+        if unit is None:
+            factor = 1.0
+        elif unit not in UNITS:
+            raise ValueError(f"unknown unit '{unit}'; a {dimension} is written in {_known(dimension)}")
+        else:
+            factor, found = UNITS[unit]
+            if found != dimension:
+                raise ValueError(f"'{value}' is a {found}, but a {dimension} belongs here")
+        result = number * factor
+    else:
+        result = float(value)
+    if not math.isfinite(result):
+        raise ValueError(f"{value!r} is not a finite number")
+    return result
+
+
+def _known(dimension: str) -> str:
+    return ", ".join(unit for unit, (_, found) in UNITS.items() if found == dimension) or "SI"
+
+
+def _example(dimension: str) -> str:
+    return next((unit for unit, (_, found) in UNITS.items() if found == dimension), "")

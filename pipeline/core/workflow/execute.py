@@ -1,0 +1,84 @@
+"""One task in this process: fresh, or run and stored. And the state of a task, in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+
+from pipeline.core.artifacts.store import Record, Store
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import Task, facts, in_order, key, reasons
+
+#: told the done share of a task (None: unknown) and what it is doing
+Progress = Callable[[float | None, str], None]
+
+
+@dataclass(frozen=True)
+class State:
+    """Where a task stands. record: its artifact, when it is fresh. why: else the reasons, in words."""
+
+    task: Task
+    record: Record | None
+    why: tuple[str, ...]
+
+
+def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
+    """Key of the artifact that a task makes from these inputs."""
+    return key(_facts(task, inputs, sources))
+
+
+def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
+    """The fresh artifact of a task whose inputs are fresh, now also shown in its folder; or None."""
+    record = store.find(task.stage, key_of(task, inputs, sources))
+    if record is not None:
+        store.show(record, task.folder, task.names, task.label)
+    return record
+
+
+def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress) -> Record:
+    """The artifact of a task whose inputs are fresh, run if need be (once, over all processes)."""
+    task_facts = _facts(task, inputs, sources)
+    name = key(task_facts)
+    with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
+        record = Store(store.root).find(task.stage, name)  # whoever asked for the task has told its faults
+        if record is None:
+            module, _, function = task.run.partition(":")
+            run = getattr(import_module(module), function)
+            data = {name: store.load(above) for name, above in inputs.items()}
+            product = run(task.params, data, progress)
+            record = store.put(task.stage, name, product, task_facts)
+    store.show(record, task.folder, task.names, task.label)
+    return record
+
+
+def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
+    """State of each task and all its inputs, inputs first; nothing is run."""
+    found: dict[int, State] = {}
+    for task in in_order(tasks):
+        above = {name: found[id(t)].record for name, t in task.inputs.items()}
+        fresh = {name: record for name, record in above.items() if record is not None}
+        stale = frozenset(above.keys() - fresh.keys())
+        found[id(task)] = _state(task, fresh, stale, store, sources)
+    return list(found.values())
+
+
+def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
+    now = _facts(task, fresh, sources)
+    last = store.last(task.folder, task.label)
+    if last is None and stale:
+        return State(task, None, ("never run",))
+    above = [f"its input {name} would be made again" for name in sorted(stale)]
+    if not stale:
+        record = store.find(task.stage, key(now))
+        if record is not None:
+            return State(task, record, ())
+    why = reasons(now, None if last is None else last.facts, stale) + above
+    if not why and last is not None:
+        # nothing changed, so the artifact itself must be broken; `find` has said so if it is corrupt
+        why = [store.fault(last) or "its record in the cache is missing"]
+    return State(task, None, tuple(why))
+
+
+def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[str, str]:
+    return facts(task, {name: record.digest for name, record in inputs.items()}, sources)

@@ -1,0 +1,161 @@
+"""Which source a result depends on: the static import closure of modules, and their digests.
+
+Only names below `OWN` are followed; other top-level imports are libraries, which count by their
+version. Parts that are looked up by name at run time are not seen here: whoever builds a task
+names their modules as further roots.
+"""
+
+from __future__ import annotations
+
+import ast
+import contextlib
+import hashlib
+import json
+import re
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+from pipeline.core.artifacts.store import publish
+
+OWN = ("pipeline", "stages")
+#: distributions whose name differs from that of their import package
+DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg"}
+
+
+@dataclass(frozen=True, slots=True)
+class Module:
+    """One source file: digest of its bytes, own modules and libraries that it imports."""
+
+    digest: str
+    own: frozenset[str]
+    libraries: frozenset[str]
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The source tree under `root`, each file read at most once.
+
+    memo: file that remembers what each module imports, and the digest of the text that says so;
+    only edited files are parsed then.  None parses all of them.
+    A source is assumed not to change while one process looks at it.
+    """
+
+    root: Path
+    memo: Path | None = None
+    read: dict[str, Module | None] = field(default_factory=dict, repr=False, compare=False)
+    imports: dict[str, tuple[str, list[str], list[str]]] = field(default_factory=dict, repr=False, compare=False)
+    closures: dict[frozenset[str], dict[str, Module]] = field(default_factory=dict, repr=False, compare=False)
+
+    def closure(self, roots: Iterable[str]) -> dict[str, Module]:
+        """Every own module that `roots` reach by imports, packages on the way included.
+
+        Raises LookupError for a root that is no module of the tree.
+        """
+        wanted = frozenset(roots)
+        if wanted not in self.closures:
+            self._remember()
+            known = dict(self.imports)
+            self.closures[wanted] = self._reach(wanted)
+            if self.memo is not None and self.imports != known:
+                with contextlib.suppress(OSError):
+                    publish(self.memo, json.dumps(self.imports, sort_keys=True).encode())
+        return self.closures[wanted]
+
+    def module(self, name: str) -> Module | None:
+        """The module called `name`, or None when there is no such file (an attribute, say)."""
+        if name not in self.read:
+            base = self.root.joinpath(*name.split("."))
+            path = next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
+            self.read[name] = None if path is None else self._parse(path, name)
+        return self.read[name]
+
+    def _reach(self, wanted: frozenset[str]) -> dict[str, Module]:
+        found: dict[str, Module] = {}
+        waiting = sorted(wanted)
+        for name in waiting:
+            if self.module(name) is None:
+                raise LookupError(f"no module {name} under {self.root}")
+        while waiting:
+            name = waiting.pop()
+            module = self.module(name)
+            if name in found or module is None:
+                continue
+            found[name] = module
+            waiting.extend(module.own)
+            waiting.extend(parents(name))
+        return found
+
+    def _parse(self, path: Path, name: str) -> Module:
+        source = path.read_bytes()
+        digest = hashlib.sha256(source).hexdigest()
+        if self.imports.get(name, [""])[0] != digest:
+            own, libraries = imported(source, name, path.name == "__init__.py")
+            self.imports[name] = (digest, sorted(own), sorted(libraries))
+        _, own_names, library_names = self.imports[name]
+        return Module(digest, frozenset(own_names), frozenset(library_names))
+
+    def _remember(self) -> None:
+        """Read the memo, once; one that cannot be understood is as good as none."""
+        if self.memo is not None and not self.imports:
+            with contextlib.suppress(OSError, ValueError):
+                self.imports.update(json.loads(self.memo.read_bytes()))
+
+
+def parents(name: str) -> list[str]:
+    """Packages above a module: ``a.b.c`` -> ``a.b``, ``a``."""
+    parts = name.split(".")
+    return [".".join(parts[:n]) for n in range(1, len(parts))]
+
+
+def imported(source: bytes, name: str, package: bool) -> tuple[set[str], set[str]]:
+    """Own names and libraries that one source text imports; imports for type checkers do not count."""
+    own: set[str] = set()
+    libraries: set[str] = set()
+    for target in _imports(ast.parse(source).body, name if package else name.rpartition(".")[0]):
+        top = target.partition(".")[0]
+        if top in OWN:
+            own.add(target)
+        elif top not in sys.stdlib_module_names:
+            libraries.add(top)
+    return own, libraries
+
+
+def _imports(statements: Iterable[ast.stmt], package: str) -> Iterable[str]:
+    """Dotted names that statements import, at any depth; ``from a import b`` gives a and a.b."""
+    for node in statements:
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) + 1 - node.level] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            yield base
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.If) and _is_type_checking(node.test):
+            yield from _imports(node.orelse, package)
+        elif isinstance(node, ast.Match):
+            yield from (name for case in node.cases for name in _imports(case.body, package))
+        else:
+            # imports are statements, so expressions need not be walked
+            for block in ("body", "orelse", "handlers", "finalbody"):
+                yield from _imports(getattr(node, block, ()), package)
+
+
+def _is_type_checking(test: ast.expr) -> bool:
+    name = test.attr if isinstance(test, ast.Attribute) else getattr(test, "id", "")
+    return name == "TYPE_CHECKING"
+
+
+@cache
+def library_version(package: str) -> str:
+    """Version of the distribution that holds an import package; 'absent' when it is not installed."""
+    try:
+        metadata = distribution(DISTRIBUTIONS.get(package, package)).read_text("METADATA") or ""
+    except PackageNotFoundError:
+        return "absent"
+    # `importlib.metadata.version` parses the whole description as an e-mail, 5 ms for each library
+    found = re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
+    return found[1].strip() if found else "unknown"

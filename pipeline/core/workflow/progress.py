@@ -1,0 +1,119 @@
+"""Progress on stderr: which scene and stage is running and how long it still takes."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TextIO
+
+#: least time between two lines of one task where lines stay on the screen [s]
+SPARSE = 10.0
+#: least time between two redraws of the line on a terminal [s]
+REDRAW = 0.1
+#: an estimate of the rest is shown from this share on; before, it jumps about
+ENOUGH = 0.02
+
+
+@dataclass
+class Job:
+    """A running task as the screen knows it."""
+
+    name: str
+    begun: float
+    fraction: float | None = None
+    text: str = ""
+    said: float = 0.0
+
+
+@dataclass
+class Monitor:
+    """Shows running tasks: on a terminal as one line that is rewritten, else as sparse lines."""
+
+    out: TextIO = field(default_factory=lambda: sys.stderr)
+    clock: Callable[[], float] = time.monotonic
+    jobs: dict[str, Job] = field(default_factory=dict)
+    total: int = 0
+    done: int = 0
+    drawn: float = 0.0
+
+    def start(self, total: int) -> None:
+        """`total` tasks are to be run."""
+        self.total, self.done = total, 0
+
+    def begin(self, scene: str, label: str) -> str:
+        """A task starts; returns the name to report under."""
+        name = f"{scene}: {label}"
+        self.jobs[name] = Job(name, self.clock(), said=self.clock())
+        self._show(f"{self._count()} {name}")
+        return name
+
+    def update(self, name: str, fraction: float | None, text: str) -> None:
+        """A task is `fraction` done (None: unknown) and doing `text`."""
+        job = self.jobs.get(name)
+        if job is None:
+            return
+        news = fraction is None and text != job.text
+        job.fraction, job.text = fraction, text
+        if self.out.isatty() or news or self.clock() - job.said >= SPARSE:
+            job.said = self.clock()
+            self._show(f"{self._count()} {self._line(job)}")
+
+    def finish(self, name: str, *, failed: bool) -> None:
+        """A task has ended."""
+        job = self.jobs.pop(name)
+        self.done += 1
+        seconds = self.clock() - job.begun
+        if not self.out.isatty() and (failed or seconds >= 1.0):
+            self._show(f"{self._count()} {name} {'failed' if failed else 'done'} after {duration(seconds)}")
+        elif self.out.isatty():
+            self._show("")
+
+    def end(self) -> None:
+        """All tasks have ended; clears the line."""
+        if self.out.isatty():
+            self._write("\r\033[K")
+
+    def say(self, text: str) -> None:
+        """One line that stays."""
+        self._write(("\r\033[K" if self.out.isatty() else "") + f"flexclear: {text}\n")
+
+    def _count(self) -> str:
+        return f"[{self.done}/{self.total}]"
+
+    def _line(self, job: Job) -> str:
+        parts = [job.name]
+        if job.fraction is not None:
+            parts.append(f"{job.fraction:4.0%}")
+            if job.fraction >= ENOUGH:
+                parts.append(f"{duration((self.clock() - job.begun) * (1.0 / job.fraction - 1.0))} left")
+        return " ".join([*parts, *([job.text] if job.text else [])])
+
+    def _show(self, text: str) -> None:
+        if not self.out.isatty():
+            self._write(f"flexclear: {text}\n")
+        elif self.clock() - self.drawn >= REDRAW or not text:
+            self.drawn = self.clock()
+            line = f"{self._count()} " + " | ".join(self._line(job) for job in self.jobs.values())
+            self._write("\r\033[K" + line[: _columns(self.out)])
+
+    def _write(self, text: str) -> None:
+        self.out.write(text)
+        self.out.flush()
+
+
+def duration(seconds: float) -> str:
+    """``4.2 s``, ``3 min 10 s``."""
+    if seconds < 60.0:
+        return f"{seconds:.1f} s"
+    return f"{seconds // 60:.0f} min {seconds % 60:.0f} s"
+
+
+def _columns(out: TextIO) -> int:
+    import os
+
+    try:
+        return os.get_terminal_size(out.fileno()).columns - 1
+    except (OSError, ValueError):
+        return 79

@@ -1,0 +1,252 @@
+"""Brings tasks up to date over the cores there are: fresh ones are found, stale ones run as soon as
+their inputs are there."""
+
+from __future__ import annotations
+
+import os
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core.artifacts.store import Record, Store
+from pipeline.core.errors import FlexclearError, ResourceError
+from pipeline.core.workflow.execute import Progress, execute, find, key_of
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.progress import Monitor
+from pipeline.core.workflow.task import Task, in_order
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future, ProcessPoolExecutor
+
+#: how often the progress of workers is looked at [s]
+TICK = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """A task that could not be done: the exit code and what to tell the user."""
+
+    task: Task
+    exit_code: int
+    message: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the tasks asked for: records by task (by identity), and the failures."""
+
+    records: Mapping[int, Record]
+    failures: tuple[Failure, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Running:
+    """A task in a worker: its key, since the same artifact is not asked for twice, and its name on the screen."""
+
+    task: Task
+    key: str
+    name: str
+
+
+@dataclass
+class _Plan:
+    """Book-keeping of one call: what is done, what failed, what still waits."""
+
+    waiting: list[Task]
+    done: dict[int, Record] = field(default_factory=dict)
+    failed: dict[int, Failure] = field(default_factory=dict)
+
+    def inputs(self, task: Task) -> dict[str, Record]:
+        return {name: self.done[id(above)] for name, above in task.inputs.items()}
+
+    def ready(self) -> list[Task]:
+        return [t for t in self.waiting if all(id(above) in self.done for above in t.inputs.values())]
+
+    def give_up_below_failures(self) -> None:
+        """Tasks whose inputs failed are left out silently; the failure itself is reported."""
+        for task in list(self.waiting):
+            broken = next((self.failed[id(a)] for a in task.inputs.values() if id(a) in self.failed), None)
+            if broken is not None:
+                self.failed[id(task)] = broken
+                self.waiting.remove(task)
+
+
+def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, jobs: int | None = None) -> Outcome:
+    """Bring tasks and all their inputs up to date; a failure stops only what depends on it.
+
+    jobs: processes at most; default: the cores this process may use.  KeyboardInterrupt ends the
+    workers and passes through.
+    """
+    plan = _Plan(in_order(tasks))
+    _settle_fresh(plan, store, sources)
+    if plan.waiting:
+        monitor.start(len(plan.waiting))
+        width = min(jobs or cores(), _width(plan.waiting))
+        if width == 1:
+            _alone(plan, store, sources, monitor)
+        else:
+            _together(plan, store, sources, monitor, width)
+        monitor.end()
+    failures = {id(f): f for f in plan.failed.values()}
+    return Outcome(plan.done, tuple(failures.values()))
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _width(tasks: list[Task]) -> int:
+    """How many tasks can run side by side at most: chains, counted by what nothing waits for."""
+    return max(1, len({(t.scene, t.part) for t in tasks if not t.exclusive}))
+
+
+def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
+    """Tasks are in order, so one pass finds all that is fresh."""
+    for task in list(plan.waiting):
+        if all(id(above) in plan.done for above in task.inputs.values()):
+            record = find(task, plan.inputs(task), store, sources)
+            if record is not None:
+                plan.done[id(task)] = record
+                plan.waiting.remove(task)
+
+
+def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
+    """One after the other in this process."""
+    while ready := plan.ready():
+        task = ready[0]
+        plan.waiting.remove(task)
+        name = monitor.begin(task.scene, task.label)
+        result = attempt(task, plan.inputs(task), store, sources, partial(monitor.update, name))
+        _note(plan, task, result)
+        monitor.finish(name, failed=isinstance(result, Failure))
+        plan.give_up_below_failures()
+
+
+def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
+    """In worker processes; spawned, because compiled kernels and forks do not mix."""
+    # imported here, because a run that finds everything fresh must start quickly
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor
+
+    context = multiprocessing.get_context("spawn")
+    with context.Manager() as server:
+        reports = server.Queue()
+        pool = ProcessPoolExecutor(width, mp_context=context, initializer=_leave_interrupts_to_parent)
+        running: dict[Future[Record | Failure], _Running] = {}
+        try:
+            while plan.waiting or running:
+                _submit(plan, running, pool, width, (store, sources, reports), monitor)
+                _collect(plan, running, monitor)
+                _relay(reports, monitor)
+        except BaseException:
+            _kill(pool)
+            raise
+        pool.shutdown()
+
+
+def _submit(
+    plan: _Plan,
+    running: dict[Future[Record | Failure], _Running],
+    pool: ProcessPoolExecutor,
+    width: int,
+    common: tuple[Store, Sources, Any],
+    monitor: Monitor,
+) -> None:
+    """Hand out ready tasks while workers are free; an exclusive one only to an idle pool.
+
+    Tasks whose artifact is being made already wait for it; those whose artifact is there by now,
+    made for another scene, are done.
+    """
+    store, sources, reports = common
+    for task in sorted(plan.ready(), key=lambda t: t.exclusive):
+        alone = any(other.task.exclusive for other in running.values())
+        if len(running) >= width or alone or (task.exclusive and running):
+            return
+        inputs = plan.inputs(task)
+        key = key_of(task, inputs, sources)
+        if any(other.key == key for other in running.values()):
+            continue
+        plan.waiting.remove(task)
+        name = monitor.begin(task.scene, task.label)
+        record = find(task, inputs, store, sources)
+        if record is not None:
+            _note(plan, task, record)
+            monitor.finish(name, failed=False)
+            continue
+        future = pool.submit(_work, task, inputs, name, store.root, sources.root, sources.memo, reports)
+        running[future] = _Running(task, key, name)
+
+
+def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], monitor: Monitor) -> None:
+    from concurrent.futures import FIRST_COMPLETED, wait
+    from concurrent.futures.process import BrokenProcessPool
+
+    done, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
+    for future in done:
+        job = running.pop(future)
+        task, name = job.task, job.name
+        try:
+            result = future.result()
+        except BrokenProcessPool:
+            told = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
+            raise ResourceError(told) from None
+        _note(plan, task, result)
+        monitor.finish(name, failed=isinstance(result, Failure))
+    plan.give_up_below_failures()
+
+
+def _relay(reports: Any, monitor: Monitor) -> None:
+    while not reports.empty():
+        monitor.update(*reports.get())
+
+
+def _leave_interrupts_to_parent() -> None:
+    """Ctrl-C reaches the whole group; the parent alone decides what it means, and ends the workers."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _kill(pool: ProcessPoolExecutor) -> None:
+    """End the workers at once; a compiled kernel does not listen to interrupts."""
+    for process in list((pool._processes or {}).values()):
+        process.kill()
+    pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
+    if isinstance(result, Failure):
+        plan.failed[id(task)] = result
+    else:
+        plan.done[id(task)] = result
+
+
+def _work(
+    task: Task, inputs: Mapping[str, Record], name: str, root: Path, source: Path, memo: Path | None, reports: Any
+) -> Record | Failure:
+    """In a worker: the same as in `_alone`, with progress sent home."""
+
+    def progress(fraction: float | None, text: str) -> None:
+        reports.put((name, fraction, text))
+
+    return attempt(task, inputs, Store(root, say=partial(progress, None)), Sources(source, memo), progress)
+
+
+def attempt(
+    task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress
+) -> Record | Failure:
+    """The record, or the failure with what the user is told. A mistake of this program is told with
+    its traceback, since only that helps then."""
+    try:
+        return execute(task, inputs, store, sources, progress)
+    except FlexclearError as error:
+        code, told = error.exit_code, str(error)
+    except MemoryError:
+        code, told = ResourceError.exit_code, "the memory is full"
+    except Exception:
+        code, told = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
+    return Failure(task, code, f"{task.scene} {task.label}: {told}")

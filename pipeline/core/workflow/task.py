@@ -1,0 +1,117 @@
+"""A task: one artifact to be brought up to date. Its facts, its key, and why it would run again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from pipeline.core.workflow.fingerprint import Sources, library_version
+
+#: libraries that every artifact passes through on its way to disk
+STORE = "pipeline.core.artifacts.store"
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What to run, with what, and where its files are shown.
+
+    stage: name of the stage and of its folder in the cache.
+    part: the body (or figure) it is about; empty when the stage has one artifact per scene.
+    run: ``"module:function"``, called as ``run(params, inputs, progress)``; see `execute`.
+    params: all that the function may know, as JSON; nothing else may change its result.
+    inputs: tasks whose artifact ``nc`` it is given, by name.
+    modules: modules that it reaches by a name in `params`, beside those it imports.
+    folder: where its files are shown, below the results folder; empty: nowhere.
+    names: file of the artifact -> name shown there; a file that is not listed keeps its name.
+    exclusive: whether nothing else may run beside it (measurements of time).
+    """
+
+    stage: str
+    scene: str
+    run: str
+    params: Mapping[str, Any]
+    folder: str
+    part: str = ""
+    inputs: Mapping[str, Task] = field(default_factory=dict)
+    modules: tuple[str, ...] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+    exclusive: bool = False
+
+    @property
+    def label(self) -> str:
+        """Name within the scene, e.g. ``mesh rod1``."""
+        return f"{self.stage} {self.part}".strip()
+
+
+def in_order(tasks: list[Task]) -> list[Task]:
+    """`tasks` and all their inputs, each once, inputs first."""
+    found: dict[int, Task] = {}
+
+    def visit(task: Task) -> None:
+        for above in task.inputs.values():
+            visit(above)
+        found.setdefault(id(task), task)
+
+    for task in tasks:
+        visit(task)
+    return list(found.values())
+
+
+def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
+    """Everything that decides the artifact, in words: kind and name -> value.
+
+    digests: digest of each input that is known; leave one out to compare the rest.
+    """
+    result = {f"parameter {name}": value for name, value in flatten(task.params)}
+    result |= {f"input {name}": digest for name, digest in digests.items()}
+    module = task.run.partition(":")[0]
+    closure = sources.closure((module, STORE, *task.modules))
+    result |= {f"module {name}": module.digest for name, module in closure.items()}
+    libraries = sorted(set().union(*(module.libraries for module in closure.values())))
+    result |= {f"library {name}": library_version(name) for name in libraries}
+    return dict(sorted({**result, "function": task.run}.items()))
+
+
+def key(task_facts: Mapping[str, str]) -> str:
+    """Name of the artifact in the cache: sha256 of the facts, 32 hexadecimal digits."""
+    text = json.dumps(task_facts, sort_keys=True, ensure_ascii=False)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
+    """Dotted place -> canonical text of every leaf of a JSON tree; floats by repr.
+
+    Empty tables and lists are leaves, so that adding an empty one is seen.
+    """
+    if isinstance(node, Mapping) and node:
+        items = [(str(name), value) for name, value in node.items()]
+    elif isinstance(node, (list, tuple)) and any(isinstance(x, (Mapping, list, tuple)) for x in node):
+        items = [(str(n), value) for n, value in enumerate(node)]
+    else:
+        return [(place, json.dumps(node, allow_nan=False, ensure_ascii=False))]
+    return [leaf for name, value in items for leaf in flatten(value, f"{place}.{name}".lstrip("."))]
+
+
+def reasons(new: Mapping[str, str], last: Mapping[str, str] | None, unknown: frozenset[str] = frozenset()) -> list[str]:
+    """Why to run again, in words; empty when nothing changed.
+
+    last: facts of the artifact made last, None when there is none.
+    unknown: inputs (by name) that will themselves be made again; they are not compared.
+    """
+    if last is None:
+        return ["never run"]
+    skipped = {f"input {name}" for name in unknown}
+    names = sorted((new.keys() | last.keys()) - skipped)
+    return [_reason(name, last.get(name), new.get(name)) for name in names if last.get(name) != new.get(name)]
+
+
+def _reason(fact: str, old: str | None, new: str | None) -> str:
+    kind, _, name = fact.partition(" ")
+    if kind in ("parameter", "library"):
+        what = f"{name}: " if kind == "parameter" else f"library {name}: "
+        return f"{what}{'(absent)' if old is None else old} -> {'(absent)' if new is None else new}"
+    verb = "is new" if old is None else "is no longer used" if new is None else "changed"
+    return f"{kind} {name} {verb}".replace("function  ", "function ")

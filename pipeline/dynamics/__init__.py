@@ -1,0 +1,35 @@
+"""The multibody tower: a scene and its bundles in, a run dataset out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+
+Progress = Callable[[float | None, str], None]
+
+__all__ = ["ensemble", "simulate"]
+
+
+def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """One run of a scene (schema RUN).
+
+    bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
+    """
+    from pipeline.dynamics.record.dataset import dataset
+    from pipeline.dynamics.run import integrate
+
+    done = integrate(scene, bundles, progress)
+    return dataset(done.engine.built, done.trajectory, done.observed, done.start_residual)
+
+
+def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
+    from pipeline.dynamics.record.ensemble import ensemble as run
+
+    return run(scene, bundles, progress)

@@ -1,0 +1,223 @@
+r"""Loop closures: rows, Jacobian, and the multipliers that keep them closed.
+
+A closure row is a wrench (moment about the world's origin, force); its Jacobian against a
+coordinate is that wrench times the coordinate's column. With :math:`M = LL^T` the multipliers solve
+
+.. math:: (J M^{-1} J^T)\lambda = \gamma - J M^{-1} f, \qquad
+          M\dot v = f + J^T\lambda
+
+with :math:`L^{-1}J^T` kept on the support of each closure (the coordinates on the way to the ground).
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.assembly.envelope import backward, base, factor, forward
+from pipeline.dynamics.tables import (
+    ACCELERATION,
+    ALPHA,
+    AXES,
+    CLOSURE_ENVELOPE,
+    CLOSURE_PAIRS,
+    CLOSURE_ROWS,
+    COMMON,
+    DRIVE_FORCE,
+    ENTRIES,
+    ENTRY0,
+    ENVELOPE,
+    EVALUATION,
+    FORCE,
+    GAMMA,
+    JACOBIAN,
+    JACOBIAN0,
+    KNOWN_ENTRIES,
+    MASS,
+    MULTIPLIER,
+    N_CLOSURE_PAIRS,
+    N_CLOSURE_ROWS,
+    N_CLOSURES,
+    N_ENTRIES,
+    N_KNOWN_ENTRIES,
+    N_ROWS,
+    N_SUPPORT,
+    NV,
+    OK,
+    OMEGA,
+    ORIGIN,
+    RESIDUAL,
+    RESIDUAL_RATE,
+    ROW0,
+    ROWS,
+    SCHUR,
+    SCHUR_SIZE,
+    SINGULAR,
+    SITE_A,
+    SITE_B,
+    SPREAD,
+    SUPPORT,
+    SUPPORT0,
+    VELOCITY,
+    closure,
+    column,
+    site_frame,
+)
+from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, dot6, index, kernel, put, scale, sub
+
+#: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
+SINGULAR_PIVOT = 1e-13
+
+
+@kernel
+def rows(h, w, c):
+    """Wrenches, residuals [m or -], their rates, and acceleration biases of closure c."""
+    a, b = site_frame(h, closure(h, c, SITE_A)), site_frame(h, closure(h, c, SITE_B))
+    A, B = at9(w, a + AXES), at9(w, b + AXES)
+    omega_a, omega_b = at(w, a + OMEGA), at(w, b + OMEGA)
+    p_b = at(w, b + ORIGIN)
+    r = sub(p_b, at(w, a + ORIGIN))
+    slide = sub(sub(at(w, b + VELOCITY), at(w, a + VELOCITY)), cross(omega_a, r))
+    bias = sub(sub(at(w, b + ACCELERATION), at(w, a + ACCELERATION)), cross(at(w, a + ALPHA), r))
+    bias = sub(bias, add(cross(omega_a, cross(omega_a, r)), scale(2.0, cross(omega_a, slide))))
+    turning, turning_rate = sub(omega_b, omega_a), sub(at(w, b + ALPHA), at(w, a + ALPHA))
+    first = closure(h, c, ROW0)
+    for k in range(first, first + closure(h, c, N_ROWS)):
+        o, declared = h[ROWS] + 6 * k, h[CLOSURE_ROWS] + 3 * k
+        along = axis(A, h[index(declared + 1)])
+        if h[index(declared)] == 0:
+            put(w, o, cross(p_b, along))
+            put(w, o + 3, along)
+            w[index(h[RESIDUAL] + k)] = dot(along, r)
+            w[index(h[RESIDUAL_RATE] + k)] = dot(along, slide)
+            w[index(h[GAMMA] + k)] = -dot(along, bias)
+        else:
+            against = axis(B, h[index(declared + 2)])
+            about = cross(against, along)
+            swing = add(cross(cross(omega_b, against), along), cross(against, cross(omega_a, along)))
+            put(w, o, about)
+            put(w, o + 3, (0.0, 0.0, 0.0))
+            w[index(h[RESIDUAL] + k)] = dot(along, against)
+            w[index(h[RESIDUAL_RATE] + k)] = dot(turning, about)
+            w[index(h[GAMMA] + k)] = -dot(turning_rate, about) - dot(turning, swing)
+
+
+@kernel
+def jacobian(h, w, c):
+    """Jacobian of closure c on its support, row after row."""
+    start, size, count = h[JACOBIAN] + closure(h, c, JACOBIAN0), closure(h, c, N_SUPPORT), closure(h, c, N_ROWS)
+    for k in range(start, start + size * count):
+        w[index(k)] = 0.0
+    first, wrenches = h[ENTRIES] + 3 * closure(h, c, ENTRY0), h[ROWS] + 6 * closure(h, c, ROW0)
+    for e in range(closure(h, c, N_ENTRIES)):
+        slot, col, sign = h[index(first + 3 * e)], column(h, h[index(first + 3 * e + 1)]), h[index(first + 3 * e + 2)]
+        for k in range(count):
+            w[index(start + k * size + slot)] += sign * dot6(w, wrenches + 6 * k, w, col)
+
+
+@kernel
+def spread(h, w, c):
+    """L^-1 J^T of closure c, on its support."""
+    size, support = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0)
+    j0 = closure(h, c, JACOBIAN0)
+    for r in range(closure(h, c, N_ROWS)):
+        J, S = h[JACOBIAN] + j0 + r * size, h[SPREAD] + j0 + r * size
+        for a in range(size):
+            i = h[index(support + a)]
+            first, row = h[index(h[ENVELOPE] + 2 * i)], base(h, h[ENVELOPE], h[MASS], i)
+            total = w[index(J + a)]
+            for b in range(a):
+                k = h[index(support + b)]
+                if k >= first:
+                    total -= w[index(row + k)] * w[index(S + b)]
+            w[index(S + a)] = total / w[index(row + i)]
+
+
+@kernel
+def couple(h, w, p):
+    """The block of J M^-1 J^T between the closures of pair p."""
+    o = h[CLOSURE_PAIRS] + 4 * p
+    a, b, common, count = h[index(o)], h[index(o + 1)], h[COMMON] + 2 * h[index(o + 2)], h[index(o + 3)]
+    A, B = h[SPREAD] + closure(h, a, JACOBIAN0), h[SPREAD] + closure(h, b, JACOBIAN0)
+    size_a, size_b = closure(h, a, N_SUPPORT), closure(h, b, N_SUPPORT)
+    for r in range(closure(h, b, N_ROWS)):
+        row = base(h, h[CLOSURE_ENVELOPE], h[SCHUR], closure(h, b, ROW0) + r) + closure(h, a, ROW0)
+        for s in range(r + 1 if a == b else closure(h, a, N_ROWS)):
+            total = 0.0
+            for k in range(count):
+                total += w[index(A + s * size_a + h[index(common + 2 * k)])] * w[index(B + r * size_b + h[index(common + 2 * k + 1)])]
+            w[index(row + s)] = total
+
+
+@kernel
+def prepare(h, w, n):
+    """Rows, Jacobians and the factor of J M^-1 J^T; needs the factor of M."""
+    for c in range(h[N_CLOSURES]):
+        rows(h, w, c)
+        jacobian(h, w, c)
+        spread(h, w, c)
+    for k in range(h[SCHUR], h[SCHUR] + h[SCHUR_SIZE]):
+        w[index(k)] = 0.0
+    for p in range(h[N_CLOSURE_PAIRS]):
+        couple(h, w, p)
+    ratio = factor(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_CLOSURE_ROWS], SINGULAR_PIVOT)
+    n[EVALUATION] = OK if ratio > SINGULAR_PIVOT else SINGULAR
+
+
+@kernel
+def add_spread(h, w, y, weight):
+    """y <- y + weight L^-1 J^T lambda, y in w."""
+    for c in range(h[N_CLOSURES]):
+        size, support = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0)
+        for r in range(closure(h, c, N_ROWS)):
+            amount = weight * w[index(h[MULTIPLIER] + closure(h, c, ROW0) + r)]
+            S = h[SPREAD] + closure(h, c, JACOBIAN0) + r * size
+            for a in range(size):
+                w[index(y + h[index(support + a)])] += amount * w[index(S + a)]
+
+
+@kernel
+def solve(h, w):
+    """Multipliers from their right-hand side, in place."""
+    forward(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_CLOSURE_ROWS], h[MULTIPLIER])
+    backward(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_CLOSURE_ROWS], h[MULTIPLIER])
+
+
+@kernel
+def close(h, w, n):
+    """Multipliers, and FORCE (holding L^-1 f) completed by them: L^-T then gives the accelerations."""
+    prepare(h, w, n)
+    if n[EVALUATION] != OK:
+        return
+    for c in range(h[N_CLOSURES]):
+        size, support = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0)
+        for r in range(closure(h, c, N_ROWS)):
+            row, S = closure(h, c, ROW0) + r, h[SPREAD] + closure(h, c, JACOBIAN0) + r * size
+            total = w[index(h[GAMMA] + row)]
+            for a in range(size):
+                total -= w[index(S + a)] * w[index(h[FORCE] + h[index(support + a)])]
+            w[index(h[MULTIPLIER] + row)] = total
+    solve(h, w)
+    add_spread(h, w, h[FORCE], 1.0)
+
+
+@kernel
+def known_forces(h, w):
+    """Take the closures' share out of the forces that the drives must supply."""
+    for e in range(h[N_KNOWN_ENTRIES]):
+        o = h[KNOWN_ENTRIES] + 4 * e
+        c, d, col, sign = h[index(o)], h[index(o + 1)], column(h, h[index(o + 2)]), h[index(o + 3)]
+        for k in range(closure(h, c, ROW0), closure(h, c, ROW0) + closure(h, c, N_ROWS)):
+            w[index(h[DRIVE_FORCE] + d)] -= sign * dot6(w, h[ROWS] + 6 * k, w, col) * w[index(h[MULTIPLIER] + k)]
+
+
+@kernel
+def correction(h, w, residual, step):
+    """The least correction of the coordinates, in the metric of M, that undoes a residual.
+
+    step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `prepare`.
+    """
+    for k in range(h[N_CLOSURE_ROWS]):
+        w[index(h[MULTIPLIER] + k)] = w[index(residual + k)]
+    solve(h, w)
+    for k in range(h[NV]):
+        w[index(step + k)] = 0.0
+    add_spread(h, w, step, -1.0)
+    backward(h, h[ENVELOPE], w, h[MASS], h[NV], step)

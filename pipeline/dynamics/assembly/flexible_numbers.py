@@ -1,0 +1,130 @@
+"""Tables of the flexible bodies, from their bundles."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.scene.parts import FlexibleBody
+from pipeline.dynamics.assembly.layout import Layout
+from pipeline.dynamics.assembly.wiring import integers
+
+#: a shape or moment below this share of the largest of its kind is rounding, not coupling
+NEGLIGIBLE = 1e-13
+
+
+def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Wiring (FLEXES, MOMENTS, PORTS) and numbers (FLEX_NUMBERS .. PORT_DATA) of the flexible bodies."""
+    flex, flex_real, data, index, value = [], [], [], [], []
+    data0 = moment0 = 0
+    order = sorted(layout.modes)
+    for i in order:
+        link = layout.system.links[i]
+        body = layout.system.scene.body[str(link.flexible)]
+        assert isinstance(body, FlexibleBody)
+        bundle = layout.system.bundles[str(link.flexible)]
+        n = layout.modes[i]
+        moments, where = _moments(bundle)
+        chunk = _data(bundle, body.damping or 0.0)
+        moves = int(_inboard_moves(layout, i, bundle))
+        flex.append((i, n, layout.flex_q0[i], layout.flex_c0[i], data0, moment0, len(moments), moves))
+        flex_real.append(
+            [float(bundle["mass"]), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
+        )
+        data.append(chunk)
+        value.append(moments)
+        index.append(where)
+        data0 += len(chunk)
+        moment0 += len(moments)
+    port, port_real, port_data = _ports(layout, order)
+    wiring = {
+        "FLEXES": integers(flex, 8),
+        "MOMENTS": np.concatenate([*index, np.zeros((0, 2), dtype=np.int64)]),
+        "PORTS": port,
+    }
+    numbers = {
+        "FLEX_NUMBERS": np.array(flex_real, dtype=float).reshape(-1, 13),
+        "FLEX_DATA": np.concatenate([*data, np.zeros(0)]),
+        "MOMENT_VALUES": np.concatenate([*value, np.zeros(0)]),
+        "PORT_NUMBERS": port_real,
+        "PORT_DATA": port_data,
+    }
+    return wiring, numbers
+
+
+def _data(bundle: xr.Dataset, damping: float) -> np.ndarray:
+    """C1 (3n), E (9n), modal mass, stiffness (n n each), damping 2 zeta omega (n)."""
+    omega = 2.0 * np.pi * bundle["frequency"].values
+    chunks = [
+        bundle["modal_first_moment"].values,
+        bundle["position_mode_moment"].values,
+        bundle["modal_mass"].values,
+        bundle["modal_stiffness"].values,
+        2.0 * damping * omega,
+    ]
+    return np.concatenate([c.ravel() for c in chunks])
+
+
+def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Nonzero int rho S_ki S_lj as values and (row (3k + l) n + j, i)."""
+    F = bundle["mode_mode_moment"].values
+    n = F.shape[-1]
+    k, l, i, j = np.nonzero(np.abs(F) > NEGLIGIBLE * max(np.abs(F).max(), 1e-300))
+    row = (3 * k + l) * n + j
+    order = np.lexsort((i, row))
+    where = np.stack([row[order], i[order]], axis=1).astype(np.int64)
+    return F[k, l, i, j][order], where
+
+
+def _frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
+    k = list(bundle["frame"].values).index(frame)
+    pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
+    shapes = [bundle[name].values[k].copy() for name in ("frame_translation_shape", "frame_rotation_shape")]
+    for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):
+        # what the reference condition holds still is exactly still
+        scale = np.abs(bundle[name].values).max()
+        shape[np.abs(shape) <= NEGLIGIBLE * 1e3 * scale] = 0.0
+    return pose, shapes[0], shapes[1]
+
+
+def _inboard_frame(layout: Layout, i: int) -> str | None:
+    """Name of the frame by which a flexible link hangs in the tree; None for a free body."""
+    branch = layout.system.links[i].branch
+    if branch.edge is None:
+        return None
+    name = branch.edge.frame_a if branch.reverse else branch.edge.frame_b
+    return name.partition(".")[2]
+
+
+def _inboard_moves(layout: Layout, i: int, bundle: xr.Dataset) -> bool:
+    frame = _inboard_frame(layout, i)
+    if frame is None:
+        return False
+    _, translation, rotation = _frame_shapes(bundle, frame)
+    return bool(np.any(translation) or np.any(rotation))
+
+
+def _ports(layout: Layout, order: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ports of sites first, then one inboard port per flexible link (Layout.port_of_inboard)."""
+    rows, reals, data, start = [], [], [], 0
+
+    def add(link: int, frame: str | None, column: int) -> None:
+        nonlocal start
+        bundle = layout.system.bundles[str(layout.system.links[link].flexible)]
+        n = layout.modes[link]
+        if frame is None:
+            pose, shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), [np.zeros(3 * n)] * 2
+        else:
+            pose, *found = _frame_shapes(bundle, frame)
+            shapes = [s.ravel() for s in found]
+        rows.append((order.index(link), column, start))
+        reals.append(pose)
+        data.extend(shapes)
+        start += 6 * n
+
+    for site, frame, column in layout.ports:
+        add(layout.sites[site].link, frame.partition(".")[2], column)
+    for i in order:
+        add(i, _inboard_frame(layout, i), -1)
+    return integers(rows, 3), np.array(reals, dtype=float).reshape(-1, 12), np.concatenate([*data, np.zeros(0)])

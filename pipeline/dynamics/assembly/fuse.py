@@ -1,0 +1,182 @@
+"""One compiled entry per set of part kinds, cached on disk across processes.
+
+The entry is a generated file that composes exactly the kernels of the kinds present: what a scene
+does not call for is neither imported nor compiled. Its name is a digest of the sources of all
+kernels it can reach and of the versions of the compiler, because Numba's own cache looks at the
+entry's file alone and would keep stale callees.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import llvmlite
+import numba
+
+from pipeline.core.artifacts.paths import results_root
+from pipeline.core.registry import module_of
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.dynamics.assembly.numbers import Kinds
+
+SOURCES = Sources(Path(__file__).resolve().parents[3])
+PACKAGES = {
+    "joint": "pipeline.dynamics.joints",
+    "normal": "pipeline.dynamics.contact.normal",
+    "friction": "pipeline.dynamics.contact.friction",
+    "integrator": "pipeline.dynamics.integrate",
+}
+
+
+def entry(kinds: Kinds, integrator: str) -> ModuleType:
+    """The module with the compiled functions `advance`, `observe` and `evaluate` for these kinds."""
+    source = _source(kinds, integrator)
+    name = f"flexclear_kernels_{_digest(source)}"
+    if name in sys.modules:
+        return sys.modules[name]
+    path = _folder() / f"{name}.py"
+    if not path.exists():
+        _write(path, source)
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def is_compiled(kinds: Kinds, integrator: str) -> bool:
+    """Whether the machine code of this entry is on disk already."""
+    name = f"flexclear_kernels_{_digest(_source(kinds, integrator))}"
+    return any((_folder() / "__pycache__").glob(f"{name}.advance*.nbc"))
+
+
+def _folder() -> Path:
+    folder = results_root() / "cache" / "kernels"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _write(path: Path, source: str) -> None:
+    temporary = path.with_suffix(f".{os.getpid()}.tmp")
+    temporary.write_text(source)
+    os.replace(temporary, path)
+
+
+def _digest(source: str) -> str:
+    """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
+    digest = hashlib.sha256(source.encode())
+    digest.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
+    roots = {line.split()[1] for line in source.splitlines() if line.startswith("from pipeline")}
+    reached = SOURCES.closure(roots)
+    for name in sorted(reached):
+        if name.startswith("pipeline.dynamics"):
+            digest.update(reached[name].digest.encode())
+    return digest.hexdigest()[:20]
+
+
+def _source(kinds: Kinds, integrator: str) -> str:
+    lines = [
+        f'"""Generated: joints {kinds.joints}, normal laws {kinds.normals}, friction {kinds.frictions}."""',
+        "from numba import njit",
+        "from pipeline.dynamics.assembly import dispatch, equations, kinematics as motion",
+        "from pipeline.dynamics.bodies import rigid",
+        "from pipeline.dynamics.integrate import explicit, observe as observing, project as projecting",
+        f"from {module_of(PACKAGES['integrator'], integrator)} import METHOD",
+    ]
+    lines += _imports("joint", kinds.joints, ("motion",))
+    lines.append(f"joint_motion = dispatch.joints({_names('joint', 'motion', kinds.joints)})")
+    lines += _flexible_lines(kinds.flexible)
+    lines += _contact_lines(kinds)
+    lines += _closure_lines(kinds.closures)
+    lines += [_BODY, _ENTRIES]
+    return "\n".join(lines) + "\n"
+
+
+def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...]) -> list[str]:
+    return [
+        f"from {module_of(PACKAGES[family], name)} import "
+        + ", ".join(f"{function} as {family}_{function}_{k}" for function in functions)
+        for k, name in enumerate(names)
+    ]
+
+
+def _names(family: str, function: str, names: tuple[str, ...]) -> str:
+    return "(" + "".join(f"{family}_{function}_{k}, " for k in range(len(names))) + ")"
+
+
+def _flexible_lines(present: bool) -> list[str]:
+    if not present:
+        return [
+            "port, inboard = motion.no_port, motion.no_inboard",
+            "flexible_inertia, port_load, modal = equations.no_flexible, equations.no_port_load, equations.no_modal",
+            "flexible_observed, flexible_energy = observing.no_modal, observing.no_energy",
+        ]
+    return [
+        "from pipeline.dynamics.bodies import flexible, ports",
+        "port, inboard = ports.site, ports.inboard",
+        "flexible_inertia = equations.flexible_inertia(flexible.inertia, flexible.mass_matrix)",
+        "port_load, modal = equations.gather_port, equations.modal_forces",
+        "flexible_observed = observing.modal_inertias(flexible.inertia, flexible.modal_inertia)",
+        "flexible_energy = observing.flexible_energies(flexible.energies)",
+    ]
+
+
+def _contact_lines(kinds: Kinds) -> list[str]:
+    if not kinds.normals:
+        return ["contacts = equations.no_contacts", "events = (explicit.watch_nothing, explicit.settle_nothing)"]
+    return [
+        "from pipeline.dynamics.joints import clearance_spherical",
+        "from pipeline.dynamics.integrate.events import EVENTS_OF_CONTACTS as events",
+        *_imports("normal", kinds.normals, ("force", "stored")),
+        *_imports("friction", kinds.frictions, ("coefficient",)),
+        f"normal = dispatch.normals({_names('normal', 'force', kinds.normals)})",
+        f"stored = dispatch.energies({_names('normal', 'stored', kinds.normals)})",
+        f"friction = dispatch.frictions({_names('friction', 'coefficient', kinds.frictions)})",
+        "contacts = clearance_spherical.compose(normal, stored, friction)",
+    ]
+
+
+def _closure_lines(present: bool) -> list[str]:
+    if not present:
+        return ["close, known_forces, correction = equations.no_closures, equations.no_known_forces, None"]
+    return [
+        "from pipeline.dynamics.assembly import closures",
+        "close, known_forces, correction = closures.close, closures.known_forces, closures.correction",
+    ]
+
+
+_BODY = """kinematics = motion.compose(joint_motion, port, inboard)
+rhs = equations.compose(
+    kinematics, rigid.inertia, flexible_inertia, port_load, modal, contacts, close, known_forces
+)
+project = projecting.compose(rhs, joint_motion, correction) if correction else projecting.none
+stepper = explicit.compose(rhs, project, METHOD, events)
+observer = observing.compose(
+    rhs, project, kinematics, (rigid.inertia, rigid.kinetic_energy), (flexible_observed, flexible_energy), contacts
+)
+"""
+
+_ENTRIES = '''
+@njit(cache=True, nogil=True)
+def advance(h, f, w, n, outputs, rows, events):
+    """Step to the end of the segment or of the budget."""
+    stepper(h, f, w, n, outputs, rows, events)
+
+
+@njit(cache=True, nogil=True)
+def observe(h, f, w, n, rows, pieces, tolerance, out):
+    """Evaluate what is recorded."""
+    observer(h, f, w, n, rows, pieces, tolerance, out)
+
+
+@njit(cache=True, nogil=True)
+def evaluate(h, f, w, n, t, y, dy, repeat):
+    """The right-hand side, `repeat` times."""
+    for _ in range(repeat):
+        rhs(h, f, w, n, t, y, dy)
+'''

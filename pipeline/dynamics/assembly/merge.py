@@ -1,0 +1,197 @@
+"""Rigidly joined bodies become one link; every body and frame keeps its place in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.errors import InputError
+from pipeline.core.registry import suggestion
+from pipeline.core.scene.parts import FlexibleBody, Ground, RigidBody
+from pipeline.core.scene.schema import Scene
+
+GROUND = "ground"
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Pose of a frame: origin p and axes R (columns) in some parent frame."""
+
+    p: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    R: np.ndarray = field(default_factory=lambda: np.eye(3))
+
+    def of(self, inner: Placement) -> Placement:
+        """`inner`, given in this frame, in this frame's parent."""
+        return Placement(self.p + self.R @ inner.p, self.R @ inner.R)
+
+    def inverse(self) -> Placement:
+        """The parent, seen from this frame."""
+        return Placement(-self.R.T @ self.p, self.R.T)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A named frame: its body and its undeformed place in it."""
+
+    body: str
+    place: Placement
+
+
+@dataclass(frozen=True)
+class Group:
+    """Bodies that move as one; `places` gives each body's frame in that of the first, the host."""
+
+    host: str
+    places: dict[str, Placement]
+    flexible: bool
+
+
+def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Frame]:
+    """Every named frame of the scene by ``body.FRAME``."""
+    found: dict[str, Frame] = {}
+    for name, body in scene.body.items():
+        if isinstance(body, FlexibleBody):
+            bundle = bundles[name]
+            for k, frame in enumerate(bundle["frame"].values):
+                place = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
+                found[f"{name}.{frame}"] = Frame(name, place)
+        else:
+            for frame, pose in body.frames.items():
+                R = quaternion_to_matrix(pose.as_quaternion())
+                found[f"{name}.{frame}"] = Frame(name, Placement(np.array(pose.position), R))
+    return found
+
+
+def find_frame(frames: Mapping[str, Frame], name: str, place: str) -> Frame:
+    """The frame called `name`; InputError with the nearest name when there is none."""
+    if name not in frames:
+        raise InputError(place, f"there is no frame '{name}'", suggestion(name, list(frames)))
+    return frames[name]
+
+
+def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[str, int]]:
+    """Groups of rigidly joined bodies (the ground's first), and the group of each body."""
+    neighbours: dict[str, list[tuple[str, Placement]]] = {name: [] for name in scene.body}
+    grounds = [n for n, b in scene.body.items() if isinstance(b, Ground)]
+    for name, joint in scene.joint.items():
+        if joint.type != "fixed":
+            continue
+        a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
+        if _flexible(scene, a.body) or _flexible(scene, b.body):
+            continue
+        b_in_a = a.place.of(b.place.inverse())
+        neighbours[a.body].append((b.body, b_in_a))
+        neighbours[b.body].append((a.body, b_in_a.inverse()))
+    groups, group_of = [], {}
+    for root in [*grounds, *(n for n in scene.body if n not in grounds)]:
+        if root in group_of:
+            continue
+        is_ground = root in grounds
+        if is_ground and groups:
+            places = groups[0].places  # further bodies of type ground are the same world
+        else:
+            places = {}
+            groups.append(Group(root, places, _flexible(scene, root)))
+        _flood(root, neighbours, places)
+        group_of.update(dict.fromkeys(places, 0 if is_ground else len(groups) - 1))
+    if not grounds:
+        groups.insert(0, Group(GROUND, {}, False))
+        group_of = {n: i + 1 for n, i in group_of.items()}
+    return groups, group_of
+
+
+def _flood(root: str, neighbours: Mapping[str, list[tuple[str, Placement]]], places: dict[str, Placement]) -> None:
+    places[root] = Placement()
+    stack = [root]
+    while stack:
+        body = stack.pop()
+        for other, relative in neighbours[body]:
+            if other not in places:
+                places[other] = places[body].of(relative)
+                stack.append(other)
+
+
+def _flexible(scene: Scene, body: str) -> bool:
+    return isinstance(scene.body[body], FlexibleBody)
+
+
+def rigid_inertia(scene: Scene, group: Group, link: Placement) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, centre of mass and inertia about it of a group, in the frame `link` (given in the host's)."""
+    inward = link.inverse()
+    mass, first = 0.0, np.zeros(3)
+    parts = []
+    for name, place in group.places.items():
+        body = scene.body[name]
+        if not isinstance(body, RigidBody):
+            continue
+        here = inward.of(place)
+        c = here.p + here.R @ np.array(body.com)
+        parts.append((body.mass, c, here.R @ np.array(body.inertia) @ here.R.T))
+        mass += body.mass
+        first = first + body.mass * c
+    com = first / mass
+    inertia = np.zeros((3, 3))
+    for m, c, J in parts:
+        d = c - com
+        inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
+    return mass, com, inertia
+
+
+def start_places(scene: Scene, groups: list[Group], group_of: Mapping[str, int], frames: Mapping[str, Frame]) -> list[Placement]:
+    """Start pose of every group's host frame in the world.
+
+    A group whose bodies give no pose follows from a joint with a group that has one, the two
+    frames coinciding.  Raises InputError for a group that nothing places, and for a pose that
+    contradicts the fixed joints.
+    """
+    known: dict[int, Placement] = {0: Placement()}
+    for i, group in enumerate(groups[1:], start=1):
+        for name, place in group.places.items():
+            pose = scene.body[name].pose  # type: ignore[union-attr]
+            if pose is None:
+                continue
+            here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(place.inverse())
+            if i in known and not _close(known[i], here):
+                raise InputError(
+                    f"[body.{name}.pose]",
+                    "contradicts the poses of the bodies that it is fixed to",
+                    "give one body of a rigid group its pose; the others follow",
+                )
+            known.setdefault(i, here)
+    _propagate(scene, group_of, frames, groups, known)
+    missing = [groups[i].host for i in range(len(groups)) if i not in known]
+    if missing:
+        raise InputError(f"[body.{missing[0]}.pose]", f"nothing says where {', '.join(missing)} start", "give a pose, or a joint")
+    return [known[i] for i in range(len(groups))]
+
+
+def _close(a: Placement, b: Placement) -> bool:
+    return bool(np.allclose(a.p, b.p, rtol=0, atol=1e-9) and np.allclose(a.R, b.R, rtol=0, atol=1e-9))
+
+
+def _propagate(
+    scene: Scene,
+    group_of: Mapping[str, int],
+    frames: Mapping[str, Frame],
+    groups: list[Group],
+    known: dict[int, Placement],
+) -> None:
+    # fixed joints place exactly; any other joint only when nothing better does
+    joints = sorted(scene.joint.items(), key=lambda item: item[1].type != "fixed")
+    changed = True
+    while changed:
+        changed = False
+        for name, joint in joints:
+            a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
+            ga, gb = group_of[a.body], group_of[b.body]
+            if (ga in known) == (gb in known):
+                continue
+            (new, inner), (old, outer) = ((gb, b), (ga, a)) if ga in known else ((ga, a), (gb, b))
+            there = known[old].of(groups[old].places[outer.body]).of(outer.place)
+            known[new] = there.of(groups[new].places[inner.body].of(inner.place).inverse())
+            changed = True
+            break

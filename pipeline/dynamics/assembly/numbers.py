@@ -1,0 +1,206 @@
+"""The tables of a system: all its wiring and numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import lookup
+from pipeline.dynamics import tables
+from pipeline.dynamics.assembly import flexible_numbers as flexible
+from pipeline.dynamics.assembly import wiring
+from pipeline.dynamics.assembly.layout import Layout, number
+from pipeline.dynamics.assembly.merge import Placement
+from pipeline.dynamics.assembly.packing import Packed, pack
+from pipeline.dynamics.assembly.system import Link, System
+from pipeline.dynamics.assembly.tree import joint_class
+
+NORMAL = "pipeline.dynamics.contact.normal"
+INTEGRATORS = "pipeline.dynamics.integrate"
+FRICTION = "pipeline.dynamics.contact.friction"
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Which kinds of parts a system has: all that its compiled code depends on."""
+
+    joints: tuple[str, ...]
+    normals: tuple[str, ...]
+    frictions: tuple[str, ...]
+    flexible: bool
+    closures: bool
+
+
+@dataclass(frozen=True)
+class Tables:
+    """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system."""
+
+    system: System
+    layout: Layout
+    kinds: Kinds
+    packed: Packed
+    closure_order: np.ndarray
+
+
+def tabulate(system: System) -> Tables:
+    """Number a system and fill its tables."""
+    layout = number(system)
+    kinds = _kinds(system)
+    site_pairs = [(e.kind, layout.add_site(a), layout.add_site(b)) for e, a, b in system.closures]
+    touching = [(layout.add_site(a), layout.add_site(b)) for _, _, a, b in system.contacts]
+    closing = wiring.closures(layout, site_pairs)
+    order = closing.pop("order")
+    flexible_wiring, flexible_numbers = flexible.fill(layout)
+    contacts, contact_numbers = _contacts(system, kinds, touching)
+    drives, pieces = _drives(system)
+    groups, floors = _error_groups(layout)
+    sites = [(s.link, layout.port_of(k)) for k, s in enumerate(layout.sites)]
+    method = lookup(INTEGRATORS, system.scene.solver.integrator, where="[solver.integrator]")
+    packed = pack(
+        {
+            "NQ": layout.nq,
+            "N_LEDGER": tables.CONTACT_LOSS + 2 * len(system.contacts),
+            "MOST_MODES": max(layout.modes.values(), default=0),
+        },
+        {
+            "LINKS": _links(layout, kinds),
+            "SITES": wiring.integers(sites, 2),
+            **flexible_wiring,
+            **wiring.mass_entries(layout),
+            **closing,
+            "CONTACTS": contacts,
+            "DRIVES": drives,
+            "GROUPS": groups,
+        },
+        {
+            "LINK_NUMBERS": np.array([_link_numbers(link) for link in system.links]),
+            "SITE_NUMBERS": np.array([_pose_row(s.place) for s in layout.sites]),
+            **flexible_numbers,
+            "CONTACT_NUMBERS": contact_numbers,
+            "PIECES": pieces,
+            "GRAVITY": _gravity(system),
+            "FLOORS": floors,
+        },
+        method.slopes,
+        method.dense,
+        layout.columns,
+    )
+    return Tables(system, layout, kinds, packed, order)
+
+
+def _kinds(system: System) -> Kinds:
+    contacts = [joint for _, joint, _, _ in system.contacts]
+    return Kinds(
+        joints=tuple(sorted({link.kind for link in system.links[1:]})),
+        normals=tuple(sorted({c.normal.law for c in contacts})),
+        frictions=tuple(sorted({c.friction.law for c in contacts if c.friction is not None})),
+        flexible=any(link.flexible for link in system.links),
+        closures=bool(system.closures),
+    )
+
+
+def _gravity(system: System) -> np.ndarray:
+    if not system.scene.load:
+        return np.zeros(3)
+    return lookup("pipeline.dynamics.loads", "gravity", where="[load]")(system.scene)
+
+
+def _pose_row(place: Placement) -> np.ndarray:
+    return np.concatenate([place.p, place.R.ravel()])
+
+
+def _links(layout: Layout, kinds: Kinds) -> np.ndarray:
+    rows = []
+    flexible = sorted(layout.modes)
+    for i, link in enumerate(layout.system.links):
+        joint = kinds.joints.index(link.kind) if i else -1
+        flex = flexible.index(i) if i in layout.modes else -1
+        inboard = layout.port_of_inboard(i) if flex >= 0 else -1
+        port = layout.port_of(i - 1) if i else -1
+        speeds = layout.n_speeds(i)
+        rows.append((link.branch.parent, joint, layout.q0[i], layout.c0[i], speeds, flex, inboard, port))
+    return wiring.integers(rows, 8)
+
+
+def _link_numbers(link: Link) -> np.ndarray:
+    if link.inertia is None:
+        return np.zeros(10)
+    mass, com, J = link.inertia
+    return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
+
+
+def _contacts(system: System, kinds: Kinds, touching: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
+    rows, reals = [], []
+    for (name, joint, _, _), (socket, ball) in zip(system.contacts, touching, strict=True):
+        place = f"[joint.{name}.normal]"
+        normal = lookup(NORMAL, joint.normal.law, where=place)
+        stiffness = lookup("pipeline.dynamics.contact", joint.type, where=place)(joint)
+        try:
+            parameters = normal.parameters(joint.normal, stiffness)
+        except ValueError as error:
+            raise InputError(place, str(error)) from None
+        friction_kind, friction = -1, (0.0, 0.0, 0.0, 0.0)
+        if joint.friction is not None:
+            friction_kind = kinds.frictions.index(joint.friction.law)
+            law = lookup(FRICTION, joint.friction.law, where=f"[joint.{name}.friction]")
+            friction = law.parameters(joint.friction)
+        rows.append((socket, ball, kinds.normals.index(joint.normal.law), friction_kind))
+        reals.append([joint.clearance, joint.ball_radius, joint.floor, *parameters, *friction])
+    return wiring.integers(rows, 4), np.array(reals, dtype=float).reshape(-1, 11)
+
+
+def _drives(system: System) -> tuple[np.ndarray, np.ndarray]:
+    rows, pieces = [], []
+    for drive in system.scene.drive.values():
+        law = lookup("pipeline.dynamics.drives", drive.law.type, where="[drive]")
+        table = law(drive.law).copy()
+        branch = next(b.branch for b in system.links if b.branch.edge and b.branch.edge.name == drive.joint)
+        if branch.reverse:
+            table[:, 1:] *= -1.0  # the tree meets this joint from its second frame
+        rows.append((sum(len(p) for p in pieces), len(table)))
+        pieces.append(table)
+    stacked = np.concatenate(pieces) if pieces else np.zeros((0, 7))
+    return wiring.integers(rows, 2), np.ascontiguousarray(stacked)
+
+
+def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+    """Group of every state variable, and the floor below which a group is resolved absolutely.
+
+    A vector is one group, so that turning the scene changes no step.  Floors: the mechanism's
+    size, one radian, both per second, and the energy of moving its mass by its size in a second.
+    """
+    L = layout.system.length
+    groups: list[int] = []
+    floors: list[float] = []
+    nq = layout.nq
+    q_group, v_group = np.zeros(nq, dtype=np.int64), np.zeros(layout.nv, dtype=np.int64)
+
+    def fill(target: np.ndarray, first: int, letters: str) -> None:
+        for k, letter in enumerate(letters):
+            if k == 0 or letters[k - 1] != letter:
+                floors.append(L if letter == "t" else 1.0)
+            target[first + k] = len(floors) - 1
+
+    for i, link in enumerate(layout.system.links[1:], start=1):
+        declared = joint_class(link.kind)
+        if layout.driven(i) < 0:
+            fill(q_group, layout.q0[i], declared.POSITIONS)
+            fill(v_group, layout.c0[i], declared.SPEEDS)
+        if i in layout.modes:
+            mass = float(layout.system.bundles[str(link.flexible)]["mass"])
+            for target, first in ((q_group, layout.flex_q0[i]), (v_group, layout.flex_c0[i])):
+                floors.append(L * mass**0.5)
+                target[first : first + layout.modes[i]] = len(floors) - 1
+    groups = [*q_group, *v_group]
+    energy = _mass(layout.system) * L**2
+    for _ in range(tables.CONTACT_LOSS + 2 * len(layout.system.contacts)):
+        floors.append(energy)
+        groups.append(len(floors) - 1)
+    return np.array(groups, dtype=np.int64), np.array(floors)
+
+
+def _mass(system: System) -> float:
+    rigid = sum(link.inertia[0] for link in system.links if link.inertia is not None)
+    return rigid + sum(float(system.bundles[str(link.flexible)]["mass"]) for link in system.links if link.flexible)

@@ -1,0 +1,1 @@
+"""Inertia of the bodies: rigid ones in `rigid`, modally reduced ones in `flexible`."""

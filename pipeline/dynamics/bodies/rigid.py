@@ -1,0 +1,81 @@
+"""Spatial inertia and inertial wrench of a rigid link, about the kernels' origin."""
+
+from __future__ import annotations
+
+from pipeline.dynamics.tables import (
+    ACCELERATION,
+    ALPHA,
+    AXES,
+    INERTIA_SIZE,
+    LINK_NUMBERS,
+    OMEGA,
+    ORIGIN,
+    OWN,
+    VELOCITY,
+    link_frame,
+    wrench,
+)
+from pipeline.dynamics.vectors import (
+    add,
+    at,
+    at6,
+    at9,
+    congruence,
+    cross,
+    dot,
+    kernel,
+    put,
+    scale,
+    turn,
+    turn_symmetric,
+)
+
+MASS, COM, TENSOR, NUMBERS = 0, 1, 4, 10  # fields of LINK_NUMBERS
+
+
+@kernel
+def spatial(w, o, mass, c, J):
+    """Store the spatial inertia of a mass at c with inertia J about it, world axes."""
+    x, y, z = c
+    w[o] = mass
+    put(w, o + 1, scale(mass, c))
+    w[o + 4] = J[0] + mass * (y * y + z * z)
+    w[o + 5] = J[1] + mass * (x * x + z * z)
+    w[o + 6] = J[2] + mass * (x * x + y * y)
+    w[o + 7] = J[3] - mass * x * y
+    w[o + 8] = J[4] - mass * x * z
+    w[o + 9] = J[5] - mass * y * z
+
+
+@kernel
+def inertia(h, f, w, i):
+    """Spatial inertia of link i (OWN) and the wrench on it (moment about the origin, force).
+
+    The wrench is what the accelerations now in its frame need, gravity being an acceleration of
+    the ground.
+    """
+    frame, numbers = link_frame(h, i), h[LINK_NUMBERS] + NUMBERS * i
+    R = at9(w, frame + AXES)
+    omega, alpha = at(w, frame + OMEGA), at(w, frame + ALPHA)
+    arm = turn(R, at(f, numbers + COM))
+    c = add(at(w, frame + ORIGIN), arm)
+    mass = f[numbers + MASS]
+    J = congruence(R, at6(f, numbers + TENSOR))
+    spatial(w, h[OWN] + INERTIA_SIZE * i, mass, c, J)
+    a = add(at(w, frame + ACCELERATION), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+    force = scale(mass, a)
+    moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
+    o = wrench(h, i)
+    put(w, o, add(moment, cross(c, force)))
+    put(w, o + 3, force)
+
+
+@kernel
+def kinetic_energy(h, f, w, i):
+    """Kinetic energy [J] of a rigid link."""
+    frame, numbers = link_frame(h, i), h[LINK_NUMBERS] + NUMBERS * i
+    R = at9(w, frame + AXES)
+    omega = at(w, frame + OMEGA)
+    v = add(at(w, frame + VELOCITY), cross(omega, turn(R, at(f, numbers + COM))))
+    J = congruence(R, at6(f, numbers + TENSOR))
+    return 0.5 * (f[numbers + MASS] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))

@@ -1,0 +1,37 @@
+r"""Coulomb friction made continuous: a cubic rise to mu_s at v_s, a cubic fall to mu_d at v_d.
+
+.. math:: F_t = -\mu(|v_t|)\,F_n\,v_t/|v_t|
+
+Eqs. (27) and (28) of the paper both carry a minus sign, so that friction would drive the
+sliding as printed; the sign that dissipates is used here. Below v_s the coefficient is
+:math:`\tfrac12\mu_s(3y - y^3)`, y = v/v_s.
+Source: Wang & Wang (2019), eqs. (27)-(29).
+"""
+
+from __future__ import annotations
+
+from pipeline.core.scene.parts import FrictionLaw
+from pipeline.dynamics.vectors import kernel
+
+
+@kernel
+def coefficient(speed, p):
+    """mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d)."""
+    if speed >= p[3]:
+        return p[1]
+    if speed >= p[2]:
+        y = (speed - p[2]) / (p[3] - p[2])
+        return p[0] + (p[1] - p[0]) * y * y * (3.0 - 2.0 * y)
+    y = speed / p[2]
+    return 0.5 * p[0] * y * (3.0 - y * y)
+
+
+class ModifiedCoulomb:
+    """See the module's text."""
+
+    coefficient = staticmethod(coefficient)
+
+    @staticmethod
+    def parameters(law: FrictionLaw) -> tuple[float, float, float, float]:
+        """mu_s, mu_d [-], v_s, v_d [m/s]."""
+        return (law.static, law.dynamic, law.v_static, law.v_dynamic)

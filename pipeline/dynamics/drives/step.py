@@ -1,0 +1,40 @@
+r"""Sum of smooth steps: each a cubic from 0 to its change, flat outside.
+
+.. math:: h\,(3 s^2 - 2 s^3), \quad s = (t - t_0)/(t_1 - t_0)
+
+Value and rate are continuous; the acceleration jumps at both ends of a step.
+Source: Wang & Wang (2019), eqs. (29) and (35).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.scene.parts import Step
+
+
+def pieces(law: Step) -> np.ndarray:
+    """Pieces between all starts and ends, shape (n, 7): start time, coefficients of rising order."""
+    breaks = sorted({*law.start, *law.end})
+    starts = [breaks[0] - 1.0, *breaks]
+    return np.array([[t, *_taylor(law, t, t + 0.5 * _width(starts, k))] for k, t in enumerate(starts)])
+
+
+def _width(starts: list[float], k: int) -> float:
+    return starts[k + 1] - starts[k] if k + 1 < len(starts) else 1.0
+
+
+def _taylor(law: Step, t: float, inside: float) -> np.ndarray:
+    """Coefficients about t of the polynomial that holds at the time `inside`."""
+    c = np.zeros(6)
+    for start, end, change in zip(law.start, law.end, law.change, strict=True):
+        if inside >= end:
+            c[0] += change
+        elif inside > start:
+            T = end - start
+            s = (t - start) / T
+            c[0] += change * s * s * (3.0 - 2.0 * s)
+            c[1] += change * 6.0 * s * (1.0 - s) / T
+            c[2] += change * 3.0 * (1.0 - 2.0 * s) / T**2
+            c[3] += change * -2.0 / T**3
+    return c

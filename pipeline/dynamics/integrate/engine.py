@@ -1,0 +1,146 @@
+"""A system with its compiled entry: evaluate a state, integrate a trajectory, observe its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+
+import numpy as np
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.dynamics.assembly import fuse, initial
+from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.integrate import observe as observing
+from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, OK, TOUCH_SIZE
+
+Progress = Callable[[float | None, str], None]
+
+#: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
+RECORD_SHARE, ROUNDING = 1e-3, 1e-14
+
+
+@dataclass(frozen=True)
+class Engine:
+    """One per run: the work space is not shared."""
+
+    built: Tables
+    entry: ModuleType
+    w: np.ndarray
+    n: np.ndarray
+    start: float
+    end: float
+    rtol: float
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Start, drive breaks in between, end."""
+        starts, found = self.built.packed.table("PIECES")[:, 0], set()
+        for first, count in self.built.packed.table("DRIVES"):
+            found |= {float(t) for t in starts[first + 1 : first + count] if self.start < t < self.end}
+        return np.array([self.start, *sorted(found), self.end])
+
+    def select_pieces(self, inside: float) -> None:
+        """Put the pieces of the drive laws in force that hold at `inside`, which is no break."""
+        first = self.n[ACTIVE]
+        self.n[first : first + self.built.layout.known] = pieces_at(self.built, inside)
+
+    def view(self, name: str, length: int) -> np.ndarray:
+        """A stretch of the work space, not copied."""
+        o = self.built.packed.offset(name)
+        return self.w[o : o + length]
+
+    def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
+        """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
+        packed = self.built.packed
+        self.view("Y", len(y))[:] = y
+        places = (packed.offset("Y"), packed.offset("SLOPES"))
+        self.entry.evaluate(packed.h, packed.f, self.w, self.n, t, *places, repeat)
+        if self.n[EVALUATION] != OK:
+            joints = ", ".join(e.name for e, _, _ in self.built.system.closures) or "none"
+            raise SolverError(
+                f"at t = {t:.6g} s: the equations are singular in this pose (loops closed at joints {joints}); "
+                "move the mechanism away from it, or remove redundant joints"
+            )
+        return self.view("SLOPES", len(y)).copy()
+
+
+def pieces_at(built: Tables, inside: float) -> np.ndarray:
+    """Piece of every drive law that holds at a time which is no break."""
+    starts, found = built.packed.table("PIECES")[:, 0], []
+    for first, count in built.packed.table("DRIVES"):
+        found.append(first + max(int(np.searchsorted(starts[first : first + count], inside, side="right")) - 1, 0))
+    return np.array(found, dtype=np.int64)
+
+
+def prepare(built: Tables, progress: Progress) -> Engine:
+    """The engine of a system, its kernels compiled or fetched from disk."""
+    scene = built.system.scene
+    integrator = scene.solver.integrator
+    if not fuse.is_compiled(built.kinds, integrator):
+        progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
+    entry = fuse.entry(built.kinds, integrator)
+    w, n = built.packed.work_space()
+    return Engine(built, entry, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+
+
+def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
+    """State at the start with its loops closed, and the loops' residual as the scene gives them [m]."""
+    built = engine.built
+    engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
+    y = initial.start_state(built)
+    engine.evaluate(y, engine.start)
+    residual = initial.check_residual(built, engine.view("RESIDUAL", built.packed.sizes["N_CLOSURE_ROWS"]))
+    y = project(engine, y)
+    links = built.packed.sizes["N_LINKS"]
+
+    def frames(state_vector: np.ndarray) -> np.ndarray:
+        engine.evaluate(state_vector, engine.start)
+        return engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
+
+    y = project(engine, initial.given_velocities(built, frames, y))
+    _refuse_penetration(engine, y)
+    return y, residual
+
+
+def project(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """y at the start with the loops closed and their rates zero; SolverError when that fails."""
+    contacts = engine.built.packed.sizes["N_CONTACTS"]
+    row = np.concatenate([[engine.start], np.zeros(2 * contacts), y])
+    seen = observe(engine, row[None, :])
+    if seen["status"][0, 0] != OK:
+        raise SolverError(f"at t = {engine.start:.6g} s: the loops cannot be closed from the start that the scene gives")
+    return seen["state"][0].copy()
+
+
+def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
+    engine.evaluate(y, engine.start)
+    contacts = engine.built.system.contacts
+    touches = engine.view("TOUCH", TOUCH_SIZE * len(contacts)).reshape(-1, TOUCH_SIZE)
+    for (name, joint, _, _), touch in zip(contacts, touches, strict=True):
+        if touch[GAP] < -1e-9 * joint.clearance:
+            raise InputError(
+                f"[joint.{name}]",
+                f"ball and socket start {-touch[GAP]:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
+                "move a body, or enlarge the clearance",
+            )
+
+
+def observe(engine: Engine, rows: np.ndarray) -> dict[str, np.ndarray]:
+    """What is recorded of rows (time, modes, impact rates, state), whose states are projected first.
+
+    Fields and widths: `pipeline.dynamics.integrate.observe`; shape (rows, width) each.
+    """
+    built = engine.built
+    packed, segments = built.packed, engine.breaks
+    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="left"), 1, len(segments) - 1)
+    middles = 0.5 * (segments[sides - 1] + segments[sides])
+    per_segment = {x: pieces_at(built, x) for x in set(middles.tolist())}
+    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(len(rows), built.layout.known)
+    widths = observing.widths(packed.sizes)
+    out = np.zeros((len(rows), sum(widths.values())))
+    tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * built.system.length
+    engine.entry.observe(packed.h, packed.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
+    ends = np.cumsum(list(widths.values()))
+    return {name: out[:, end - widths[name] : end] for name, end in zip(widths, ends, strict=True)}
+

@@ -1,0 +1,297 @@
+"""Contacts begin and end at located times; the impact rate is latched there, as state.
+
+A closing is a gap that falls through zero, an opening one that rises through it. Both are looked
+for in every accepted step, also when gap and penetration return within the step; the earliest is
+located on the dense output, the step is repeated to end there, and the contact's mode changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pipeline.dynamics.integrate.state import (
+    CLOSING,
+    CULPRIT,
+    DURATION,
+    EVALUATIONS,
+    EVENT_CONTACT,
+    EVENT_KIND,
+    EVENT_ROW,
+    EVENT_TIME,
+    GAP0,
+    GAP1,
+    IMMEDIATE,
+    LENGTH,
+    LOST_CLOSURE,
+    N_EVENTS,
+    OPENING,
+    PEAK_DEPTH,
+    PEAK_FORCE,
+    RATE0,
+    RATE1,
+    RTOL,
+    SPEED,
+    STATUS,
+    STUCK_EVENT,
+    TIME,
+    WATCH_SIZE,
+)
+from pipeline.dynamics.tables import (
+    CLEARANCE,
+    CONTACT_NUMBERS,
+    CONTROL,
+    GAP,
+    LATCHED,
+    MODE,
+    N_CONTACTS,
+    NORMAL_FORCE,
+    NY,
+    RATE,
+    SLOPES,
+    WATCH,
+    Y,
+    Y_NEW,
+    Y_STAGE,
+    touch,
+)
+from pipeline.dynamics.vectors import kernel
+
+#: a gap below this share of the clearance is zero: rounding of the sites' positions
+ZERO_GAP = 1e-12
+ROOT_ITERATIONS = 60
+#: mode changes at one and the same time before the solver gives up (Zeno)
+MOST_IMMEDIATE = 200
+#: dense samples of a step in which the force may peak
+SAMPLES = 8
+#: penetration rates below this share of the impact rate may hold the peak of the force
+NEAR_PEAK = 0.3
+NEVER = 2.0
+
+
+@kernel
+def watch(h, c):
+    """Where w holds what the stepper watches of contact c."""
+    return h[WATCH] + WATCH_SIZE * c
+
+
+@kernel
+def side(n, c):
+    """+1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
+    return 1.0 if n[n[MODE] + c] == 0 else -1.0
+
+
+@kernel
+def clearance(h, f, c):
+    """Clearance of contact c."""
+    return f[h[CONTACT_NUMBERS] + 11 * c + CLEARANCE]
+
+
+@kernel
+def start_watch(h, w):
+    """Remember gap and rate where a step starts."""
+    for c in range(h[N_CONTACTS]):
+        w[watch(h, c) + GAP0], w[watch(h, c) + RATE0] = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
+
+
+@kernel
+def suspicious(h, w, n, c):
+    """Whether the ends of a step leave room for a mode change within it."""
+    o, s = watch(h, c), side(n, c)
+    return s * w[o + GAP1] < 0.0 or (s * w[o + RATE0] > 0.0 and s * w[o + RATE1] <= 0.0)
+
+
+@kernel
+def peaking(h, w, n, c):
+    """Whether the force of a closed contact may peak within the step."""
+    o = watch(h, c)
+    return n[n[MODE] + c] == 1 and w[o + RATE0] > 0.0 and w[o + RATE1] < NEAR_PEAK * w[h[LATCHED] + c]
+
+
+@kernel
+def switch(h, w, n, events, c, t):
+    """Change the mode of contact c at time t, latch its impact rate, and write the event down."""
+    row, o = n[N_EVENTS], watch(h, c)
+    event, rate = events[row], w[o + RATE1]
+    event[EVENT_TIME], event[EVENT_CONTACT] = t, c
+    if n[n[MODE] + c] == 0:
+        n[n[MODE] + c] = 1
+        w[h[LATCHED] + c] = max(rate, 0.0)
+        event[EVENT_KIND], event[SPEED], event[PEAK_FORCE], event[PEAK_DEPTH] = CLOSING, rate, 0.0, 0.0
+        w[o + EVENT_ROW] = row
+    else:
+        n[n[MODE] + c] = 0
+        event[EVENT_KIND], event[SPEED] = OPENING, -rate
+        begun = events[int(w[o + EVENT_ROW])]
+        begun[DURATION] = t - begun[EVENT_TIME]
+    n[N_EVENTS] = row + 1
+
+
+def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+    """The kernel settle(h, f, w, n, step, t_new, events) -> (event?, dense output ready?, end, step)."""
+    interpolate, last, extra = method.interpolate, method.last, method.extra
+    spare = method.slopes - 1  # row of SLOPES that no stage uses
+
+    @kernel
+    def look(h, f, w, n, step, theta, c):
+        """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
+        interpolate(h, w, theta, h[Y_STAGE])
+        evaluate(h, f, w, n, w[h[CONTROL] + TIME] + theta * step, h[Y_STAGE], h[SLOPES] + h[NY] * spare)
+        n[EVALUATIONS] += 1
+        return side(n, c) * w[touch(h, c) + GAP], -side(n, c) * w[touch(h, c) + RATE] * step
+
+    @kernel
+    def turning_point(h, f, w, n, step, c, sign):
+        """Share of the step where sign * distance is least, or where it is found negative at once."""
+        low, high = 0.0, 1.0
+        zero = ZERO_GAP * clearance(h, f, c)
+        for _ in range(40):
+            theta = 0.5 * (low + high)
+            value, rate = look(h, f, w, n, step, theta, c)
+            if sign * value < -zero:
+                return theta
+            if sign * rate > 0.0:
+                high = theta
+            else:
+                low = theta
+        return 0.5 * (low + high)
+
+    @kernel
+    def crossing(h, f, w, n, step, c, low, high):
+        """Share of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
+        theta, enough = 0.5 * (low + high), 1e-3 * ZERO_GAP * clearance(h, f, c)
+        for _ in range(ROOT_ITERATIONS):
+            value, rate = look(h, f, w, n, step, theta, c)
+            if value > 0.0:
+                low = theta
+            else:
+                high = theta
+            if abs(value) <= enough or high - low <= 1e-15:
+                return theta
+            newton = theta - value / rate if rate < 0.0 else -1.0
+            theta = newton if low < newton < high else 0.5 * (low + high)
+        return theta
+
+    @kernel
+    def find(h, f, w, n, step, c):
+        """Share of the step where contact c changes its mode: 0 at once, NEVER not at all."""
+        o, s, zero = watch(h, c), side(n, c), ZERO_GAP * clearance(h, f, c)
+        start, falling = s * w[o + GAP0], s * w[o + RATE0] > 0.0
+        if s * w[o + GAP1] < 0.0:
+            if start > zero:
+                return crossing(h, f, w, n, step, c, 0.0, 1.0)
+            if falling:
+                return 0.0
+            top = turning_point(h, f, w, n, step, c, -1.0)
+            value, _ = look(h, f, w, n, step, top, c)
+            return crossing(h, f, w, n, step, c, top, 1.0) if value > zero else 0.0
+        if falling and start > zero:
+            bottom = turning_point(h, f, w, n, step, c, 1.0)
+            value, _ = look(h, f, w, n, step, bottom, c)
+            if value < -zero:
+                return crossing(h, f, w, n, step, c, 0.0, bottom)
+        return NEVER
+
+    @kernel
+    def peaks(h, f, w, n, step, c, event):
+        """Largest force and penetration of a closed contact in this step, from dense samples."""
+        best, before, after, previous, depth = 0.0, 0.0, 0.0, 0.0, 0.0
+        at_peak = False
+        for k in range(SAMPLES + 1):
+            look(h, f, w, n, step, k / SAMPLES, c)
+            force = w[touch(h, c) + NORMAL_FORCE]
+            depth = max(depth, -w[touch(h, c) + GAP])
+            if at_peak:
+                after, at_peak = force, False
+            if force > best:
+                best, before, after, at_peak = force, previous, 0.0, k > 0
+            previous = force
+        bend = 2.0 * best - before - after
+        if before > 0.0 and after > 0.0 and bend > 0.0:
+            best += (after - before) ** 2 / (8.0 * bend)  # top of the parabola through three samples
+        event[PEAK_FORCE] = max(event[PEAK_FORCE], best)
+        event[PEAK_DEPTH] = max(event[PEAK_DEPTH], depth)
+
+    @kernel
+    def end_at(h, f, w, n, step, c):
+        """Repeat the step so that it ends on the event; its length, or -1 when it cannot be done."""
+        o, slope = h[CONTROL], h[SLOPES] + h[NY] * last
+        for _ in range(3):
+            n[EVALUATIONS] += last
+            if not attempt(h, f, w, n, step):
+                return -1.0
+            t = w[o + TIME] + step
+            evaluate(h, f, w, n, t, h[Y_NEW], slope)
+            used = project(h, f, w, n, t, h[Y_NEW], slope, 1e-3 * w[o + RTOL] * w[o + LENGTH])
+            if used < 0:
+                return -1.0
+            n[EVALUATIONS] += used
+            gap, rate = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
+            if abs(gap) <= 1e-13 * clearance(h, f, c) + 1e-15 or not abs(gap) < 0.1 * abs(rate) * step:
+                return step
+            step += gap / rate
+        return step
+
+    @kernel
+    def first_event(h, f, w, n, step, events):
+        """Contact and share of the step of its first mode change; also the peaks on the way."""
+        ready, first, which = False, NEVER, -1
+        for c in range(h[N_CONTACTS]):
+            w[watch(h, c) + GAP1], w[watch(h, c) + RATE1] = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
+        for c in range(h[N_CONTACTS]):
+            change, peak = suspicious(h, w, n, c), peaking(h, w, n, c)
+            if (change or peak) and not ready:
+                extend(h, f, w, n, step)
+                n[EVALUATIONS] += extra
+                ready = True
+            if change:
+                theta = find(h, f, w, n, step, c)
+                if theta < first:
+                    first, which = theta, c
+            if peak:
+                peaks(h, f, w, n, step, c, events[int(w[watch(h, c) + EVENT_ROW])])
+        return which, first, ready
+
+    @kernel
+    def at_once(h, f, w, n, c, events):
+        """A mode change where the step starts: no step is made."""
+        n[IMMEDIATE] += 1
+        t = w[h[CONTROL] + TIME]
+        for k in range(h[NY]):
+            w[h[Y_NEW] + k] = w[h[Y] + k]
+        evaluate(h, f, w, n, t, h[Y_NEW], h[SLOPES] + h[NY] * last)
+        n[EVALUATIONS] += 1
+        w[watch(h, c) + RATE1] = w[touch(h, c) + RATE]
+        switch(h, w, n, events, c, t)
+        if n[IMMEDIATE] > MOST_IMMEDIATE:
+            n[STATUS], n[CULPRIT] = STUCK_EVENT, c
+            return -1
+        return 1
+
+    @kernel
+    def settle(h, f, w, n, step, t_new, events):
+        t = w[h[CONTROL] + TIME]
+        which, first, ready = first_event(h, f, w, n, step, events)
+        if which < 0:
+            n[IMMEDIATE] = 0
+            for c in range(h[N_CONTACTS]):
+                o = watch(h, c)
+                w[o + GAP0], w[o + RATE0] = w[o + GAP1], w[o + RATE1]
+            return 0, ready, t_new, step
+        if first * step <= 1e-15 * max(abs(t), step):
+            return at_once(h, f, w, n, which, events), True, t, step
+        n[IMMEDIATE] = 0
+        length = end_at(h, f, w, n, first * step, which)
+        if length < 0.0:
+            n[STATUS], n[CULPRIT] = LOST_CLOSURE, which
+            return -1, ready, t_new, step
+        w[watch(h, which) + RATE1] = w[touch(h, which) + RATE]
+        extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
+        n[EVALUATIONS] += extra
+        switch(h, w, n, events, which, t + length)
+        return 1, True, t + length, length
+
+    return settle
+
+
+EVENTS_OF_CONTACTS = (start_watch, make_settle)

@@ -1,0 +1,265 @@
+"""Adaptive steps of an explicit Runge-Kutta method, with projection, events and a record.
+
+One call advances to the end of a segment between two drive breaks, or until its budget of
+evaluations is used, so that the caller can report progress and be interrupted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pipeline.dynamics.integrate.state import (
+    BUDGET,
+    CAP,
+    CAP_REACHED,
+    DRIFT,
+    END,
+    EVALUATIONS,
+    FRESH,
+    FULL,
+    LENGTH,
+    LOST_CLOSURE,
+    N_EVENTS,
+    N_RECORDED,
+    NEXT_OUTPUT,
+    NO_START,
+    PAUSED,
+    PROJECTIONS,
+    REJECTED,
+    ROOM,
+    RTOL,
+    SEGMENT_END,
+    SPAN,
+    STATUS,
+    STEP,
+    STEP_TOO_SMALL,
+    STEPS,
+    TIME,
+)
+from pipeline.dynamics.integrate.project import largest
+from pipeline.dynamics.tables import (
+    CONTROL,
+    EVALUATION,
+    FLOORS,
+    GROUPS,
+    LATCHED,
+    MAGNITUDE,
+    MODE,
+    N_CLOSURE_ROWS,
+    N_CONTACTS,
+    N_GROUPS,
+    NY,
+    OK,
+    RESIDUAL,
+    SLOPES,
+    Y,
+    Y_NEW,
+    Y_STAGE,
+)
+from pipeline.dynamics.vectors import kernel
+
+SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
+#: a step below this share of the time reached cannot be told from rounding
+SMALLEST_STEP = 4e-16
+
+
+@kernel
+def snapshot(h, w, n, rows, t, y):
+    """Append a row to the record: time, modes and impact rates of the contacts, state."""
+    row, contacts = rows[n[N_RECORDED]], h[N_CONTACTS]
+    row[0] = t
+    for c in range(contacts):
+        row[1 + c] = n[n[MODE] + c]
+        row[1 + contacts + c] = w[h[LATCHED] + c]
+    for k in range(h[NY]):
+        row[1 + 2 * contacts + k] = w[y + k]
+    n[N_RECORDED] += 1
+
+
+@kernel
+def set_magnitudes(h, f, w, y):
+    """Scale of each error group: tolerance times its floor plus its largest value at both ends."""
+    m, o = h[MAGNITUDE], h[Y]
+    for g in range(h[N_GROUPS]):
+        w[m + g] = 0.0
+    for c in range(h[NY]):
+        g = m + h[h[GROUPS] + c]
+        w[g] = max(w[g], max(abs(w[y + c]), abs(w[o + c])))
+    for g in range(h[N_GROUPS]):
+        w[m + g] = w[h[CONTROL] + RTOL] * (f[h[FLOORS] + g] + w[m + g])
+
+
+@kernel
+def scaled_norm(h, w, a):
+    """Root mean square of the stretch of w from a, in units of the magnitudes."""
+    total = 0.0
+    for c in range(h[NY]):
+        total += (w[a + c] / w[h[MAGNITUDE] + h[h[GROUPS] + c]]) ** 2
+    return (total / h[NY]) ** 0.5
+
+
+@kernel
+def watch_nothing(h, w):
+    """No contact to watch."""
+
+
+def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+    """The stepper without root finding."""
+
+    @kernel
+    def settle(h, f, w, n, step, t_new, events):
+        return 0, False, t_new, step
+
+    return settle
+
+
+def compose_start(evaluate: Callable, start_watch: Callable, order: int) -> Callable:
+    """The kernel first_step(h, f, w, n): slope at the start of a segment, and a first step."""
+
+    @kernel
+    def first_step(h, f, w, n):
+        """False when the equations have no solution here. Source: Hairer et al., sec. II.4."""
+        c, y, slope = h[CONTROL], h[Y], h[SLOPES]
+        other = slope + h[NY]
+        evaluate(h, f, w, n, w[c + TIME], y, slope)
+        n[EVALUATIONS] += 2
+        if n[EVALUATION] != OK:
+            n[STATUS] = NO_START
+            return False
+        start_watch(h, w)
+        set_magnitudes(h, f, w, y)
+        size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
+        step = 1e-6 * w[c + SPAN]
+        if size > 0.0 and steepness > 0.0:
+            step = min(0.01 * size / steepness, 0.01 * w[c + SPAN])
+        step = min(step, w[c + END] - w[c + TIME])
+        for k in range(h[NY]):
+            w[h[Y_STAGE] + k] = w[y + k] + step * w[slope + k]
+        evaluate(h, f, w, n, w[c + TIME] + step, h[Y_STAGE], other)
+        if n[EVALUATION] == OK:
+            for k in range(h[NY]):
+                w[other + k] -= w[slope + k]
+            steepness = max(steepness, scaled_norm(h, w, other) / step)
+            if steepness > 0.0:
+                step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
+        w[c + STEP] = step
+        n[FRESH] = 0
+        return True
+
+    return first_step
+
+
+def compose(evaluate: Callable, project: Callable, method: Any, contact_events: tuple[Callable, Callable]) -> Callable:
+    """The kernel advance(h, f, w, n, outputs, rows, events).
+
+    contact_events: start_watch and make_settle of `events`, or those that do nothing.
+    """
+    attempt, extend = method.compose(evaluate)
+    error, interpolate, last, extra = method.error, method.interpolate, method.last, method.extra
+    exponent = -1.0 / (method.error_order + 1)
+    start_watch, make_settle = contact_events
+    settle = make_settle(evaluate, attempt, extend, project, method)
+    first_step = compose_start(evaluate, start_watch, method.error_order + 1)
+
+    @kernel
+    def must_stop(h, w, n, outputs, rows, events):
+        """Whether to return now, with the reason in n[STATUS]."""
+        c, waiting = h[CONTROL], outputs.shape[0] - n[NEXT_OUTPUT]
+        if w[c + TIME] >= w[c + END]:
+            n[STATUS] = SEGMENT_END
+        elif n[EVALUATIONS] >= n[CAP]:
+            n[STATUS] = CAP_REACHED
+        elif n[EVALUATIONS] >= n[BUDGET]:
+            n[STATUS] = PAUSED
+        elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:
+            n[STATUS] = FULL
+        else:
+            return False
+        return True
+
+    @kernel
+    def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
+        """Snapshots at the output times up to t_end, from the dense output."""
+        t = w[h[CONTROL] + TIME]
+        while n[NEXT_OUTPUT] < outputs.shape[0] and outputs[n[NEXT_OUTPUT]] <= t_end:
+            wanted = outputs[n[NEXT_OUTPUT]]
+            if wanted > t:
+                if not ready:
+                    extend(h, f, w, n, step)
+                    n[EVALUATIONS] += extra
+                    ready = True
+                interpolate(h, w, (wanted - t) / step, h[Y_STAGE])
+                snapshot(h, w, n, rows, wanted, h[Y_STAGE])
+            n[NEXT_OUTPUT] += 1
+
+    @kernel
+    def finish(h, f, w, n, t_new):
+        """Slope at Y_NEW with the loops closed; False when they cannot be."""
+        c, slope = h[CONTROL], h[SLOPES] + h[NY] * last
+        evaluate(h, f, w, n, t_new, h[Y_NEW], slope)
+        n[EVALUATIONS] += 1
+        if n[EVALUATION] != OK:
+            return False
+        w[c + DRIFT] = max(w[c + DRIFT], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
+        used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[c + RTOL] * w[c + LENGTH])
+        if used > 0:
+            n[EVALUATIONS] += used
+            n[PROJECTIONS] += 1
+        return used >= 0
+
+    @kernel
+    def try_step(h, f, w, n, step, t_new):
+        """Error norm of the step to Y_NEW, 1 at the tolerance; at least 1e9 when it failed."""
+        n[EVALUATIONS] += last - 1
+        if not attempt(h, f, w, n, step):
+            return 1e9
+        set_magnitudes(h, f, w, h[Y_NEW])
+        norm = error(h, w, step)
+        if not norm <= 1.0:
+            return min(norm, 1e9) if norm == norm else 1e9
+        return norm if finish(h, f, w, n, t_new) else 1e9
+
+    @kernel
+    def accept(h, w, t_new):
+        """Make the end of the step the start of the next."""
+        slope = h[SLOPES]
+        final = slope + h[NY] * last
+        for k in range(h[NY]):
+            w[h[Y] + k] = w[h[Y_NEW] + k]
+            w[slope + k] = w[final + k]
+        w[h[CONTROL] + TIME] = t_new
+
+    @kernel
+    def advance(h, f, w, n, outputs, rows, events):
+        """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
+        c = h[CONTROL]
+        while not must_stop(h, w, n, outputs, rows, events):
+            if n[FRESH] and not first_step(h, f, w, n):
+                return
+            step, t = w[c + STEP], w[c + TIME]
+            final = t + 1.0001 * step >= w[c + END]
+            if final:
+                step = w[c + END] - t
+            if not step > SMALLEST_STEP * max(abs(t), w[c + SPAN]):
+                n[STATUS] = LOST_CLOSURE if n[EVALUATION] != OK else STEP_TOO_SMALL
+                return
+            t_new = w[c + END] if final else t + step
+            norm = try_step(h, f, w, n, step, t_new)
+            if norm > 1.0:
+                n[REJECTED] += 1
+                w[c + STEP] = step * max(SHRINK, SAFETY * norm**exponent)
+                continue
+            growth = GROW if norm == 0.0 else min(GROW, max(SHRINK, SAFETY * norm**exponent))
+            happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
+            if happened < 0:
+                return
+            n[STEPS] += 1
+            record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
+            accept(h, w, t_new)
+            w[c + STEP] = step * growth
+            if happened > 0:
+                snapshot(h, w, n, rows, t_new, h[Y])
+                n[FRESH] = 1
+
+    return advance

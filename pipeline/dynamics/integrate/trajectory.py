@@ -1,0 +1,129 @@
+"""From a consistent start to the end, in segments between drive breaks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.errors import SolverError
+from pipeline.dynamics.integrate import state
+from pipeline.dynamics.integrate.engine import Engine, Progress
+
+#: evaluations between two looks at the clock and the keyboard
+SLICE = 20_000
+#: events for which there is room at first
+EVENT_ROWS = 4096
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`."""
+
+    rows: np.ndarray
+    events: np.ndarray
+    counters: dict[str, int]
+    drift: float
+
+    @property
+    def time(self) -> np.ndarray:
+        """Times of the rows [s], strictly increasing."""
+        return self.rows[:, 0]
+
+
+@dataclass
+class _Run:
+    """The arrays of one integration; the record may be replaced by a larger one."""
+
+    w: np.ndarray
+    n: np.ndarray
+    outputs: np.ndarray
+    rows: np.ndarray
+    events: np.ndarray
+
+
+def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
+    """Regular output times and all breaks, increasing; times nearer than rounding are one."""
+    span = breaks[-1] - breaks[0]
+    regular = breaks[0] + interval * np.arange(int(np.floor(span / interval * (1 + 1e-12))) + 1)
+    apart = np.min(np.abs(regular[:, None] - breaks[None, :]), axis=1) > 1e-9 * interval
+    return np.union1d(regular[apart], breaks)
+
+
+def integrate(engine: Engine, y: np.ndarray, progress: Progress) -> Trajectory:
+    """The trajectory from a consistent start; SolverError when the stepper gives up."""
+    run = _begin(engine, y)
+    control = engine.view("CONTROL", state.N_CONTROLS)
+    for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
+        engine.select_pieces(0.5 * (a + b))
+        control[state.END], run.n[state.FRESH] = b, 1
+        _segment(engine, run, progress)
+    return _collect(run, float(control[state.DRIFT]))
+
+
+def _begin(engine: Engine, y: np.ndarray) -> _Run:
+    built, n = engine.built, engine.n
+    scene, contacts = built.system.scene, built.packed.sizes["N_CONTACTS"]
+    control = engine.view("CONTROL", state.N_CONTROLS)
+    control[:] = 0.0
+    control[state.TIME], control[state.SPAN] = engine.start, engine.end - engine.start
+    control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length
+    n[state.STATUS : state.INTEGERS] = 0
+    n[state.INTEGERS + built.layout.known :] = 0
+    n[state.CAP] = scene.solver.evaluations
+    engine.view("Y", len(y))[:] = y
+    engine.view("LATCHED", contacts)[:] = 0.0
+    outputs = output_times(engine.breaks, scene.output.interval)
+    room = EVENT_ROWS if contacts else state.ROOM
+    rows = np.zeros((len(outputs) + room + state.ROOM, 1 + 2 * contacts + len(y)))
+    rows[0, 0], rows[0, 1 + 2 * contacts :] = engine.start, y
+    n[state.N_RECORDED], n[state.NEXT_OUTPUT] = 1, 1
+    return _Run(engine.w, n, outputs, rows, np.full((room + state.ROOM, state.EVENT_SIZE), np.nan))
+
+
+def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
+    packed, n = engine.built.packed, run.n
+    control = engine.view("CONTROL", state.N_CONTROLS)
+    while True:
+        n[state.BUDGET] = n[state.EVALUATIONS] + SLICE
+        engine.entry.advance(packed.h, packed.f, run.w, n, run.outputs, run.rows, run.events)
+        t = control[state.TIME]
+        progress((t - engine.start) / control[state.SPAN], f"t = {t:.5f} s, {n[state.EVALUATIONS]} evaluations")
+        status = n[state.STATUS]
+        if status == state.SEGMENT_END:
+            return
+        if status == state.FULL:
+            run.rows = np.concatenate([run.rows, np.zeros_like(run.rows)])
+            run.events = np.concatenate([run.events, np.full_like(run.events, np.nan)])
+        elif status != state.PAUSED:
+            raise SolverError(_refusal(engine, run))
+
+
+def _refusal(engine: Engine, run: _Run) -> str:
+    control, n = engine.view("CONTROL", state.N_CONTROLS), run.n
+    joints = ", ".join(e.name for e, _, _ in engine.built.system.closures) or "none"
+    contacts = [name for name, *_ in engine.built.system.contacts]
+    culprit = contacts[n[state.CULPRIT]] if contacts else ""
+    reasons = {
+        state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
+        "contacts may be collapsing in time, or the tolerance is too tight",
+        state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
+        f"or stiffer than an explicit method can follow (loops closed at joints {joints})",
+        state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
+        state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
+        state.LOST_CLOSURE: f"the loops at joints {joints} cannot be kept closed: a singular configuration",
+    }
+    return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
+
+
+def _collect(run: _Run, drift: float) -> Trajectory:
+    n = run.n
+    rows = run.rows[: n[state.N_RECORDED]]
+    keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
+    counters = {
+        "evaluations": int(n[state.EVALUATIONS]),
+        "steps": int(n[state.STEPS]),
+        "rejected_steps": int(n[state.REJECTED]),
+        "projections": int(n[state.PROJECTIONS]),
+    }
+    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift)

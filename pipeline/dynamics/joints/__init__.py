@@ -1,0 +1,19 @@
+"""Joint types. To add one: a module here and a line below; the family tests pick it up.
+
+Each module holds one class with
+- ``POSITIONS``, ``SPEEDS``: coordinates of a tree joint of this type, one letter each (r, t);
+- ``TRANSLATIONS``: axes of the first frame along which a closure forbids displacement;
+- ``ROTATIONS``: pairs (axis of the first frame, axis of the second) that a closure keeps perpendicular;
+- ``motion``: kernel for the motion of the second frame relative to the first (see `spherical`);
+- ``coordinates(R, p)``: joint positions of a relative pose, for the start.
+"""
+
+KIND = "joint type"
+NAMES = {
+    "fixed": "fixed:Fixed",
+    "prismatic": "prismatic:Prismatic",
+    "revolute": "revolute:Revolute",
+    "spherical": "spherical:Spherical",
+    "free": "free:Free",
+}
+CONTACTS = {"clearance-spherical": "clearance_spherical:ClearanceSpherical"}

@@ -1,0 +1,35 @@
+"""Rigid connection; met in the tree only where one of the two bodies is flexible."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.tables import J_COLUMNS
+from pipeline.dynamics.vectors import kernel
+
+
+@kernel
+def motion(w, x, u, du, joint, rate):
+    """The two frames coincide (see `spherical.motion`)."""
+    for k in range(J_COLUMNS):
+        w[joint + k] = 0.0
+    w[joint] = w[joint + 4] = w[joint + 8] = 1.0
+
+
+class Fixed:
+    """Nothing is free."""
+
+    POSITIONS, SPEEDS = "", ""  #: r: rotation [rad or -], t: translation [m]
+    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+    ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
+    motion = staticmethod(motion)
+
+    @staticmethod
+    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """No coordinates, shape (0,)."""
+        return np.zeros(0)
+
+    @staticmethod
+    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """No speeds."""
+        return np.zeros(0)

@@ -1,0 +1,40 @@
+"""Sliding joint along z of the first frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.tables import J_ACCELERATION, J_COLUMNS, J_POSITION, J_VELOCITY
+from pipeline.dynamics.vectors import kernel
+
+
+@kernel
+def motion(w, x, u, du, joint, rate):
+    """Motion of frame G in frame F: x metres along z (see `spherical.motion`)."""
+    for k in range(J_COLUMNS + 6):
+        w[joint + k] = 0.0
+    w[joint] = w[joint + 4] = w[joint + 8] = 1.0
+    w[joint + J_POSITION + 2] = w[x]
+    w[joint + J_VELOCITY + 2] = w[u]
+    w[joint + J_ACCELERATION + 2] = w[du]
+    w[joint + J_COLUMNS + 5] = 1.0
+    w[rate] = w[u]
+
+
+class Prismatic:
+    """One displacement is free."""
+
+    POSITIONS, SPEEDS = "t", "t"  #: r: rotation [rad or -], t: translation [m]
+    TRANSLATIONS: tuple[int, ...] = (0, 1)
+    ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
+    motion = staticmethod(motion)
+
+    @staticmethod
+    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Displacement along z [m], shape (1,)."""
+        return np.array([p[2]])
+
+    @staticmethod
+    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Joint speed of a relative twist, components in the first frame."""
+        return v[2:]

@@ -1,0 +1,40 @@
+"""Hinge about z of the first frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA
+from pipeline.dynamics.vectors import kernel
+
+
+@kernel
+def motion(w, x, u, du, joint, rate):
+    """Motion of frame G in frame F: x radians about z (see `spherical.motion`)."""
+    for k in range(J_COLUMNS + 6):
+        w[joint + k] = 0.0
+    cosine, sine = np.cos(w[x]), np.sin(w[x])
+    w[joint], w[joint + 1], w[joint + 3], w[joint + 4], w[joint + 8] = cosine, -sine, sine, cosine, 1.0
+    w[joint + J_OMEGA + 2] = w[u]
+    w[joint + J_ALPHA + 2] = w[du]
+    w[joint + J_COLUMNS + 2] = 1.0
+    w[rate] = w[u]
+
+
+class Revolute:
+    """One rotation is free."""
+
+    POSITIONS, SPEEDS = "r", "r"  #: r: rotation [rad or -], t: translation [m]
+    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+    ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
+    motion = staticmethod(motion)
+
+    @staticmethod
+    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Angle about z [rad] in (-pi, pi], shape (1,)."""
+        return np.array([np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])])
+
+    @staticmethod
+    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Joint speed of a relative twist, components in the first frame."""
+        return omega[2:]

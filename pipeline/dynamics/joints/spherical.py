@@ -1,0 +1,46 @@
+"""Ball joint: rotation by a quaternion, angular velocity in the axes of the first frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA, J_ROTATION
+from pipeline.dynamics.vectors import from_quaternion, kernel, put9, quaternion_rate
+
+
+@kernel
+def motion(w, x, u, du, joint, rate):
+    """Motion of frame G in frame F, components in F; all arguments after w are places in it.
+
+    x: quaternion of R_FG (4); u: angular velocity [rad/s] (3); du: known part of its rate (3).
+    Fills `joint` (layout: tables.J_*) and the position rates `rate` (4).
+    """
+    R = from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3])
+    put9(w, joint + J_ROTATION, R)
+    for k in range(9, J_COLUMNS + 18):
+        w[joint + k] = 0.0
+    for k in range(3):
+        w[joint + J_OMEGA + k] = w[u + k]
+        w[joint + J_ALPHA + k] = w[du + k]
+        w[joint + J_COLUMNS + 7 * k] = 1.0
+    quaternion_rate(w, x, u, rate)
+
+
+class Spherical:
+    """Three rotations are free; a closure keeps the two origins together."""
+
+    POSITIONS, SPEEDS = "rrrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
+    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+    ROTATIONS: tuple[tuple[int, int], ...] = ()
+    motion = staticmethod(motion)
+
+    @staticmethod
+    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Quaternion of R_FG, shape (4,); the offset p is the closure's business."""
+        return matrix_to_quaternion(R)
+
+    @staticmethod
+    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Joint speeds of a relative twist, components in the first frame."""
+        return omega

@@ -1,0 +1,145 @@
+"""Members of an ensemble: the same scene from starts that differ by a hair.
+
+Beyond the horizon of pointwise validity single values of a chaotic run mean nothing; mean and
+spread of such members do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.artifacts.schema import ENSEMBLE, conform
+from pipeline.core.errors import InputError
+from pipeline.core.scene.schema import Ensemble, Scene
+from pipeline.dynamics.integrate import state
+from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, project
+from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
+from pipeline.dynamics.record.dataset import attributes
+from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
+from pipeline.dynamics.run import engine_of, observed
+from pipeline.dynamics.tables import BALL, FRAME_SIZE, NORMAL_FORCE, SOCKET, TOUCH_OFFSET, TOUCH_SIZE, VELOCITY
+
+#: approach speed above which a closing counts as an impact [m/s]
+IMPACT = 1e-4
+
+
+def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """All members (schema ENSEMBLE) of a scene with clearance joints."""
+    wanted = scene.ensemble or Ensemble()
+    if not scene.contacts():
+        raise InputError("[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it")
+    engine = engine_of(scene, bundles, progress)
+    names = _bodies(engine, wanted)
+    start, _ = consistent_start(engine)
+    jacobian = offset_jacobian(engine, start)
+    random = np.random.default_rng(wanted.seed)
+    members = []
+    for k in range(wanted.members):
+        offsets = random.normal(size=(len(scene.contacts()), 3))
+        offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
+        moved = perturbed(engine, start, jacobian, offsets.ravel())
+        members.append(_member(engine, integrate(engine, moved, _quiet), names))
+        progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
+    made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
+    return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation)
+
+
+def _quiet(share: float | None, text: str) -> None:
+    """Progress is told per member."""
+
+
+def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
+    system = engine.built.system
+    known = [n for n, b in system.scene.body.items() if b.type != "ground"]
+    if wanted.bodies is None:
+        return sorted({system.frames[f].body for _, joint, _, _ in system.contacts for f in joint.between} & set(known))
+    for name in wanted.bodies:
+        if name not in known:
+            raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
+    return list(wanted.bodies)
+
+
+def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
+
+    From the velocities that unit speeds give, so that no step width enters.
+    """
+    layout = engine.built.layout
+    columns = []
+    for k in range(layout.nv):
+        moved = y.copy()
+        moved[layout.nq : layout.nq + layout.nv] = 0.0
+        moved[layout.nq + k] = 1.0
+        columns.append(_offset_rates(engine, project(engine, moved)))
+    return np.array(columns).T
+
+
+def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
+    engine.evaluate(y, engine.start)
+    sites = engine.view("SITE_FRAMES", FRAME_SIZE * engine.built.packed.sizes["N_SITES"]).reshape(-1, FRAME_SIZE)
+    table = engine.built.packed.table("CONTACTS")
+    return np.concatenate([sites[b, VELOCITY : VELOCITY + 3] - sites[s, VELOCITY : VELOCITY + 3] for s, b in table[:, [SOCKET, BALL]]])
+
+
+def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """The start with the balls moved by `offsets` (3 per contact) as nearly as the joints allow."""
+    layout = engine.built.layout
+    speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
+    moving = y.copy()
+    moving[layout.nq : layout.nq + layout.nv] = speeds
+    rates = engine.evaluate(project(engine, moving), engine.start)[: layout.nq]
+    moved = y.copy()
+    moved[: layout.nq] += rates  # rates per unit time, for one unit: a displacement of 1e-8 m is linear
+    return project(engine, moved)
+
+
+def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
+    scene = engine.built.system.scene
+    regular = output_times(engine.breaks, scene.output.interval)
+    rows = np.searchsorted(trajectory.time, regular)
+    peak, count, share = _contact_statistics(engine, trajectory)
+    kept = Trajectory(trajectory.rows[rows], trajectory.events, trajectory.counters, trajectory.drift)
+    seen = observed(engine, kept)
+    motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
+    chosen = [motions[n] for n in names]
+    touch = seen["touch"].reshape(len(rows), -1, TOUCH_SIZE)
+    variables = {
+        **_series(chosen, engine.built.system.origin),
+        "contact_normal_force": (("time", "contact"), touch[..., NORMAL_FORCE]),
+        "contact_offset": (("time", "contact", "axis"), touch[..., TOUCH_OFFSET : TOUCH_OFFSET + 3]),
+        "impact_count": (("contact",), count),
+        "peak_force": (("contact",), peak),
+        "contact_time_share": (("contact",), share),
+    }
+    contacts = [name for name, *_ in engine.built.system.contacts]
+    return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
+
+
+def _series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    dims = ("time", "body", "axis")
+    return {
+        "position": (dims, np.stack([m.p + origin for m in motions], axis=1)),
+        "quaternion": (("time", "body", "quat"), np.stack([quaternions(m.R) for m in motions], axis=1)),
+        "velocity": (dims, np.stack([m.v for m in motions], axis=1)),
+        "angular_velocity": (dims, np.stack([m.omega for m in motions], axis=1)),
+        "acceleration": (dims, np.stack([m.a for m in motions], axis=1)),
+    }
+
+
+def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Largest force [N], impacts, and share of the time in contact, per contact."""
+    e = trajectory.events
+    span = engine.end - engine.start
+    peak, count, share = [], [], []
+    for c in range(engine.built.packed.sizes["N_CONTACTS"]):
+        closing = e[(e[:, state.EVENT_CONTACT] == c) & (e[:, state.EVENT_KIND] == state.CLOSING)]
+        lasting = np.where(np.isnan(closing[:, state.DURATION]), engine.end - closing[:, state.EVENT_TIME], closing[:, state.DURATION])
+        peak.append(closing[:, state.PEAK_FORCE].max(initial=0.0))
+        count.append(int((closing[:, state.SPEED] > IMPACT).sum()))
+        share.append(lasting.sum() / span)
+    return np.array(peak), np.array(count), np.array(share)
+
+

@@ -1,0 +1,125 @@
+"""Motion of the named bodies and frames, from that of the links that carry them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.scene.parts import RigidBody
+from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.tables import ACCELERATION, ALPHA, AXES, FRAME_SIZE, OMEGA, ORIGIN, VELOCITY
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Motion of a point of a body and of the body's axes, over time; world axes, kernels' origin.
+
+    p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3).
+    """
+
+    p: np.ndarray
+    R: np.ndarray
+    v: np.ndarray
+    omega: np.ndarray
+    a: np.ndarray
+    alpha: np.ndarray
+
+    def at(self, arm: np.ndarray, turn: np.ndarray | None = None) -> Motion:
+        """Motion of a fixed point `arm`, and of axes turned by `turn`, both given in the body."""
+        r = self.R @ arm
+        swing = np.cross(self.omega, r)
+        a = self.a + np.cross(self.alpha, r) + np.cross(self.omega, swing)
+        R = self.R if turn is None else self.R @ turn
+        return Motion(self.p + r, R, self.v + swing, self.omega, a, self.alpha)
+
+    def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
+        """Motion of a point that moves in the body: its place, rate and second rate there, (time, 3)."""
+        r, s, t = (np.einsum("tij,tj->ti", self.R, x) for x in (arm, rate, second))
+        swing = np.cross(self.omega, r)
+        a = self.a + np.cross(self.alpha, r) + np.cross(self.omega, swing + 2.0 * s) + t
+        return Motion(self.p + r, self.R, self.v + swing + s, self.omega, a, self.alpha)
+
+
+def link_motions(built: Tables, frames: np.ndarray) -> list[Motion]:
+    """Motion of every link's frame, gravity's upward acceleration of the ground taken out."""
+    gravity = built.packed.table("GRAVITY")[0]
+    frames = frames.reshape(len(frames), -1, FRAME_SIZE)
+    found = []
+    for i in range(frames.shape[1]):
+        f = frames[:, i]
+        R = f[:, AXES : AXES + 9].reshape(-1, 3, 3)
+        p, omega, v, alpha, a = (f[:, o : o + 3] for o in (ORIGIN, OMEGA, VELOCITY, ALPHA, ACCELERATION))
+        found.append(Motion(p, R, v, omega, a + gravity, alpha))
+    return found
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Modal coordinates of a flexible link, their rates and second rates; shape (time, mode)."""
+
+    q: np.ndarray
+    u: np.ndarray
+    du: np.ndarray
+
+
+def modal(built: Tables, link: int, seen: dict[str, np.ndarray]) -> Modal:
+    """Modal coordinates of a flexible link."""
+    layout = built.layout
+    q0, c0, n = layout.flex_q0[link], layout.flex_c0[link], layout.modes[link]
+    return Modal(
+        seen["coordinate"][:, q0 : q0 + n], seen["speed"][:, c0 : c0 + n], seen["acceleration"][:, c0 : c0 + n]
+    )
+
+
+def body_motions(built: Tables, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, Motion]:
+    """Motion of each moving body's centre of mass and axes, by name."""
+    system, found = built.system, {}
+    for name, body in system.scene.body.items():
+        i = system.link_of[name]
+        if isinstance(body, RigidBody):
+            place = system.links[i].places[name]
+            found[name] = links[i].at(place.p + place.R @ np.array(body.com), place.R)
+        elif i and system.links[i].flexible == name:
+            bundle, state = system.bundles[name], modal(built, i, seen)
+            C, mass = bundle["modal_first_moment"].values, float(bundle["mass"])
+            arm = (bundle["first_moment"].values + state.q @ C.T) / mass
+            found[name] = links[i].moving(arm, state.u @ C.T / mass, state.du @ C.T / mass)
+    return found
+
+
+def frame_positions(built: Tables, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, np.ndarray]:
+    """Origin of every named frame, kernels' origin, shape (time, 3)."""
+    system, found = built.system, {}
+    for name, frame in system.frames.items():
+        i = system.link_of[frame.body]
+        place = system.links[i].places[frame.body].of(frame.place)
+        arm = np.broadcast_to(place.p, (len(links[i].p), 3))
+        if system.links[i].flexible:
+            bundle = system.bundles[frame.body]
+            k = list(bundle["frame"].values).index(name.partition(".")[2])
+            arm = arm + modal(built, i, seen).q @ bundle["frame_translation_shape"].values[k].T
+        found[name] = links[i].p + np.einsum("tij,tj->ti", links[i].R, arm)
+    return found
+
+
+def quaternions(R: np.ndarray) -> np.ndarray:
+    """Unit quaternions of rotation matrices (time, 3, 3), without jumps of sign; w >= 0 at first."""
+    trace = np.trace(R, axis1=1, axis2=2)
+    diagonal = np.diagonal(R, axis1=1, axis2=2)
+    squares = 1.0 + np.concatenate([trace[:, None], 2.0 * diagonal - trace[:, None]], axis=1)
+    best = np.argmax(squares, axis=1)
+    skew = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    q = np.empty((len(R), 4))
+    for b in range(4):
+        rows = np.flatnonzero(best == b)
+        if b == 0:
+            q[rows, 0], q[rows, 1:] = squares[rows, 0], skew[rows]
+        else:
+            q[rows, 0] = skew[rows, b - 1]
+            q[rows, 1:] = R[rows, :, b - 1] + R[rows, b - 1, :]
+            q[rows, b] = squares[rows, b]
+    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0)
+    first = 1.0 if q[0, 0] >= 0.0 else -1.0
+    return q * np.concatenate([[first], first * np.cumprod(flips)])[:, None]

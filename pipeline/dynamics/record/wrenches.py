@@ -1,0 +1,143 @@
+"""Forces and moments of every joint, also of those between rigidly joined bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pipeline.core.scene.parts import RigidBody
+from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.record.motion import Motion
+from pipeline.dynamics.tables import TOUCH_FORCE, TOUCH_POINT, TOUCH_SIZE
+
+Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
+
+
+def joint_wrenches(
+    built: Tables, seen: dict[str, np.ndarray], bodies: Mapping[str, Motion], frames: Mapping[str, np.ndarray]
+) -> dict[str, Wrench]:
+    """Wrench of every joint on its second body: force [N], moment [N m] about that body's frame origin.
+
+    Returned as (moment, force).
+    """
+    found = _tree(built, seen) | _closures(built, seen) | _contacts(built, seen)
+    found |= _inside_groups(built, bodies, found)
+    result = {}
+    for name, joint in built.system.scene.joint.items():
+        moment, force = found[name]
+        result[name] = (moment - np.cross(frames[joint.between[1]], force), force)
+    return result
+
+
+def _tree(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
+    found = {}
+    table = seen["link_wrench"].reshape(len(seen["link_wrench"]), -1, 6)
+    for i, link in enumerate(built.system.links):
+        edge = link.branch.edge
+        if edge is not None:
+            sign = -1.0 if link.branch.reverse else 1.0
+            found[edge.name] = (sign * table[:, i, :3], sign * table[:, i, 3:])
+    return found
+
+
+def _closures(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
+    table = seen["closure_wrench"].reshape(len(seen["closure_wrench"]), -1, 6)
+    return {
+        built.system.closures[k][0].name: (table[:, row, :3], table[:, row, 3:])
+        for row, k in enumerate(built.closure_order)
+    }
+
+
+def _contacts(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
+    touch = seen["touch"].reshape(len(seen["touch"]), -1, TOUCH_SIZE)
+    found = {}
+    for c, (name, *_) in enumerate(built.system.contacts):
+        force = touch[:, c, TOUCH_FORCE : TOUCH_FORCE + 3]
+        found[name] = (np.cross(touch[:, c, TOUCH_POINT : TOUCH_POINT + 3], force), force)
+    return found
+
+
+def _inside_groups(built: Tables, bodies: Mapping[str, Motion], known: Mapping[str, Wrench]) -> dict[str, Wrench]:
+    """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
+    scene, system = built.system.scene, built.system
+    found: dict[str, Wrench] = {}
+    for link in system.links:
+        inner = [n for n, j in scene.joint.items() if _is_inside(built, j.between, link.places) and n not in known]
+        demand = {b: _demand(built, b, bodies, known) for b in link.places}
+        tree = _forest(built, inner, list(link.places))
+        for name in inner:
+            if name not in tree:
+                # a second path between bodies that are joined already: it carries nothing here
+                zero = np.zeros_like(next(iter(demand.values()))[0])
+                found[name] = (zero, zero)
+                continue
+            side, sign = _far_side(built, name, tree, list(link.places))
+            total = [sign * sum(demand[b][k] for b in side) for k in (0, 1)]
+            found[name] = (total[0], total[1])
+    return found
+
+
+def _is_inside(built: Tables, between: tuple[str, str], places: Mapping[str, object]) -> bool:
+    return all(built.system.frames[f].body in places for f in between)
+
+
+def _demand(built: Tables, name: str, bodies: Mapping[str, Motion], known: Mapping[str, Wrench]) -> Wrench:
+    """What the fixed joints must supply to a body: its inertia less gravity and all other joints."""
+    scene, frames = built.system.scene, built.system.frames
+    times = len(next(iter(bodies.values())).p)
+    moment, force = np.zeros((times, 3)), np.zeros((times, 3))
+    body = scene.body[name]
+    if isinstance(body, RigidBody):
+        motion = bodies[name]
+        J = motion.R @ np.array(body.inertia) @ np.swapaxes(motion.R, 1, 2)
+        force = body.mass * (motion.a - built.packed.table("GRAVITY")[0])
+        spin = np.einsum("tij,tj->ti", J, motion.omega)
+        moment = np.einsum("tij,tj->ti", J, motion.alpha) + np.cross(motion.omega, spin) + np.cross(motion.p, force)
+    for joint_name, (n, f) in known.items():
+        a, b = (frames[x].body for x in scene.joint[joint_name].between)
+        if name in (a, b):
+            sign = 1.0 if name == b else -1.0
+            moment, force = moment - sign * n, force - sign * f
+    return moment, force
+
+
+def _forest(built: Tables, names: list[str], bodies: list[str]) -> list[str]:
+    """Fixed joints that span the bodies, in scene order."""
+    root = {b: b for b in bodies}
+
+    def top(b: str) -> str:
+        while root[b] != b:
+            b = root[b]
+        return b
+
+    kept = []
+    for name in names:
+        a, b = (top(built.system.frames[f].body) for f in built.system.scene.joint[name].between)
+        if a != b:
+            root[a] = b
+            kept.append(name)
+    return kept
+
+
+def _far_side(built: Tables, name: str, tree: list[str], bodies: list[str]) -> tuple[set[str], float]:
+    """Bodies on one side of a fixed joint, without the ground; +1 for the second body's side."""
+    frames, scene = built.system.frames, built.system.scene
+    a, b = (frames[f].body for f in scene.joint[name].between)
+    others = [tuple(frames[f].body for f in scene.joint[n].between) for n in tree if n != name]
+
+    def reach(start: str) -> set[str]:
+        found, stack = {start}, [start]
+        while stack:
+            body = stack.pop()
+            for x, y in others:
+                for near, far in ((x, y), (y, x)):
+                    if near == body and far not in found:
+                        found.add(far)
+                        stack.append(far)
+        return found
+
+    side = reach(b)
+    if any(scene.body[body].type == "ground" for body in side):
+        return reach(a), -1.0
+    return side, 1.0

@@ -1,0 +1,283 @@
+"""The arrays through which scene and compiled kernels speak: wiring, numbers and work space.
+
+A kernel's code depends only on the kinds of parts present. Everything else, how many there
+are, what is joined to what, every number, stands in three flat arrays that every kernel takes:
+
+- ``h`` (integers): a header with sizes and offsets, then the wiring tables;
+- ``f`` (floats): the numbers of the scene;
+- ``w`` (floats): the work space, the integrator's state and stages included.
+
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
+
+Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site*
+is a frame on a link that a joint, closure or contact uses. A *port* is a site on a flexible
+link. A *coordinate* is one generalised speed; free ones come first, in the order of
+elimination (descendants before ancestors), prescribed ones after. A *column* is the twist
+(angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
+coordinate has one, and every port one more per mode.
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.vectors import index, kernel
+
+#: header of h: sizes
+SIZES = (
+    "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS N_KNOWN_PAIRS "
+    "N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE MOST_MODES"
+).split()
+#: wiring tables in h: name -> columns
+WIRING = {
+    # parent, joint kind, first position, first coordinate, number of coordinates, flexible body or -1,
+    # port of a flexible link's inboard frame or -1, port of the parent that carries it or -1
+    "LINKS": 8,
+    "SITES": 2,  # link, port or -1
+    # link, number of modes, first position, first coordinate, first of its numbers, first and number of
+    # its moments, whether modes move the inboard frame
+    "FLEXES": 8,
+    "MOMENTS": 2,  # row (3k + l) n + j, i of int rho S_ki S_lj
+    "PORTS": 3,  # flexible body, first column, first of its shapes
+    "PAIRS": 3,  # momentum, column, place in the mass matrix's envelope
+    "KNOWN_PAIRS": 4,  # momentum, column, prescribed coordinate, free coordinate
+    "ENVELOPE": 2,  # first column, start of each row of the mass matrix
+    # site a, site b, first row, rows, first of support, its length, first of Jacobian, first entry, entries
+    "CLOSURES": 9,
+    "CLOSURE_ROWS": 3,  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
+    "SUPPORT": 1,  # coordinates on which a closure depends
+    "ENTRIES": 3,  # slot in the support, column, sign
+    "KNOWN_ENTRIES": 4,  # closure, prescribed coordinate, column, sign
+    "CLOSURE_PAIRS": 4,  # closure a, closure b >= a, start and number of their common slots
+    "COMMON": 2,  # slot in a, slot in b
+    "CLOSURE_ENVELOPE": 2,
+    "CONTACTS": 4,  # socket site, ball site, normal law, friction law
+    "DRIVES": 2,  # first piece, number of pieces
+    "GROUPS": 1,  # error group of each state variable
+}
+#: numbers in f: name -> columns
+NUMBERS = {
+    "LINK_NUMBERS": 10,  # mass, centre of mass (3), inertia about it (xx yy zz xy xz yz), link axes
+    "SITE_NUMBERS": 12,  # position (3), rotation (9) in the link
+    "FLEX_NUMBERS": 13,  # mass, first moment (3), second moment (9)
+    "FLEX_DATA": 1,  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n n), damping (n)
+    "MOMENT_VALUES": 1,
+    "PORT_NUMBERS": 12,  # undeformed position (3), rotation (9)
+    "PORT_DATA": 1,  # per port: translation shape (3n), rotation shape (3n)
+    "CONTACT_NUMBERS": 11,  # clearance, ball radius, floor, normal law (4), friction law (4)
+    "PIECES": 7,  # start, six coefficients
+    "GRAVITY": 3,
+    "FLOORS": 1,  # per error group: magnitude below which it is resolved absolutely
+}
+#: work space in w: its places, in order; sizes follow from the header (see `assembly.packing`)
+WORK = (
+    "X U DU LINK_FRAMES SITE_FRAMES JOINT OWN INERTIA WRENCH COLUMNS MOMENTA DEFORMATION BIAS MODAL_BIAS MODAL SCRATCH "
+    "MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR MULTIPLIER TOUCH DRIVE_FORCE LEDGER_RATE "
+    "POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MAGNITUDE CORRECTION LATCHED WATCH CONTROL"
+).split()
+_PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK])}
+HEADER = len(_PLACE)
+
+
+def place(name: str) -> int:
+    """Where the header keeps a size or an offset."""
+    return _PLACE[name]
+
+
+(
+    N_LINKS,
+    N_SITES,
+    N_FLEX,
+    N_CLOSURES,
+    N_CLOSURE_ROWS,
+    N_CONTACTS,
+    N_DRIVES,
+    NQ,
+    NV,
+    NY,
+    N_LEDGER,
+    N_PAIRS,
+    N_KNOWN_PAIRS,
+    N_KNOWN_ENTRIES,
+    N_CLOSURE_PAIRS,
+    N_GROUPS,
+    MASS_SIZE,
+    SCHUR_SIZE,
+    MOST_MODES,
+) = (place(name) for name in SIZES)
+(
+    LINKS,
+    SITES,
+    FLEXES,
+    MOMENTS,
+    PORTS,
+    PAIRS,
+    KNOWN_PAIRS,
+    ENVELOPE,
+    CLOSURES,
+    CLOSURE_ROWS,
+    SUPPORT,
+    ENTRIES,
+    KNOWN_ENTRIES,
+    CLOSURE_PAIRS,
+    COMMON,
+    CLOSURE_ENVELOPE,
+    CONTACTS,
+    DRIVES,
+    GROUPS,
+) = (place(name) for name in WIRING)
+(
+    LINK_NUMBERS,
+    SITE_NUMBERS,
+    FLEX_NUMBERS,
+    FLEX_DATA,
+    MOMENT_VALUES,
+    PORT_NUMBERS,
+    PORT_DATA,
+    CONTACT_NUMBERS,
+    PIECES,
+    GRAVITY,
+    FLOORS,
+) = (place(name) for name in NUMBERS)
+(
+    X,
+    U,
+    DU,
+    LINK_FRAMES,
+    SITE_FRAMES,
+    JOINT,
+    OWN,
+    INERTIA,
+    WRENCH,
+    COLUMNS,
+    MOMENTA,
+    DEFORMATION,
+    BIAS,
+    MODAL_BIAS,
+    MODAL,
+    SCRATCH,
+    MASS,
+    FORCE,
+    ROWS,
+    RESIDUAL,
+    RESIDUAL_RATE,
+    GAMMA,
+    JACOBIAN,
+    SPREAD,
+    SCHUR,
+    MULTIPLIER,
+    TOUCH,
+    DRIVE_FORCE,
+    LEDGER_RATE,
+    POSITION_RATE,
+    Y,
+    Y_NEW,
+    Y_STAGE,
+    SLOPES,
+    DENSE,
+    MAGNITUDE,
+    CORRECTION,
+    LATCHED,
+    WATCH,
+    CONTROL,
+) = (place(name) for name in WORK)
+
+# fields of a link, a flexible body, a port, a closure, a contact
+PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)
+FLEX_LINK, N_MODES, FLEX_Q0, FLEX_C0, DATA0, MOMENT0, N_MOMENTS, FLEX_INBOARD = range(8)
+PORT_FLEX, PORT_COLUMN, PORT_SHAPES = range(3)
+SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES = range(9)
+SOCKET, BALL, NORMAL_KIND, FRICTION_KIND = range(4)
+CLEARANCE, BALL_RADIUS, FLOOR, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 7
+# a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
+ORIGIN, AXES, OMEGA, VELOCITY, ALPHA, ACCELERATION, FRAME_SIZE = 0, 3, 12, 15, 18, 21, 24
+# a joint's motion: rotation (9), position (3), rates (3 + 3), rate biases (3 + 3), then columns (6 each)
+J_ROTATION, J_POSITION, J_OMEGA, J_VELOCITY, J_ALPHA, J_ACCELERATION, J_COLUMNS, JOINT_SIZE = 0, 9, 12, 15, 18, 21, 24, 60
+# spatial inertia: mass, mass * centre (3), inertia about the kernels' origin (xx yy zz xy xz yz)
+INERTIA_SIZE = 10
+# what a contact does now
+GAP, RATE, NORMAL_FORCE, FRICTION_POWER, DAMPING_POWER, STORED = range(6)
+TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 6, 9, 12, 15
+# ledger before the contacts' slots (normal, friction each): work of drives, loss of modal damping
+DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
+# what evaluate reports in n[EVALUATION]
+OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED = range(4)
+#: first entries of n, the integers that change: report of the last evaluation; then the drives' active pieces
+#: and the contacts' modes start where n[ACTIVE] and n[MODE] say
+EVALUATION, ACTIVE, MODE = range(3)
+
+
+@kernel
+def link(h, i, field):
+    """A field of link i."""
+    return h[index(h[LINKS] + 8 * i + field)]
+
+
+@kernel
+def flex(h, k, field):
+    """A field of flexible body k."""
+    return h[index(h[FLEXES] + 8 * k + field)]
+
+
+@kernel
+def port(h, k, field):
+    """A field of port k."""
+    return h[index(h[PORTS] + 3 * k + field)]
+
+
+@kernel
+def closure(h, c, field):
+    """A field of closure c."""
+    return h[index(h[CLOSURES] + 9 * c + field)]
+
+
+@kernel
+def contact(h, c, field):
+    """A field of contact c."""
+    return h[index(h[CONTACTS] + 4 * c + field)]
+
+
+@kernel
+def site_link(h, s):
+    """Link of site s."""
+    return h[index(h[SITES] + 2 * s)]
+
+
+@kernel
+def site_port(h, s):
+    """Port of site s, or -1."""
+    return h[index(h[SITES] + 2 * s + 1)]
+
+
+@kernel
+def link_frame(h, i):
+    """Where w holds the frame of link i."""
+    return h[LINK_FRAMES] + FRAME_SIZE * i
+
+
+@kernel
+def site_frame(h, s):
+    """Where w holds the frame of site s."""
+    return h[SITE_FRAMES] + FRAME_SIZE * s
+
+
+@kernel
+def column(h, k):
+    """Where w holds column k."""
+    return h[COLUMNS] + 6 * k
+
+
+@kernel
+def momentum(h, k):
+    """Where w holds the momentum of column k."""
+    return h[MOMENTA] + 6 * k
+
+
+@kernel
+def wrench(h, i):
+    """Where w holds the wrench on link i."""
+    return h[WRENCH] + 6 * i
+
+
+@kernel
+def touch(h, c):
+    """Where w holds the state of contact c."""
+    return h[TOUCH] + TOUCH_SIZE * c

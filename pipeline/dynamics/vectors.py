@@ -1,0 +1,264 @@
+"""Vector and rotation algebra for compiled kernels, on tuples that live in registers.
+
+A vector is ``(x, y, z)``, a matrix its nine entries row by row. `kernel` is the decorator of
+every compiled function: IEEE division (no exceptions), fused multiply-add and reordered sums
+allowed, NaN and infinity honoured.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+kernel = njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+
+
+#: type of an index: unsigned, because compiled code must otherwise ask of each whether it is negative
+index = np.uint64
+ONE, TWO, THREE, FOUR, FIVE, SIX, SEVEN, EIGHT = (np.uint64(k) for k in range(1, 9))
+
+
+@kernel
+def at(a, o):
+    """Vector stored in a flat array from place o."""
+    i = index(o)
+    return (a[i], a[i + ONE], a[i + TWO])
+
+
+@kernel
+def put(a, o, v):
+    """Store a vector from place o."""
+    i = index(o)
+    a[i] = v[0]
+    a[i + ONE] = v[1]
+    a[i + TWO] = v[2]
+
+
+@kernel
+def accumulate(a, o, v):
+    """Add a vector to the one stored from place o."""
+    i = index(o)
+    a[i] += v[0]
+    a[i + ONE] += v[1]
+    a[i + TWO] += v[2]
+
+
+@kernel
+def at9(a, o):
+    """Matrix stored in a flat array from place o."""
+    i = index(o)
+    return (
+        a[i],
+        a[i + ONE],
+        a[i + TWO],
+        a[i + THREE],
+        a[i + FOUR],
+        a[i + FIVE],
+        a[i + SIX],
+        a[i + SEVEN],
+        a[i + EIGHT],
+    )
+
+
+@kernel
+def at6(a, o):
+    """Symmetric matrix (xx, yy, zz, xy, xz, yz) stored from place o."""
+    i = index(o)
+    return (a[i], a[i + ONE], a[i + TWO], a[i + THREE], a[i + FOUR], a[i + FIVE])
+
+
+@kernel
+def put9(a, o, m):
+    """Store a matrix from place o."""
+    i = index(o)
+    a[i], a[i + ONE], a[i + TWO] = m[0], m[1], m[2]
+    a[i + THREE], a[i + FOUR], a[i + FIVE] = m[3], m[4], m[5]
+    a[i + SIX], a[i + SEVEN], a[i + EIGHT] = m[6], m[7], m[8]
+
+
+@kernel
+def dot6(a, o, b, p):
+    """Product of the six-vectors stored from o in a and from p in b."""
+    i, j = index(o), index(p)
+    first = a[i] * b[j] + a[i + ONE] * b[j + ONE] + a[i + TWO] * b[j + TWO]
+    second = a[i + THREE] * b[j + THREE] + a[i + FOUR] * b[j + FOUR] + a[i + FIVE] * b[j + FIVE]
+    return first + second
+
+
+@kernel
+def add(a, b):
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@kernel
+def sub(a, b):
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@kernel
+def scale(s, a):
+    """s a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@kernel
+def dot(a, b):
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def turn(m, v):
+    """m v."""
+    return (
+        m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
+        m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
+        m[6] * v[0] + m[7] * v[1] + m[8] * v[2],
+    )
+
+
+@kernel
+def turn_back(m, v):
+    """m^T v."""
+    return (
+        m[0] * v[0] + m[3] * v[1] + m[6] * v[2],
+        m[1] * v[0] + m[4] * v[1] + m[7] * v[2],
+        m[2] * v[0] + m[5] * v[1] + m[8] * v[2],
+    )
+
+
+@kernel
+def product(a, b):
+    """a b."""
+    return (
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
+        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
+        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
+        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+    )
+
+
+@kernel
+def transpose(a):
+    """a^T."""
+    return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
+
+
+@kernel
+def axis(m, k):
+    """Column k of a matrix: axis k of the frame."""
+    return (m[k], m[3 + k], m[6 + k])
+
+
+@kernel
+def from_quaternion(w, x, y, z):
+    """Rotation matrix of a quaternion of any norm."""
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    return (
+        1.0 - s * (y * y + z * z),
+        s * (x * y - w * z),
+        s * (x * z + w * y),
+        s * (x * y + w * z),
+        1.0 - s * (x * x + z * z),
+        s * (y * z - w * x),
+        s * (x * z - w * y),
+        s * (y * z + w * x),
+        1.0 - s * (x * x + y * y),
+    )
+
+
+@kernel
+def quaternion_rate(a, q, u, rate):
+    """Rate of the quaternion stored from q at the angular velocity stored from u, parent axes."""
+    e, x, y, z = a[q], a[q + 1], a[q + 2], a[q + 3]
+    p, r, s = a[u], a[u + 1], a[u + 2]
+    a[rate] = -0.5 * (p * x + r * y + s * z)
+    a[rate + 1] = 0.5 * (p * e + r * z - s * y)
+    a[rate + 2] = 0.5 * (r * e + s * x - p * z)
+    a[rate + 3] = 0.5 * (s * e + p * y - r * x)
+
+
+@kernel
+def congruence(R, s):
+    """R S R^T of a symmetric S = (xx, yy, zz, xy, xz, yz), returned in the same order."""
+    a = product(R, (s[0], s[3], s[4], s[3], s[1], s[5], s[4], s[5], s[2]))
+    return (
+        a[0] * R[0] + a[1] * R[1] + a[2] * R[2],
+        a[3] * R[3] + a[4] * R[4] + a[5] * R[5],
+        a[6] * R[6] + a[7] * R[7] + a[8] * R[8],
+        a[0] * R[3] + a[1] * R[4] + a[2] * R[5],
+        a[0] * R[6] + a[1] * R[7] + a[2] * R[8],
+        a[3] * R[6] + a[4] * R[7] + a[5] * R[8],
+    )
+
+
+@kernel
+def turn_symmetric(s, v):
+    """S v of a symmetric S = (xx, yy, zz, xy, xz, yz)."""
+    return (
+        s[0] * v[0] + s[3] * v[1] + s[4] * v[2],
+        s[3] * v[0] + s[1] * v[1] + s[5] * v[2],
+        s[4] * v[0] + s[5] * v[1] + s[2] * v[2],
+    )
+
+
+@kernel
+def exponential(v):
+    """Rotation matrix of a rotation vector below about one radian (Rodrigues, in series)."""
+    s = dot(v, v)
+    a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
+    b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
+    x, y, z = v
+    return (
+        1.0 - b * (y * y + z * z),
+        b * x * y - a * z,
+        b * x * z + a * y,
+        b * x * y + a * z,
+        1.0 - b * (x * x + z * z),
+        b * y * z - a * x,
+        b * x * z - a * y,
+        b * y * z + a * x,
+        1.0 - b * (x * x + y * y),
+    )
+
+
+@kernel
+def _tangent_series(s):
+    """(1 - cos)/s and (sqrt s - sin)/s^1.5 at s = angle^2, and their derivatives in s."""
+    a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
+    b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0
+    da = -(1.0 - s / 15.0 * (1.0 - s / 37.333333333333336 * (1.0 - s / 67.5))) / 24.0
+    db = -(1.0 - s / 21.0 * (1.0 - s / 48.0 * (1.0 - s / 82.5))) / 120.0
+    return a, b, da, db
+
+
+@kernel
+def tangent(v, x):
+    """Angular velocity, parent axes, of the rotation exp(v) when v changes at the rate x."""
+    a, b, _, _ = _tangent_series(dot(v, v))
+    vx = cross(v, x)
+    vvx = cross(v, vx)
+    return add(x, add(scale(a, vx), scale(b, vvx)))
+
+
+@kernel
+def tangent_rate(v, x):
+    """Angular acceleration of exp(v) at constant rate x of v: d/dt of `tangent`."""
+    _, b, da, db = _tangent_series(dot(v, v))
+    ds = 2.0 * dot(v, x)
+    vx = cross(v, x)
+    vvx = cross(v, vx)
+    return add(add(scale(da * ds, vx), scale(db * ds, vvx)), scale(b, cross(x, vx)))

@@ -1,0 +1,79 @@
+"""Differences between two runs, without interpolation: only at times that both have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.post.rotations import angle_about_y, rotation_between
+
+#: two output times are the same when they agree after rounding to this many decimals [s]; outputs are
+#: 1e-4 s apart and event times fall anywhere, so a nanosecond separates what is equal from what is not
+DECIMALS = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Largest absolute differences of one body between two runs, and the span they are taken over."""
+
+    angle: float  #: angle about y [rad]
+    rotation: float  #: total rotation [rad]
+    displacement: float  #: z [m]
+    velocity: float  #: along z [m/s]
+    until: float  #: last time that was compared [s]
+
+
+def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into a and into b of the times that both have, ascending, each time once."""
+    _, first, second = np.intersect1d(np.round(a, DECIMALS), np.round(b, DECIMALS), return_indices=True)
+    return first, second
+
+
+def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: float = np.inf) -> Deviation:
+    """Largest differences of `body` between two runs at their common times up to `until` [s].
+
+    Raises ValueError when the runs have no common time in that span.
+    """
+    i, j = common_times(run.time.values, reference.time.values)
+    inside = run.time.values[i] <= until + 0.5 * 10.0**-DECIMALS
+    i, j = i[inside], j[inside]
+    if i.size == 0:
+        raise ValueError("the two runs have no output time in common")
+    return _compare(_motion(run, body), i, _motion(reference, body), j, run.time.values)
+
+
+def ensemble_deviations(ensemble: xr.Dataset, reference: xr.Dataset, body: str) -> list[Deviation]:
+    """`max_deviation` of every member over the whole run; members in order."""
+    i, j = common_times(ensemble.time.values, reference.time.values)
+    other = _motion(reference, body)
+    members = (ensemble.isel(member=k) for k in range(ensemble.sizes["member"]))
+    return [_compare(_motion(member, body), i, other, j, ensemble.time.values) for member in members]
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    quaternion: np.ndarray
+    z: np.ndarray
+    vz: np.ndarray
+
+
+def _motion(run: xr.Dataset, body: str) -> _Motion:
+    one = run.sel(body=body)
+    return _Motion(one.quaternion.values, one.position.values[:, 2], one.velocity.values[:, 2])
+
+
+def _compare(a: _Motion, i: np.ndarray, b: _Motion, j: np.ndarray, time: np.ndarray) -> Deviation:
+    qa, qb = a.quaternion[i], b.quaternion[j]
+    return Deviation(
+        angle=_largest(angle_about_y(qa) - angle_about_y(qb)),
+        rotation=_largest(rotation_between(qa, qb)),
+        displacement=_largest(a.z[i] - b.z[j]),
+        velocity=_largest(a.vz[i] - b.vz[j]),
+        until=float(time[i].max()),
+    )
+
+
+def _largest(values: np.ndarray) -> float:
+    return float(np.max(np.abs(values)))

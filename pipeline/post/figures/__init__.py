@@ -1,0 +1,56 @@
+"""The paper's figures and tables. To add one: a module here with NEEDS and make, and a line below.
+
+``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``; a literal, so that the
+runner can read it without importing the plotting libraries.
+``OPTIONAL``: further ones that it uses when they are there.
+``USES_GL``: true where the result also depends on the machine's GL libraries.
+``make(data)``: artifacts by reference -> file contents by file name.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+
+from pipeline.core.registry import lookup, module_of
+
+KIND = "figure or table"
+NAMES = {
+    "fig03": "fig03:make",
+    "fig04": "fig04:make",
+    "fig06": "fig06:make",
+    "fig08": "fig08:make",
+    "fig09": "fig09:make",
+    "fig11": "fig11:make",
+    "fig12": "fig12:make",
+    "fig13": "fig13:make",
+    "fig14": "fig14:make",
+    "fig15": "fig15:make",
+    "fig16": "fig16:make",
+    "fig17": "fig17:make",
+    "table04": "table04:make",
+    "table05": "table05:make",
+    "table07": "table07:make",
+    "table08": "table08:make",
+    "table09": "table09:make",
+    "table10": "table10:make",
+}
+
+
+def needs(name: str) -> tuple[str, ...]:
+    """References of the artifacts that `name` cannot be made without."""
+    return tuple(import_module(_module(name)).NEEDS)
+
+
+def optional(name: str) -> tuple[str, ...]:
+    """References of the artifacts that `name` uses when they are there."""
+    return tuple(getattr(import_module(_module(name)), "OPTIONAL", ()))
+
+
+def title(name: str) -> str:
+    """First line of the module's docstring: what the figure or table shows."""
+    return (import_module(_module(name)).__doc__ or name).strip().splitlines()[0].rstrip(".")
+
+
+def _module(name: str) -> str:
+    lookup(__name__, name, where="figures")
+    return module_of(__name__, name)

@@ -1,0 +1,42 @@
+"""Figure 8: trajectory of the moving platform about the y0 axis, ideal model."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from pipeline.post.models import IDEAL, motion
+from pipeline.post.plotting import style
+
+NEEDS = (
+    "sps4/ideal:run",
+    "sps4/ideal:post",
+)
+
+
+def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
+    """fig08.png and fig08.svg."""
+    ideal = motion(IDEAL, data)
+    with style.style():
+        figure, axes = style.grid(1, 1, (6.4, 3.5))
+        axes[0, 0].plot(ideal.time, ideal.angle, color=IDEAL.color, lw=1.8)
+        axes[0, 0].set(xlabel="time (s)", ylabel="angle about y0 (rad)", xlim=(ideal.time[0], ideal.time[-1]))
+        _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
+        style.heading(figure, "Figure 8", "trajectory of the moving platform about y0, ideal model")
+        return style.files("fig08", figure)
+
+
+def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None:
+    """A dot and the value at the largest tilt."""
+    i = int(np.argmax(np.abs(angle)))
+    axes.plot(time[i], angle[i], "o", color="#0072B2", ms=5)
+    text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s"
+    below = angle[i] > 0.0
+    axes.annotate(
+        text,
+        (time[i], angle[i]),
+        xytext=(0, -18 if below else 12),
+        textcoords="offset points",
+        ha="center",
+        color=style.SOFT,
+    )

@@ -1,0 +1,33 @@
+"""Figure 9: dynamic response of the ideal mechanism: z displacement, velocity, acceleration, reaction at A1."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from pipeline.post.models import IDEAL, motion
+from pipeline.post.plotting import style
+from pipeline.post.plotting.panels import ACCELERATION, DISPLACEMENT, REACTION, VELOCITY
+
+NEEDS = (
+    "sps4/ideal:run",
+    "sps4/ideal:post",
+)
+
+
+def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
+    """fig09.png and fig09.svg."""
+    ideal = motion(IDEAL, data)
+    with style.style():
+        figure, axes = style.grid(2, 2, (9.4, 5.8))
+        for letter, panel, quantity in zip(
+            "abcd", axes.flat, (DISPLACEMENT, VELOCITY, ACCELERATION, REACTION), strict=True
+        ):
+            panel.plot(ideal.time, quantity.values(ideal), color=IDEAL.color, lw=1.6)
+            panel.set(
+                xlabel="time (s)", ylabel=f"{quantity.title} ({quantity.unit})", xlim=(ideal.time[0], ideal.time[-1])
+            )
+            panel.set_title(f"({letter}) {quantity.title}")
+        style.heading(
+            figure, "Figure 9", "ideal model, centre of mass of the moving platform; reaction force at joint A1"
+        )
+        return style.files("fig09", figure)

@@ -1,0 +1,37 @@
+"""Figure 14: phase plots of angle and velocity along z, all models."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from pipeline.post.plotting import style
+from pipeline.post.plotting.phase import Plane, maps
+
+NEEDS = (
+    "sps4/ideal:run",
+    "sps4/ideal:post",
+    "sps4/csj:run",
+    "sps4/csj:post",
+    "sps4/far_csj_free:run",
+    "sps4/far_csj_free:post",
+    "sps4/far_csj_fixed:run",
+    "sps4/far_csj_fixed:post",
+    "sps4/far_csj_cb:run",
+    "sps4/far_csj_cb:post",
+)
+OPTIONAL = ("sps4/repeated/csj:run", "sps4/repeated/csj:post")
+
+PLANE = Plane(lambda m: m.angle, lambda m: m.velocity, "angle about y0 (rad)", "z velocity (mm/s)")
+
+
+def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
+    """fig14.png and fig14.svg."""
+    with style.style():
+        figure = maps(PLANE, data)
+        style.heading(
+            figure,
+            "Figure 14: angle and z velocity",
+            "the paper calls these phase plots Poincaré maps; second row (added): states when an impact "
+            "begins, hollow beyond the horizon",
+        )
+        return style.files("fig14", figure)

@@ -1,0 +1,20 @@
+"""Table 4: natural frequencies of the rod under fixed-fixed reference conditions."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from pipeline.post.paper import TABLE4_ANSYS, TABLE4_NORMAL_MODE
+from pipeline.post.plotting.frequency_table import table
+from pipeline.post.plotting.table import files
+
+NEEDS = (
+    "sps4/frequencies/fixed_square:modes/rod",
+    "sps4/frequencies/fixed_circle:modes/rod",
+)
+
+
+def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
+    """table04.csv and table04.md."""
+    title = "Table 4: frequencies of the rod, fixed-fixed reference conditions"
+    return files("table04", table(title, [data[n] for n in NEEDS], TABLE4_ANSYS, TABLE4_NORMAL_MODE, rigid=0))

@@ -1,0 +1,67 @@
+"""The paper's models: scenes, legends, and the quantities that its figures and tables show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+PLATFORM = "platform"
+JOINT = "A1"
+BALL_FRAME = "ball_A1.centre"
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """One curve of the paper's comparisons. `ours` marks what the paper does not have."""
+
+    scene: str
+    label: str
+    color: str  #: Okabe-Ito palette: told apart by colour-blind readers too
+    ours: bool = False
+
+
+IDEAL = Model("sps4/ideal", "ideal", "#111111")
+CSJ = Model("sps4/csj", "CSJ", "#E69F00")
+FAR_FREE = Model("sps4/far_free", "FAR, free-free modes", "#0072B2")
+FAR_FIXED = Model("sps4/far_fixed", "FAR, fixed-fixed modes", "#D55E00")
+FAR_CB = Model("sps4/far_cb", "FAR, Craig-Bampton modes (added)", "#009E73", ours=True)
+FAR_CSJ_FREE = Model("sps4/far_csj_free", "FAR-CSJ, free-free modes", "#0072B2")
+FAR_CSJ_FIXED = Model("sps4/far_csj_fixed", "FAR-CSJ, fixed-fixed modes", "#D55E00")
+FAR_CSJ_CB = Model("sps4/far_csj_cb", "FAR-CSJ, Craig-Bampton modes (added)", "#009E73", ours=True)
+
+FAR = (FAR_FREE, FAR_FIXED, FAR_CB)
+FAR_CSJ = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """The six quantities of figures 11-13 for one run, in the paper's units."""
+
+    model: Model
+    time: np.ndarray  #: [s]
+    angle: np.ndarray  #: about y0 [rad]
+    displacement: np.ndarray  #: z [mm]
+    velocity: np.ndarray  #: z [mm/s]
+    acceleration: np.ndarray  #: z [mm/s^2]
+    reaction: np.ndarray  #: at A1 [N]
+    ball: np.ndarray  #: centre of ball A1, world axes [mm], shape (time, 3)
+    horizon: float  #: [s]
+
+
+def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
+    """The paper's quantities of one model out of its run and post artifacts."""
+    run, post = data[f"{model.scene}:run"], data[f"{model.scene}:post"]
+    platform = run.sel(body=PLATFORM)
+    return Motion(
+        model=model,
+        time=run.time.values,
+        angle=post.rotation_y.sel(body=PLATFORM).values,
+        displacement=1e3 * post.displacement.sel(body=PLATFORM, axis="z").values,
+        velocity=1e3 * platform.velocity.sel(axis="z").values,
+        acceleration=1e3 * platform.acceleration.sel(axis="z").values,
+        reaction=post.reaction.sel(joint=JOINT).values,
+        ball=1e3 * run.frame_position.sel(frame=BALL_FRAME).values,
+        horizon=float(post.horizon),
+    )

@@ -1,0 +1,1 @@
+"""How plots and tables look, and their deterministic bytes."""

@@ -1,0 +1,82 @@
+"""What tables 7-9 share: rows of largest deviations, ours beside the paper's, and how far apart they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.post.errors import Deviation
+from pipeline.post.paper import MaximumError
+
+#: row heads, attribute of Deviation, factor to the unit, attribute of MaximumError (None: not in the paper)
+ROWS: tuple[tuple[str, str, float, str | None], ...] = (
+    ("angle about y0 (rad)", "angle", 1.0, "angle"),
+    ("total rotation (rad), added", "rotation", 1.0, None),
+    ("displacement z0 (mm)", "displacement", 1e3, "displacement"),
+    ("velocity z0 (mm/s)", "velocity", 1e3, "velocity"),
+)
+ABSENT = "–"
+#: deviations below this share of the printed ones are called zero: the paper prints four digits
+NOTHING = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column: its head, and one value or (mean, standard deviation) per row; None where there is none."""
+
+    head: str
+    cells: tuple[str, ...]
+
+
+def paper(head: str, values: MaximumError) -> Column:
+    """The paper's column."""
+    return Column(head, tuple(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS))
+
+
+def single(head: str, deviation: Deviation) -> Column:
+    """The column of one run."""
+    return Column(head, tuple(number(factor * getattr(deviation, name)) for _, name, factor, _ in ROWS))
+
+
+def several(head: str, deviations: Sequence[Deviation]) -> Column:
+    """Mean +- standard deviation over an ensemble's members."""
+    cells = []
+    for _, name, factor, _ in ROWS:
+        values = factor * np.array([getattr(deviation, name) for deviation in deviations])
+        cells.append(f"{number(values.mean())} ± {values.std(ddof=1):.1e}")
+    return Column(head, tuple(cells))
+
+
+def rows(columns: Sequence[Column]) -> tuple[tuple[str, ...], ...]:
+    """Rows of the table: head and one cell per column."""
+    return tuple((head, *(column.cells[i] for column in columns)) for i, (head, *_) in enumerate(ROWS))
+
+
+def heads(columns: Sequence[Column]) -> tuple[str, ...]:
+    """Column heads, the first for the quantity."""
+    return ("largest error", *(column.head for column in columns))
+
+
+def ratios(deviation: Deviation, printed: MaximumError) -> dict[str, float]:
+    """Ours over the paper's per quantity that the paper prints."""
+    return {
+        name: factor * getattr(deviation, ours) / getattr(printed, name)
+        for _, ours, factor, name in ROWS
+        if name is not None
+    }
+
+
+def comparison(who: str, deviation: Deviation, printed: MaximumError) -> str:
+    """A sentence with the ratios; says zero where there is nothing to divide."""
+    found = ratios(deviation, printed)
+    if max(found.values()) < NOTHING:
+        return f"{who}: ours are zero against the printed ones (largest ratio {max(found.values()):.0e})."
+    text = ", ".join(f"{name} {ratio:.2g}" for name, ratio in found.items())
+    return f"{who}: ours over the paper's: {text}."
+
+
+def number(value: float) -> str:
+    """Four significant digits, in the paper's style for small values."""
+    return f"{value:.3f}" if 0.1 <= abs(value) < 1e4 else f"{value:.3e}"

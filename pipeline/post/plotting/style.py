@@ -1,0 +1,96 @@
+"""One look for all plots, and files whose bytes depend on the data only."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, cast
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+INK, SOFT, GRID = "#222222", "#6b6b6b", "#e3e3e3"
+
+RC: dict[str, Any] = {
+    "figure.dpi": 100,
+    "savefig.dpi": 150,
+    "figure.constrained_layout.use": True,
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titleweight": "bold",
+    "axes.titlecolor": INK,
+    "axes.edgecolor": "#888888",
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": SOFT,
+    "ytick.color": SOFT,
+    "legend.frameon": False,
+    "lines.linewidth": 1.3,
+    "lines.solid_joinstyle": "round",
+    "agg.path.chunksize": 20000,
+    "svg.hashsalt": "flexclear",
+    "svg.fonttype": "path",
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Matplotlib with this project's look, whatever the user's settings are."""
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(cast(Any, RC))
+        yield
+
+
+def files(name: str, figure: Figure) -> dict[str, bytes]:
+    """The figure as ``name.png`` and ``name.svg``, without dates or versions; closes it."""
+    result = {}
+    # the layout is solved once and then kept; it would be solved again for each format
+    figure.draw_without_rendering()
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
+        figure.set_layout_engine(None)
+    for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format=kind, metadata=metadata, facecolor="white")
+        result[f"{name}.{kind}"] = buffer.getvalue()
+    plt.close(figure)
+    return result
+
+
+def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
+    """A figure and its axes, always as a 2-D array."""
+    return plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
+
+
+def heading(figure: Figure, title: str, subtitle: str = "") -> None:
+    """Title at the left, and a softer line below it."""
+    text = title if not subtitle else f"{title}\n"
+    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK)
+    if subtitle:
+        figure.text(
+            0.012, 0.995 - 0.27 / figure.get_figheight(), subtitle, ha="left", va="top", fontsize=8.6, color=SOFT
+        )
+
+
+def shared_legend(figure: Figure, axes: Axes, columns: int) -> None:
+    """One legend below all panels, from the labelled lines of `axes`."""
+    handles, labels = axes.get_legend_handles_labels()
+    legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8.8, handlelength=2.4)
+    for line in legend.get_lines():
+        line.set_linewidth(2.2)
+        line.set_alpha(1.0)

@@ -1,0 +1,78 @@
+"""A small table of text cells, written as CSV, Markdown and HTML."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Title, column heads, rows of text, and what is to be said about it (one paragraph each)."""
+
+    title: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        wrong = [row for row in self.rows if len(row) != len(self.columns)]
+        if wrong:
+            raise ValueError(f"table '{self.title}' has {len(self.columns)} columns, but a row {wrong[0]}")
+
+
+def files(name: str, table: Table) -> dict[str, bytes]:
+    """The table as ``name.csv`` and ``name.md``."""
+    return {f"{name}.csv": as_csv(table).encode(), f"{name}.md": as_markdown(table).encode()}
+
+
+def as_csv(table: Table) -> str:
+    """Heads and rows; notes are not data and stay out."""
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(table.rows)
+    return buffer.getvalue()
+
+
+def as_markdown(table: Table) -> str:
+    """Title, aligned pipe table and notes."""
+    width = [max(3, *(len(row[i]) for row in (table.columns, *table.rows))) for i in range(len(table.columns))]
+    lines = [_line(table.columns, width), "|" + "|".join(_rule(i, w) for i, w in enumerate(width)) + "|"]
+    lines += [_line(row, width) for row in table.rows]
+    notes = "".join(f"\n{note}\n" for note in table.notes)
+    return f"**{table.title}**\n\n" + "\n".join(lines) + f"\n{notes}"
+
+
+def from_markdown(text: str) -> Table:
+    """The table that `as_markdown` wrote; ValueError for other text."""
+    blocks = text.strip().split("\n\n")
+    lines = blocks[1].splitlines() if len(blocks) > 1 else []
+    if not blocks[0].startswith("**") or len(lines) < 2 or not lines[0].startswith("|"):
+        raise ValueError("not a table written by as_markdown")
+    cells = [tuple(cell.strip() for cell in line.strip("|").split("|")) for line in lines]
+    return Table(blocks[0].strip("*"), cells[0], tuple(cells[2:]), tuple(blocks[2:]))
+
+
+def as_html(table: Table) -> str:
+    """A ``<figure>`` with the table and its notes."""
+    head = "".join(f"<th>{html.escape(column)}</th>" for column in table.columns)
+    rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>\n" for row in table.rows)
+    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in table.notes)
+    caption = html.escape(table.title)
+    return (
+        f"<figure class='table'><figcaption>{caption}</figcaption>\n<div "
+        f"class='scroll'><table><thead><tr>{head}</tr></thead>\n"
+        f"<tbody>\n{rows}</tbody></table></div>\n{notes}</figure>\n"
+    )
+
+
+def _line(cells: tuple[str, ...], width: list[int]) -> str:
+    padded = (c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(cells, width, strict=True)))
+    return "| " + " | ".join(padded) + " |"
+
+
+def _rule(i: int, width: int) -> str:
+    return "-" * (width + 2) if i == 0 else "-" * (width + 1) + ":"

@@ -1,0 +1,42 @@
+"""Whether this machine can draw. A missing GL library does not raise: it ends the process."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+import sys
+from functools import cache
+
+#: what to install where drawing does not work
+REMEDY = "pictures with pyvista need GL libraries: apt-get install libgl1 libegl1 (or libosmesa6)"
+
+_PROBE = (
+    "import pyvista; p = pyvista.Plotter(off_screen=True, window_size=(32, 32)); "
+    "p.add_mesh(pyvista.Sphere()); p.screenshot(return_img=True)"
+)
+
+
+def state() -> str:
+    """Which GL libraries are there, in a few words; quick, fit for a cache key."""
+    if not sys.platform.startswith("linux"):
+        return f"GL of {sys.platform}"
+    found = [name for name in ("libGL.so.1", "libEGL.so.1", "libOSMesa.so.8") if _loads(name)]
+    return "GL: " + (", ".join(found) or "none")
+
+
+@cache
+def works() -> bool:
+    """True when a child process could draw off-screen; takes some seconds the first time."""
+    try:
+        done = subprocess.run([sys.executable, "-c", _PROBE], capture_output=True, timeout=120, check=False)
+    except (OSError, subprocess.TimeoutExpired):
+        return False
+    return done.returncode == 0
+
+
+def _loads(name: str) -> bool:
+    try:
+        ctypes.CDLL(name)
+    except OSError:
+        return False
+    return True

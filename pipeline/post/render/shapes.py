@@ -1,0 +1,97 @@
+"""Mode shapes of a rod: still pictures, a page to turn in the browser, and a file for ParaView."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import pyvista as pv
+import xarray as xr
+
+from pipeline.post.render import offline
+from pipeline.post.render.stage import grid, image, plotter
+from pipeline.post.rod_shape import scale_to, surface
+
+#: drawn size of the largest displacement, as a share of the rod's length
+SHARE = 0.16
+COLORS: Literal["viridis"] = "viridis"
+
+
+def picture(bundle: xr.Dataset, mode: int, size: tuple[int, int] = (900, 430)) -> np.ndarray:
+    """Deformed rod coloured by displacement over its undeformed ghost, shape (height, width, 3)."""
+    scene = plotter(size)
+    _draw(scene, bundle, mode)
+    _look(scene, bundle)
+    result = image(scene)
+    scene.close()
+    return result
+
+
+def page(bundle: xr.Dataset, mode: int) -> bytes:
+    """A self-contained HTML page with one mode shape that can be turned in the browser."""
+    scene = plotter((900, 600))
+    _draw(scene, bundle, mode)
+    _look(scene, bundle, parallel=False)
+    content = offline.page(scene)
+    scene.close()
+    return content
+
+
+def vtu(bundle: xr.Dataset) -> bytes:
+    """All mode shapes as node vectors ``mode_1``.. on the undeformed line, for ParaView."""
+    cells = bundle.cell.values.astype(int)
+    connectivity = np.column_stack([np.full(len(cells), 2), cells]).ravel()
+    kinds = np.full(len(cells), pv.CellType.LINE)
+    mesh = pv.UnstructuredGrid(connectivity, kinds, bundle.node_position.values)
+    for k, frequency in enumerate(bundle.frequency.values):
+        mesh.point_data[f"mode_{k + 1}_{frequency:.1f}Hz"] = bundle.shape_translation.values[:, :, k]
+        mesh.point_data[f"mode_{k + 1}_rotation"] = bundle.shape_rotation.values[:, :, k]
+    mesh.cell_data["radius"] = bundle.radius.values
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "modes.vtu"
+        mesh.save(path)
+        return path.read_bytes()
+
+
+def _draw(scene: pv.Plotter, bundle: xr.Dataset, mode: int) -> None:
+    q = np.zeros(bundle.sizes["mode"])
+    ghost, _ = surface(bundle, q)
+    q[mode] = 1.0
+    points, size = surface(bundle, q, scale_to(bundle, q, SHARE))
+    rod = grid(points)
+    # colour by displacement; for torsion, where the centre line rests, by the turn of the surface
+    moved = (
+        np.linalg.norm(points - ghost, axis=-1)
+        if size.max() < 1e-9
+        else np.repeat(size[:, None], points.shape[1], axis=1)
+    )
+    rod["displacement"] = (moved / moved.max()).ravel(order="F")
+    scene.add_mesh(grid(ghost), color="#9aa5b1", opacity=0.22)
+    scene.add_mesh(
+        rod,
+        scalars="displacement",
+        cmap=COLORS,
+        clim=(0.0, 1.0),
+        smooth_shading=True,
+        specular=0.25,
+        show_scalar_bar=False,
+    )
+    for k in range(0, points.shape[1] - 1, 6):
+        scene.add_mesh(pv.lines_from_points(points[1:-1, k]), color="#ffffff", opacity=0.55, line_width=1.5)
+
+
+def _look(scene: pv.Plotter, bundle: xr.Dataset, *, parallel: bool = True) -> None:
+    """From above and in front, the rod across the picture; the browser's view knows perspective only."""
+    x = bundle.node_position.values
+    axis = x[-1] - x[0]
+    length = float(np.linalg.norm(axis))
+    axis = axis / length
+    up = np.eye(3)[2] if abs(axis[2]) < 0.9 else np.eye(3)[0]
+    across = np.cross(axis, up)
+    direction = across / np.linalg.norm(across) + 0.9 * up - 0.35 * axis
+    centre = 0.5 * (x[0] + x[-1])
+    scene.camera_position = [tuple(centre + (3.0 if parallel else 1.7) * length * direction), tuple(centre), tuple(up)]
+    scene.camera.parallel_projection = parallel
+    scene.camera.parallel_scale = 0.30 * length

@@ -1,0 +1,97 @@
+"""What a body looks like when nothing but its mass, inertia and frames is known.
+
+Each rigid body is drawn as the uniform cylinder (or box) that has its mass and its inertia, with
+arms to the frames outside it.  For rods, plates and discs that is the body itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pyvista as pv
+
+#: two principal moments closer than this share are called equal: a cylinder, not a box; tables print four digits
+ROUND = 0.01
+#: thinnest drawn thickness as a share of the body's largest extent, so that plates are seen
+THINNEST = 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """Equivalent solid about the centre of mass: `axes` columns are its directions in the body frame.
+
+    round: half extents are (radius, radius, half length), else those of a box.
+    """
+
+    axes: np.ndarray
+    half: np.ndarray  #: [m]
+    round: bool
+
+    def holds(self, point: np.ndarray) -> bool:
+        """Whether a point relative to the centre of mass, body axes, lies inside."""
+        local = np.abs(self.axes.T @ point)
+        if self.round:
+            return bool(np.hypot(local[0], local[1]) <= self.half[0] and local[2] <= self.half[2])
+        return bool((local <= self.half).all())
+
+
+def equivalent(mass: float, inertia: np.ndarray) -> Solid:
+    """The uniform cylinder or box of this mass [kg] and inertia about its centre of mass [kg m^2]."""
+    moments, axes = np.linalg.eigh(inertia)
+    low, middle, high = moments / mass
+    if middle - low <= ROUND * high:
+        moments, axes = moments[[0, 1, 2]], axes
+    elif high - middle <= ROUND * high:
+        axes = axes[:, [1, 2, 0]]
+    else:
+        squares = 1.5 * np.array([middle + high - low, low + high - middle, low + middle - high])
+        return Solid(_right(axes), _visible(np.sqrt(np.clip(squares, 0.0, None))), round=False)
+    across, along = (0.5 * (low + middle), high) if middle - low <= ROUND * high else (0.5 * (middle + high), low)
+    radius = np.sqrt(2.0 * along)
+    half_length = np.sqrt(3.0 * max(across - 0.25 * radius**2, 0.0))
+    return Solid(_right(axes), _visible(np.array([radius, radius, half_length])), round=True)
+
+
+def mesh(solid: Solid | None, frames: Mapping[str, np.ndarray], arm: float) -> pv.PolyData:
+    """Surface of a rigid body relative to its centre of mass, body axes [m].
+
+    frames: origins relative to the centre of mass, body axes.  arm: radius of the arms to frames
+    outside the solid [m].  Without a solid only the arms are drawn.
+    """
+    parts = [] if solid is None else [_shape(solid)]
+    for origin in frames.values():
+        if np.linalg.norm(origin) > 1e-6 and (solid is None or not solid.holds(origin)):
+            parts.append(pv.Line((0.0, 0.0, 0.0), origin).tube(radius=arm, n_sides=24, capping=True))
+    if not parts:
+        parts = [pv.Sphere(radius=2.0 * arm)]
+    return pv.merge(parts).extract_surface(algorithm="dataset_surface") if len(parts) > 1 else parts[0]
+
+
+def _shape(solid: Solid) -> pv.PolyData:
+    if solid.round:
+        flat = solid.half[2] < solid.half[0]
+        shape = pv.Cylinder(
+            center=(0, 0, 0),
+            direction=solid.axes[:, 2],
+            radius=float(solid.half[0]),
+            height=2.0 * float(solid.half[2]),
+            resolution=96 if flat else 40,
+        )
+    else:
+        x, y, z = (float(value) for value in solid.half)
+        shape = pv.Box(bounds=(-x, x, -y, y, -z, z))
+        transform = np.eye(4)
+        transform[:3, :3] = solid.axes
+        shape = shape.transform(transform, inplace=False)
+    # sharp edges keep their own normals, round walls are shaded smoothly
+    return shape.triangulate().compute_normals(split_vertices=True, feature_angle=40.0)
+
+
+def _visible(half: np.ndarray) -> np.ndarray:
+    return np.maximum(half, THINNEST * half.max())
+
+
+def _right(axes: np.ndarray) -> np.ndarray:
+    return axes if np.linalg.det(axes) > 0 else axes * np.array([-1.0, 1.0, 1.0])

@@ -1,0 +1,170 @@
+"""The report page and docs/paper.md, out of what the other stages have made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import xarray as xr
+
+from pipeline.post import figures
+from pipeline.post.discrepancies import DISCREPANCIES
+from pipeline.post.page import html_page
+from pipeline.post.paper import CITATION
+from pipeline.post.plotting.table import Table, from_markdown
+
+#: the film and the browser page are those of this scene, the paper's full model
+HEADLINE = "sps4/far_csj_cb"
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """All that a report shows. Paths are relative to the report's folder."""
+
+    figures: tuple[str, ...]  #: names with a PNG
+    tables: Mapping[str, Table]
+    assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
+    film: str | None = None
+    still: str | None = None
+    links: Mapping[str, str] = field(default_factory=dict)  #: text -> path
+    facts: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  #: scene -> run attributes
+
+
+def collect(results: Path, attributes: Mapping[str, Mapping[str, object]]) -> Content:
+    """What lies in a results folder (figures/, tables/, runs/<scene>/).
+
+    attributes: scene -> attributes of its run.  Whatever is not there is left out.
+    """
+    tables = {path.stem: from_markdown(path.read_text()) for path in sorted((results / "tables").glob("table*.md"))}
+    drawn = tuple(name for name in figures.NAMES if (results / "figures" / f"{name}.png").is_file())
+    folder = results / "runs" / HEADLINE
+    films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]
+    still = folder / "mechanism.png"
+    return Content(
+        figures=drawn,
+        tables=tables,
+        assumptions=merged_assumptions(attributes),
+        film=_relative(films[0], results) if films else None,
+        still=_relative(still, results) if still.is_file() else None,
+        links={
+            _link_text(path): _relative(path, results)
+            for path in sorted(folder.glob("mode*_*"))
+            if path.suffix in (".html", ".vtu")
+        },
+        facts={
+            scene: {key: str(told[key]) for key in ("title", "evaluations") if key in told}
+            for scene, told in attributes.items()
+        },
+    )
+
+
+def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
+    """Attributes of the run datasets at these paths, by scene."""
+    found = {}
+    for scene, path in paths.items():
+        with xr.open_dataset(path) as run:
+            found[scene] = dict(run.attrs)
+    return found
+
+
+def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Each assumption once, with the scenes that make it; places in alphabetical order."""
+    scenes: dict[tuple[str, str], list[str]] = {}
+    for scene, told in attributes.items():
+        for place, text in json.loads(str(told.get("assumptions", "{}"))).items():
+            scenes.setdefault((place, text), []).append(scene)
+    result: dict[str, tuple[str, tuple[str, ...]]] = {}
+    for (place, text), names in sorted(scenes.items()):
+        key = place if place not in result else f"{place} ({', '.join(names)})"
+        result[key] = (text, tuple(names))
+    return result
+
+
+def page(content: Content) -> bytes:
+    """The report, results/report/index.html: one page, images and film by relative links."""
+    return html_page(
+        content, [(name, figures.title(name)) for name in content.figures], assumption_rows(content)
+    ).encode()
+
+
+def paper_markdown(content: Content) -> str:
+    """docs/paper.md: every figure and table with its scenes and command, the tables, assumptions, discrepancies."""
+    parts = [
+        "# The paper, reproduced\n",
+        f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
+        "commands beside it.\n",
+        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear "
+        "report` draws every figure and table "
+        "into `results/figures` and `results/tables`.\n",
+        "## Figures and tables\n",
+        _index(),
+        "## Tables\n",
+        *(_table(name, table) for name, table in content.tables.items()),
+        "## Assumptions\n",
+        "Values that the paper does not print. Each is marked `assumed` in its scene file.\n",
+        _pipe(("value", "assumption", "scenes"), assumption_rows(content)),
+        "## Discrepancies\n",
+        "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
+        "table.\n",
+        _pipe(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
+    ]
+    return "\n".join(parts)
+
+
+def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
+    """Place, reason and scenes of each assumption; a value of all scenes says so.
+
+    Values of parts that differ only in their number (leg 1 to 4) share a row.
+    """
+    total = len(content.facts)
+    grouped: dict[tuple[str, str], list[str]] = {}
+    for place, (text, scenes) in content.assumptions.items():
+        where = "all" if len(scenes) == total else ", ".join(scene.rpartition("/")[2] for scene in scenes)
+        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(place.partition(" (")[0])
+    return [(", ".join(f"`{place}`" for place in places), text, where) for (text, where), places in grouped.items()]
+
+
+def scenes_of(name: str) -> tuple[str, ...]:
+    """Scenes that a figure or table reads, in order, each once."""
+    return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.needs(name)))
+
+
+def command(name: str) -> str:
+    """What to type for one figure or table."""
+    scenes = [scene for scene in scenes_of(name) if "/" in scene]
+    return f"flexclear run {' '.join(scenes)} && flexclear report" if scenes else "flexclear report"
+
+
+def _index() -> str:
+    rows = []
+    for name in figures.NAMES:
+        scenes = ", ".join(
+            f"`{scene}`" if "/" in scene else f"timing of the `{scene}` scenes" for scene in scenes_of(name)
+        )
+        rows.append((figures.title(name), scenes, f"`{command(name)}`"))
+    return _pipe(("figure or table", "scenes", "command"), rows)
+
+
+def _table(name: str, table: Table) -> str:
+    notes = "".join(f"\n{note}\n" for note in table.notes)
+    return f"### {table.title}\n\n`{command(name)}`\n\n{_pipe(table.columns, table.rows)}{notes}"
+
+
+def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [" | ".join(heads), "|".join("---" for _ in heads), *(" | ".join(row) for row in rows)]
+    return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines) + "\n"
+
+
+def _relative(path: Path, results: Path) -> str:
+    return "../" + path.relative_to(results).as_posix()
+
+
+def _link_text(path: Path) -> str:
+    body = path.stem.partition("_")[2]
+    return (
+        f"mode shape of {body}, to turn in the browser"
+        if path.suffix == ".html"
+        else f"mode shapes of {body} for ParaView (VTU)"
+    )

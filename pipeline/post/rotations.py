@@ -1,0 +1,27 @@
+"""Angles that are read off quaternions; all functions broadcast over leading dimensions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.algebra import quaternion_conjugate, quaternion_product, quaternion_to_matrix
+
+
+def angle_about_y(quaternion: np.ndarray) -> np.ndarray:
+    """Angle about the world's y axis, asin(R_WB[0, 2]) [rad], shape (...,), in [-pi/2, pi/2].
+
+    quaternion: unit, w x y z, body to world, shape (..., 4).  Positive by the right-hand rule; for a
+    rotation about y alone it is that rotation.  This is the angle of tables 7-9.
+    """
+    R = quaternion_to_matrix(quaternion)
+    return np.arcsin(np.clip(R[..., 0, 2], -1.0, 1.0))
+
+
+def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angle of the rotation that takes pose a to pose b [rad], shape (...,), in [0, pi].
+
+    a, b: unit quaternions, shape (..., 4).  Accurate for small angles too: the angle is taken from
+    the vector part, not from an arc cosine near 1.
+    """
+    relative = quaternion_product(quaternion_conjugate(a), b)
+    return 2.0 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))

@@ -1,0 +1,90 @@
+"""Which modes stay: whole clusters of equal frequencies only, rigid ones by count and gap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.structure.modes.eigen import EQUAL, frequency
+
+WHERE = "modes.count"
+#: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them
+RIGID_GAP = 1e4
+#: modes to compute beyond those wanted, to see where the last cluster ends
+MARGIN = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """How many normal modes a basis of `count` coordinates needs, of `available` ones.
+
+    static: constraint modes that the count includes.
+    """
+
+    normal: int
+    available: int
+    static: int = 0
+
+    @property
+    def solve(self) -> int:
+        """Number of modes to compute."""
+        return min(self.normal + MARGIN, self.available)
+
+
+def request(count: int | None, available: int, static: int = 0) -> Request:
+    """Check a count (None: all) against what the mesh can give; InputError otherwise."""
+    if count is None:
+        return Request(available, available, static)
+    total = available + static
+    if count > total:
+        raise InputError(
+            WHERE, f"{count} modes are asked for, the mesh has {total} elastic coordinates", f"ask for at most {total}"
+        )
+    least = max(static, 1)
+    if count < least:
+        reason = f": the {static} constraint modes of its interfaces belong to it" if static else ""
+        raise InputError(WHERE, f"a basis of {count} modes is too small{reason}", f"ask for at least {least}")
+    return Request(count - static, available, static)
+
+
+def whole(values: np.ndarray, wanted: Request) -> int:
+    """`wanted.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
+
+    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are kept unless there are no more.
+    """
+    n = wanted.normal
+    for start, stop in clusters(values):
+        if start < n < stop:
+            counts = [c + wanted.static for c in (start, stop) if c + wanted.static > 0]
+            hertz = float(frequency(values[start : start + 1])[0])
+            nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
+            raise InputError(
+                WHERE,
+                f"{n + wanted.static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
+                f"the nearest whole {nearest}",
+            )
+    return n
+
+
+def clusters(values: np.ndarray) -> list[tuple[int, int]]:
+    """Ranges [start, stop) of equal eigenvalues; single ones are ranges of length one."""
+    hertz = frequency(values)
+    breaks = np.flatnonzero(np.diff(hertz) > EQUAL * hertz[1:]) + 1
+    edges = [0, *breaks.tolist(), len(values)]
+    return [(a, b) for a, b in pairwise(edges) if b > a]
+
+
+def without_rigid(values: np.ndarray, rigid: int) -> None:
+    """Check that exactly the first `rigid` eigenvalues are rigid: a gap of RIGID_GAP above them.
+
+    Raises SolverError when the gap is not there (a mechanism inside the mesh, or rounding that hides it).
+    """
+    if not values[rigid] > RIGID_GAP * np.abs(values[:rigid]).max():
+        last, first = frequency(values[rigid - 1 : rigid + 1])
+        raise SolverError(
+            f"modes: {rigid} rigid-body modes are expected below a gap, "
+            f"but mode {rigid} is at {last:.3g} Hz and mode {rigid + 1} at {first:.3g} Hz"
+        )

@@ -1,0 +1,4 @@
+"""The stages from recipe to pictures, how they hang together (graph), and the command (__main__)."""
+
+# reaching `pipeline` first pins BLAS to one thread, before any stage loads NumPy
+import pipeline  # noqa: F401

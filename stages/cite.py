@@ -1,0 +1,43 @@
+"""Sources of the methods and data that a scene uses, gathered from the modules that it reaches."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import in_order
+from stages.graph import Graph
+
+#: a paragraph that starts like this names where a method is from
+SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
+
+
+def text(graph: Graph, sources: Sources) -> str:
+    """Two lists: methods (module: source) and data (part of the scene: source)."""
+    scene = graph.scene
+    lines = [f"Methods of {scene.name}"]
+    lines += [f"  {module}: {source}" for module, source in methods(graph, sources)] or ["  (none is named)"]
+    lines.append(f"Data of {scene.name}")
+    lines += [f"  {place}: {source}" for place, source in scene.sources().items()] or ["  (none is named)"]
+    return "\n".join(lines) + "\n"
+
+
+def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
+    """Module and source text, modules in alphabetical order, each pair once."""
+    tasks = in_order(graph.up_to("post"))
+    roots = {task.run.partition(":")[0] for task in tasks} | {name for task in tasks for name in task.modules}
+    for name in sorted(sources.closure(roots)):
+        base = sources.root.joinpath(*name.split("."))
+        path = next(p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file())
+        for found in dict.fromkeys(named(path.read_text())):
+            yield name, found
+
+
+def named(source: str) -> Iterator[str]:
+    """Texts after ``Source:`` in all docstrings of a module, each on one line."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            for match in SOURCE.finditer(ast.get_docstring(node) or ""):
+                yield " ".join(match[1].split())

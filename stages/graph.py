@@ -1,0 +1,164 @@
+"""From a scene to its tasks: which artifact is made by which stage from which others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import suggestion
+from pipeline.core.scene.schema import Scene
+from pipeline.core.workflow.task import Task
+from stages import s1_mesh, s2_modes, s4_simulate, s6_render
+
+#: stages in order, as `--to` names them
+STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
+#: artifacts as figures refer to them, ``<scene>:<artifact>[/<body>]``, and the stage that makes each
+ARTIFACTS = {name: name for name in STAGES} | {"run": "simulate"}
+
+
+@dataclass(frozen=True)
+class Graph:
+    """All tasks of one scene; each is built when it is first asked for.
+
+    A scene without flexible bodies has no mesh, modes and bundle; one without an ensemble has no
+    such task. Raises InputError for names that no family lists and recipes that cannot be read.
+
+    shown: whether the artifacts take their place below results/runs; an edited copy of a scene
+    must not take that of its original.
+    """
+
+    scene: Scene
+    shown: bool = True
+
+    @cached_property
+    def mesh(self) -> dict[str, Task]:
+        """By flexible body."""
+        return {
+            body: self._body_task("mesh", body, "stages.s1_mesh:run", s1_mesh.params(Path(part.mesh)))
+            for body, part in self.scene.flexible().items()
+        }
+
+    @cached_property
+    def modes(self) -> dict[str, Task]:
+        """By flexible body."""
+        return {
+            body: self._body_task(
+                "modes",
+                body,
+                "stages.s2_modes:run",
+                s2_modes.params(part),
+                {"mesh": self.mesh[body]},
+                s2_modes.modules(part, f"{self.scene.path or self.scene.name} [body.{body}.modes]"),
+            )
+            for body, part in self.scene.flexible().items()
+        }
+
+    @cached_property
+    def bundle(self) -> dict[str, Task]:
+        """By flexible body."""
+        return {
+            body: self._body_task(
+                "bundle", body, "stages.s3_bundle:run", {}, {"mesh": self.mesh[body], "modes": self.modes[body]}
+            )
+            for body in self.scene.flexible()
+        }
+
+    @cached_property
+    def simulate(self) -> Task:
+        """One run; shown as ``run.nc``."""
+        return self._simulation("simulate", "stages.s4_simulate:run", "run.nc", ensemble=False)
+
+    @cached_property
+    def ensemble(self) -> Task | None:
+        """Members of the ensemble, if the scene asks for one."""
+        if self.scene.ensemble is None:
+            return None
+        return self._simulation("ensemble", "stages.s4_simulate:run_ensemble", "ensemble.nc", ensemble=True)
+
+    @cached_property
+    def post(self) -> Task:
+        """What is derived from the run."""
+        inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
+        return self._scene_task("post", "stages.s5_post:run", {}, inputs, names={"nc": "post.nc"})
+
+    @cached_property
+    def render(self) -> Task:
+        """Pictures and film."""
+        inputs = {"run": self.simulate, **self._bundles()}
+        return self._scene_task("render", "stages.s6_render:run", {"gl": s6_render.gl_state()}, inputs)
+
+    def up_to(self, stage: str) -> list[Task]:
+        """All tasks of the scene up to a stage, that stage included."""
+        wanted = STAGES[: STAGES.index(stage) + 1]
+        return [task for name in wanted for task in self.of(name).values()]
+
+    def of(self, stage: str) -> dict[str, Task]:
+        """Tasks of one stage by body; by the empty name where there is one for the whole scene."""
+        found = getattr(self, stage)
+        return found if isinstance(found, dict) else {"": found} if found is not None else {}
+
+    def artifact(self, reference: str) -> Task:
+        """The task behind ``run``, ``post``, ``modes/rod1`` ...; InputError when there is none."""
+        name, _, body = reference.partition("/")
+        where = f"{self.scene.name}:{reference}"
+        if name not in ARTIFACTS:
+            raise InputError(where, f"no artifact is called '{name}'", suggestion(name, ARTIFACTS))
+        tasks = self.of(ARTIFACTS[name])
+        if body not in tasks:
+            whose = f"'{body}'" if body else "the whole scene"
+            raise InputError(where, f"there is no {name} of {whose}", suggestion(body, tasks))
+        return tasks[body]
+
+    def _bundles(self) -> dict[str, Task]:
+        return {f"bundle/{body}": task for body, task in self.bundle.items()}
+
+    def _simulation(self, stage: str, run: str, name: str, *, ensemble: bool) -> Task:
+        params = s4_simulate.params(self.scene, ensemble=ensemble)
+        modules = s4_simulate.modules(self.scene)
+        return self._scene_task(stage, run, params, self._bundles(), names={"nc": name}, modules=modules)
+
+    def _folder(self, below: str = "") -> str:
+        return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""
+
+    def _scene_task(
+        self,
+        stage: str,
+        run: str,
+        params: dict[str, object],
+        inputs: dict[str, Task],
+        names: dict[str, str] | None = None,
+        modules: tuple[str, ...] = (),
+    ) -> Task:
+        return Task(
+            stage=stage,
+            scene=self.scene.name,
+            run=run,
+            params=params,
+            folder=self._folder(),
+            inputs=inputs,
+            names=names or {},
+            modules=modules,
+        )
+
+    def _body_task(
+        self,
+        stage: str,
+        body: str,
+        run: str,
+        params: dict[str, object],
+        inputs: dict[str, Task] | None = None,
+        modules: tuple[str, ...] = (),
+    ) -> Task:
+        return Task(
+            stage=stage,
+            scene=self.scene.name,
+            part=body,
+            run=run,
+            params=params,
+            folder=self._folder(stage),
+            inputs=inputs or {},
+            names={"nc": f"{body}.nc", "vtu": f"{body}.vtu"},
+            modules=modules,
+        )

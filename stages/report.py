@@ -1,0 +1,136 @@
+"""The report: every figure and table of the paper with all that they need, and the page that shows them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pipeline.core.artifacts.store import Record
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.task import Task
+from stages import s4_simulate, s6_render
+from stages.families import TREE, constants
+from stages.figure import FIGURES
+from stages.graph import Graph
+from stages.run import Workplace, check
+
+#: the scene whose film and pictures the page shows: the paper's full model
+HEADLINE = "sps4/far_csj_cb"
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Graphs of scenes by name, each built once, so that all figures share their tasks."""
+
+    graphs: dict[str, Graph] = field(default_factory=dict)
+
+    def graph(self, name: str) -> Graph:
+        """Graph of ``scenes/<name>.toml``."""
+        if name not in self.graphs:
+            self.graphs[name] = Graph(load_scene(scene_file(name)))
+        return self.graphs[name]
+
+    def artifact(self, reference: str) -> Task:
+        """The task behind ``<scene>:<artifact>[/<body>]`` or ``<folder>:timing``."""
+        name, _, artifact = reference.partition(":")
+        return self.timing(name) if artifact == "timing" else self.graph(name).artifact(artifact)
+
+    def timing(self, family: str) -> Task:
+        """Measured times of all scenes that lie directly in a folder below scenes/."""
+        files = sorted((TREE / "scenes" / family).glob("*.toml"))
+        if not files:
+            raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
+        graphs = [self.graph(f"{family}/{path.stem}") for path in files]
+        return Task(
+            stage="timing",
+            scene=family,
+            run="stages.timing:run",
+            params={g.scene.name: s4_simulate.params(g.scene) for g in graphs},
+            inputs={f"{g.scene.name}:bundle/{body}": task for g in graphs for body, task in g.bundle.items()},
+            modules=tuple(sorted({name for g in graphs for name in s4_simulate.modules(g.scene)})),
+            folder=f"runs/{family}",
+            names={"nc": "timing.nc"},
+            exclusive=True,
+        )
+
+
+def make(place: Workplace) -> Path:
+    """Bring everything that the report shows up to date; returns the page.
+
+    What fails is left out of the page and raised (FailedTasksError) after the page is written.
+    """
+    scenes = Scenes()
+    tasks = [*figure_tasks(place, scenes), *scenes.graph(HEADLINE).of("render").values()]
+    shown = place.bring(tasks)
+    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
+    page = place.bring([page_task(place, shown.records, graphs)])
+    check(page)
+    if s6_render.gl_state().endswith("none"):
+        from pipeline.post.render import gl
+
+        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.REMEDY}")
+    check(shown)
+    return place.store.root / "report" / "index.html"
+
+
+def figure_tasks(place: Workplace, scenes: Scenes) -> list[Task]:
+    """One task for each figure and table."""
+    return [_figure_task(name, entry, scenes) for name, entry in figure_index(place).items()]
+
+
+def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
+    """What each figure and table needs, see `stages.figure.index`."""
+    names = list(constants(FIGURES)["NAMES"])
+    task = Task(
+        stage="figures",
+        scene="report",
+        part="index",
+        run="stages.figure:index",
+        params={"names": names},
+        modules=tuple(f"{FIGURES}.{name}" for name in names),
+        folder="",
+    )
+    outcome = place.bring([task])
+    check(outcome)
+    record = outcome.records[id(task)]
+    found: dict[str, dict[str, Any]] = json.loads(place.store.path(task.stage, record.key, "index.json").read_bytes())
+    return found
+
+
+def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
+    """The page; it is written again when anything that it shows has changed."""
+    return Task(
+        stage="report",
+        scene="report",
+        part="page",
+        run="stages.page:run",
+        params={
+            "results": str(place.store.root),
+            "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
+            "digests": sorted(record.digest for record in records.values()),
+        },
+        folder="report",
+    )
+
+
+def scene_file(name: str) -> Path:
+    """Where a scene of the project is."""
+    return TREE / "scenes" / f"{name}.toml"
+
+
+def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
+    there = [ref for ref in entry["optional"] if scene_file(ref.partition(":")[0]).is_file()]
+    return Task(
+        stage="figures",
+        scene="report",
+        part=name,
+        run="stages.figure:run",
+        params={"figure": name} | ({"gl": s6_render.gl_state()} if entry["gl"] else {}),
+        inputs={reference: scenes.artifact(reference) for reference in [*entry["needs"], *there]},
+        modules=(f"{FIGURES}.{name}",),
+        folder="tables" if name.startswith("table") else "figures",
+    )

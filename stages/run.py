@@ -1,0 +1,120 @@
+"""Bringing scenes up to date: what the command and the Python functions have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.core.artifacts.paths import results_root
+from pipeline.core.artifacts.store import Store
+from pipeline.core.errors import FlexclearError, InputError, InputErrors
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.progress import Monitor
+from pipeline.core.workflow.schedule import Failure, Outcome, bring
+from pipeline.core.workflow.task import Task
+from stages.families import TREE
+from stages.graph import Graph
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where artifacts are kept, where the source lies, and who is told about progress."""
+
+    store: Store
+    sources: Sources
+    monitor: Monitor = field(default_factory=Monitor)
+
+    def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
+        """Bring tasks up to date over the cores there are."""
+        return bring(tasks, self.store, self.sources, self.monitor, jobs)
+
+
+class FailedTasksError(FlexclearError):
+    """Some tasks failed; each is told, and the first decides the exit code."""
+
+    def __init__(self, failures: tuple[Failure, ...]) -> None:
+        super().__init__("\n".join(failure.message for failure in failures))
+        self.exit_code = failures[0].exit_code
+
+
+def workplace() -> Workplace:
+    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says."""
+    monitor = Monitor()
+    root = results_root()
+    return Workplace(Store(root, say=monitor.say), Sources(TREE, root / "cache" / "imports.json"), monitor)
+
+
+def find_scene(name: str) -> Path:
+    """The file of a scene given by path or by name (``sps4/csj``). InputError names what is near."""
+    path = Path(name)
+    if path.suffix == ".toml" or path.is_file():
+        return path
+    named = TREE / "scenes" / f"{name}.toml"
+    if named.is_file():
+        return named
+    raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
+
+
+def _known(name: str) -> str:
+    from pipeline.core.registry import suggestion
+
+    scenes = TREE / "scenes"
+    return suggestion(name, sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml")))
+
+
+def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
+    """Dataset of the simulate stage, brought up to date; titled as the scene is.
+
+    An edited scene (`override`) is cached like any other but does not take the place of its file's
+    results under results/runs.  Raises FlexclearError.
+    """
+    place = place or workplace()
+    task = Graph(scene, shown=_as_in_its_file(scene)).simulate
+    # in this process: workers would run a caller's script again from its top
+    outcome = place.bring([task], jobs=1)
+    check(outcome)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+
+
+def check(outcome: Outcome) -> None:
+    """Raise FailedTasksError when something failed."""
+    if outcome.failures:
+        raise FailedTasksError(outcome.failures)
+
+
+def _as_in_its_file(scene: Scene) -> bool:
+    return scene.path is not None and load_scene(scene.path) == scene
+
+
+def graphs(names: list[str]) -> list[Graph]:
+    """Graphs of the scenes, each once; the mistakes of all scenes are told together."""
+    found: dict[str, Graph] = {}
+    wrong: list[InputError] = []
+    for name in names:
+        try:
+            graph = Graph(load_scene(find_scene(name)))
+            graph.up_to("post")
+            found[graph.scene.name] = graph
+        except InputErrors as errors:
+            wrong.extend(errors.errors)
+        except InputError as error:
+            wrong.append(error)
+    if wrong:
+        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+    return list(found.values())
+
+
+def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
+    """Write the dataset of the run to a file of the user's, titled, and atomically like any other."""
+    from pipeline.core.artifacts.store import write_dataset
+
+    if not target.parent.is_dir():
+        raise InputError(f"--out {target}", "its folder does not exist", f"mkdir -p {target.parent}")
+    write_dataset(target, run(graph.scene, place))

@@ -1,0 +1,96 @@
+"""Stage 4: scene and bundles -> one run, or an ensemble of runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from stages.families import module
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+    from pipeline.core.workflow.execute import Progress
+
+DYNAMICS = "pipeline.dynamics"
+#: what the generated kernel entry composes (pipeline.dynamics.assembly.fuse): for every scene, and
+#: for scenes with flexible bodies and with contacts
+KERNELS = (
+    "assembly.closures",
+    "assembly.dispatch",
+    "assembly.equations",
+    "assembly.kinematics",
+    "bodies.rigid",
+    "integrate.explicit",
+    "integrate.observe",
+    "integrate.project",
+)
+FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
+CONTACT_KERNELS = ("integrate.events",)
+
+
+def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
+    """What the engine sees of a scene. Titles and the place of files on disk are not part of it,
+    nor is the ensemble of a single run, nor the accuracy that somebody wants."""
+    left_out = {"title", "description", "accuracy"} | (set() if ensemble else {"ensemble"})
+    table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
+    for body in scene.flexible():
+        table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
+    return {"name": scene.name, "scene": table}
+
+
+def modules(scene: Scene) -> tuple[str, ...]:
+    """Modules of the parts that the scene names, so that editing a law leaves scenes without it alone.
+
+    Raises InputError when a name is not listed in its family.
+    """
+    joints = f"{DYNAMICS}.joints"
+    found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
+    found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
+    kernels = KERNELS + (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
+    found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
+    for name, joint in scene.joint.items():
+        table = "CONTACTS" if name in scene.contacts() else "NAMES"
+        found.add(module(joints, joint.type, where=f"[joint.{name}]", table=table))
+    for name, contact in scene.contacts().items():
+        where = f"[joint.{name}.normal]"
+        found.add(module(f"{DYNAMICS}.contact", contact.type, where=where))
+        found.add(module(f"{DYNAMICS}.contact.normal", contact.normal.law, where=where))
+        if contact.friction is not None:
+            where = f"[joint.{name}.friction]"
+            found.add(module(f"{DYNAMICS}.contact.friction", contact.friction.law, where=where))
+    for name, drive in scene.drive.items():
+        found.add(module(f"{DYNAMICS}.drives", drive.law.type, where=f"[drive.{name}.law]"))
+    for name, load in scene.load.items():
+        found.add(module(f"{DYNAMICS}.loads", load.type, where=f"[load.{name}]"))
+    return tuple(sorted(found))
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """One run (schema RUN); inputs are ``bundle/<body>``."""
+    from pipeline import dynamics
+
+    return {"nc": dynamics.simulate(rebuild(params), bundles(inputs), progress)}
+
+
+def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
+    from pipeline import dynamics
+
+    return {"nc": dynamics.ensemble(rebuild(params), bundles(inputs), progress)}
+
+
+def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """The inputs called ``bundle/<body>``, by body."""
+    return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
+
+
+def rebuild(params: Mapping[str, Any]) -> Scene:
+    """The scene again, from what `params` kept of it; its title is its name."""
+    from pipeline.core.scene.schema import Scene
+
+    scene = Scene.model_validate({**params["scene"], "title": params["name"]})
+    scene._name = params["name"]
+    return scene

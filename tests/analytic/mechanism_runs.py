@@ -1,0 +1,60 @@
+"""Runs of scenes for the tests, straight from the engine; each is made once per session."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.scene.load import load_scene, read_toml
+from pipeline.core.scene.parts import Modes
+from pipeline.core.scene.schema import Scene
+
+TREE = Path(__file__).resolve().parents[2]
+Overrides = tuple[tuple[str, object], ...]
+
+
+@cache
+def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
+    """The run of a scene; overrides as ((place, value), ...)."""
+    from pipeline import dynamics
+
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
+    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+
+
+def bundles(scene: Scene) -> dict[str, xr.Dataset]:
+    """The reduced flexible bodies of a scene, through stages 1 to 3."""
+    return {name: _bundle(body.mesh, body.modes) for name, body in scene.flexible().items()}
+
+
+@cache
+def _bundle(recipe: str, modes: Modes) -> xr.Dataset:
+    from pipeline.structure.fe import mesh
+    from pipeline.structure.modes import bundle, solve
+
+    grid = mesh.build(read_toml(Path(recipe)))
+    return bundle.build(grid, solve(grid, modes.reference, modes.count, interfaces=modes.interfaces))
+
+
+def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:
+    """Closings with an approach speed [m/s] above `least`, with their times, speeds, forces and rebounds."""
+    kind = np.array([_is_closing(k) for k in dataset.event_kind.values])
+    time, speed = dataset.event_time.values, dataset.event_approach_speed.values
+    rebound = np.full(len(kind), np.nan)
+    for i in np.flatnonzero(kind[:-1] & ~kind[1:]):
+        rebound[i] = speed[i + 1]
+    hard = kind & (speed > least)
+    return {
+        "start": time[hard],
+        "approach": speed[hard],
+        "separation": rebound[hard],
+        "peak_force": dataset.event_peak_force.values[hard],
+        "duration": dataset.event_duration.values[hard],
+    }
+
+
+def _is_closing(kind: object) -> bool:
+    return kind in ("closing", b"closing") if isinstance(kind, (str, bytes)) else kind == 1

@@ -1,0 +1,189 @@
+"""Beam frequencies: the elements against closed forms, and the closed forms against independent ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.linalg
+import xarray as xr
+
+from pipeline.structure.fe import beam, mesh
+from pipeline.structure.modes import closed_form, solve
+from tests.analytic.beam_solutions import PAPER_ROD, Rod, element_stiffness, rayleigh_frequencies
+
+RECIPE = {
+    "elements": 12,
+    "shape": {"type": "straight-beam", "length": PAPER_ROD.length},
+    "material": {
+        "density": PAPER_ROD.density,
+        "youngs_modulus": PAPER_ROD.youngs_modulus,
+        "poisson": PAPER_ROD.poisson,
+    },
+    "section": {"type": "circle", "radius": PAPER_ROD.radius},
+    "frames": {"bottom": {"x": 0.0}, "top": {"x": PAPER_ROD.length}},
+    "interfaces": ["bottom", "top"],
+}
+
+# Finite-element frequencies [Hz] of the paper's rod from a program of other authorship that shares no code with
+# this one: consistent Rayleigh mass, cubic deflections; keys are the ends (C clamped, F free, P pinned) and elements.
+RAYLEIGH_ELEMENTS = {
+    ("FF", 2): (1567.9065387914186, 4838.335519793527, 11676.988265679327, 18263.365322754766),
+    ("FF", 4): (1566.1120856353364, 4284.308187581014, 8285.19120248972, 14858.680463312916),
+    ("FF", 12): (1564.4882760528321, 4259.459914504601, 8221.007402548948, 13339.590516424732),
+    ("CC", 2): (1602.3240052032395, 5724.292554751857),
+    ("CC", 4): (1579.067277417862, 4355.313618255282, 8538.163010273025, 15880.659637894998),
+    ("CC", 12): (1577.0026042017876, 4316.201879649168, 8370.848463714992, 13643.794535536754),
+    ("CF", 1): (249.40801209568147, 2429.119839012649),
+    ("CF", 2): (248.35555761599477, 1559.2806925479883, 5208.700759760067, 14444.126563383414),
+    ("CF", 12): (248.23625761579262, 1546.4166647860095, 4289.474070761246, 8294.960724670302),
+    ("PP", 2): (698.7694106315633, 3070.1881918465206, 7629.387885181169, 13700.272798257924),
+    ("PP", 12): (696.0251060608961, 2766.5908290607304, 6161.586343135218, 10805.067525023285),
+}
+EULER_ELEMENTS = {
+    ("FF", 12): (1581.2073778197496, 4359.11929050624, 8548.482104475035, 14141.75185491859),
+    ("CC", 12): (1581.207899229326, 4359.13775873549, 8548.676712442815, 14142.881215846128),
+    ("CF", 12): (248.48654673247827, 1557.2629617879643, 4360.853012786506, 8548.474951057937),
+    ("PP", 12): (697.5142882495918, 2790.1925649758396, 6279.238213266375, 11169.228974702484),
+}
+# the same program's roots of the exact frequency equations
+EXACT = {
+    ("free-free", "euler-bernoulli"): (1581.1814568870293, 4358.587572621513, 8544.574354869366),
+    ("free-free", "rayleigh"): (1564.4634314776727, 4258.966722780683, 8217.501815180185),
+    ("free-free", "timoshenko"): (1552.6107500992712, 4145.937029758692, 7790.92146006871),
+    ("fixed-fixed", "euler-bernoulli"): (1581.1814568870293, 4358.587572621513, 8544.574354869366),
+    ("fixed-fixed", "rayleigh"): (1576.97623308615, 4315.6572692432455, 8366.836027329238),
+    ("fixed-fixed", "timoshenko"): (1529.0213628318904, 4046.798833914466, 7553.205806772877),
+}
+# two eigensolvers on matrices whose spectrum spans 1e6: eps * 1e6, with a margin of ten
+SOLVERS = 1e-9
+
+
+def build(elements: int) -> xr.Dataset:
+    return mesh.build(RECIPE | {"elements": elements})
+
+
+def without_rotary(rod: xr.Dataset) -> xr.Dataset:
+    """Euler-Bernoulli in bending; the polar moment stays, or torsion would have no mass."""
+    return rod.assign(inertia_moment=rod["inertia_moment"] * np.array([1.0, 0.0, 0.0]))
+
+
+def in_plane(rod: xr.Dataset, ends: str, count: int) -> np.ndarray:
+    """Frequencies [Hz] of the bending in y alone, with the ends held as the letters say."""
+    held = {"F": (), "P": (0,), "C": (0, 1)}
+    matrices = beam.assemble(rod)
+    nodes = rod.sizes["node"]
+    plane = np.stack([6 * np.arange(nodes) + 1, 6 * np.arange(nodes) + 5], axis=1)
+    fixed = [plane[node, k] for node, end in zip((0, -1), ends, strict=True) for k in held[end]]
+    free = np.setdiff1d(plane.ravel(), fixed)
+    K, M = (matrix.toarray()[np.ix_(free, free)] for matrix in (matrices.stiffness, matrices.mass))
+    values = scipy.linalg.eigvalsh(K, M)[2 if ends == "FF" else 0 :]
+    return np.sqrt(values[:count]) / (2.0 * np.pi)
+
+
+@pytest.mark.parametrize("ends, elements", RAYLEIGH_ELEMENTS)
+def test_rayleigh_elements_agree_with_an_independent_program(ends: str, elements: int) -> None:
+    expected = RAYLEIGH_ELEMENTS[ends, elements]
+    np.testing.assert_allclose(in_plane(build(elements), ends, len(expected)), expected, rtol=SOLVERS)
+
+
+@pytest.mark.parametrize("ends, elements", EULER_ELEMENTS)
+def test_euler_elements_agree_with_an_independent_program(ends: str, elements: int) -> None:
+    expected = EULER_ELEMENTS[ends, elements]
+    found = in_plane(without_rotary(build(elements)), ends, len(expected))
+    np.testing.assert_allclose(found, expected, rtol=SOLVERS)
+
+
+@pytest.mark.parametrize("ends, theory", EXACT)
+def test_closed_forms_agree_with_an_independent_program(ends: closed_form.Ends, theory: str) -> None:
+    exact = solve(build(12), ends, 7)[f"exact_{theory.replace('-', '_')}"].values
+    # bending pairs, torsion after the second
+    np.testing.assert_allclose(exact[[0, 2, 5]], EXACT[ends, theory], rtol=1e-11)
+    np.testing.assert_array_equal(exact[[0, 2, 5]], exact[[1, 3, 6]])
+
+
+@pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
+@pytest.mark.parametrize("radius", [0.003, 0.01, 0.03])
+def test_closed_form_equals_the_boundary_determinant(ends: closed_form.Ends, radius: float) -> None:
+    """Half-span equations against the plain 4x4 determinant of the whole span."""
+    rod = Rod(length=0.24, radius=radius, youngs_modulus=7.17e10, density=2740.0, poisson=0.33)
+    span = closed_form.Span(
+        rod.length,
+        rod.youngs_modulus * rod.second_moment,
+        rod.density * rod.area,
+        rotary=rod.density * rod.second_moment,
+    )
+    expected = rayleigh_frequencies(rod, {"free-free": "FF", "fixed-fixed": "CC"}[ends], 5)
+    # the determinant loses digits like exp(beta L), 1e7 at the fifth root
+    np.testing.assert_allclose(closed_form.bending(span, ends, 5), expected, rtol=1e-8)
+
+
+@pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
+def test_a_shear_stiff_timoshenko_rod_is_a_rayleigh_rod(ends: closed_form.Ends) -> None:
+    """The difference is first order in 1/(kappa G A), so it falls a thousandfold with it."""
+    rayleigh = closed_form.Span(0.24, 563.0, 0.86, rotary=2.1e-5)
+    exact = closed_form.bending(rayleigh, ends, 6)
+    gaps = [
+        1.0 - closed_form.bending(closed_form.Span(0.24, 563.0, 0.86, 2.1e-5, shear), ends, 6) / exact
+        for shear in (1e10, 1e13)
+    ]
+    assert gaps[0].min() > 0.0
+    np.testing.assert_allclose(gaps[0] / gaps[1], 1e3, rtol=0.02)
+
+
+@pytest.mark.parametrize("ends", ["FF", "CC", "CF", "PP"])
+def test_bending_converges_from_above_at_order_four(ends: str) -> None:
+    exact = rayleigh_frequencies(PAPER_ROD, ends, 2)
+    elements = np.array([8, 16, 32])
+    error = np.array([in_plane(build(n), ends, 2) / exact - 1.0 for n in elements])
+    assert error.min() > 0.0
+    # 32 elements leave 3e-7 of the first mode, far above the determinant's own 1e-10
+    for mode in range(2):
+        slope = np.polyfit(np.log(elements), np.log(error[:, mode]), 1)[0]
+        assert slope == pytest.approx(-4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
+@pytest.mark.parametrize("kind", ["torsion", "axial"])
+def test_torsion_and_extension_converge_from_above_at_order_two(ends: str, kind: str) -> None:
+    elements = np.array([8, 16, 32])
+    error = []
+    for n in elements:
+        modes = solve(build(n), ends, 8)
+        place = list(modes["kind"].values).index(kind)
+        error.append(float(modes["frequency"][place] / modes["exact_rayleigh"][place]) - 1.0)
+    assert min(error) > 0.0
+    assert np.polyfit(np.log(elements), np.log(error), 1)[0] == pytest.approx(-2.0, abs=0.02)
+
+
+def test_exact_torsion_and_extension_are_the_waves_travel_time() -> None:
+    modes = solve(build(12), "free-free", 9)
+    kinds = modes["kind"].values
+    for theory in ("exact_euler_bernoulli", "exact_rayleigh", "exact_timoshenko"):
+        exact = modes[theory].values
+        speed = np.sqrt(PAPER_ROD.shear_modulus / PAPER_ROD.density)
+        np.testing.assert_allclose(exact[kinds == "torsion"], np.array([1, 2]) * speed / 0.48, rtol=1e-14)
+        speed = np.sqrt(PAPER_ROD.youngs_modulus / PAPER_ROD.density)
+        np.testing.assert_allclose(exact[kinds == "axial"], speed / 0.48, rtol=1e-14)
+
+
+@pytest.mark.parametrize("elements", [12, 256])
+def test_every_cell_has_the_textbook_stiffness(elements: int) -> None:
+    """Also far from the origin, where elements built from global monomials lose six digits."""
+    stiffness = beam.assemble(build(elements)).stiffness.toarray()
+    h = PAPER_ROD.length / elements
+    expected = element_stiffness(PAPER_ROD, h)
+    scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
+    # entries that couple two neighbouring nodes belong to one cell only
+    for cell in (0, elements // 2, elements - 1):
+        rows, columns = slice(6 * cell, 6 * cell + 6), slice(6 * cell + 6, 6 * cell + 12)
+        error = np.abs(stiffness[rows, columns] - expected[:6, 6:]) / scale[:6, 6:]
+        assert error.max() < 1e-12  # the node positions themselves round at 1e-16 L, cells are L/256
+    assert np.abs(stiffness[:6, :6] - expected[:6, :6]).max() <= 1e-12 * expected.max()
+
+
+def test_no_rigid_motion_stores_energy() -> None:
+    matrices = beam.assemble(build(64))
+    rigid = beam.rigid_vectors(matrices)
+    force = matrices.stiffness @ rigid
+    # each row sums terms of the size of the row's largest entry
+    assert (np.abs(force) <= 1e-12 * np.abs(matrices.stiffness).sum(axis=1).max()).all()

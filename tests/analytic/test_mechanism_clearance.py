@@ -1,0 +1,148 @@
+"""The mechanism with clearance at A1: engine against a second derivation in minimal form."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.core.algebra import quaternion_to_matrix, rotate
+from tests.analytic.mechanism_runs import impacts, run
+from tests.reference import contact_solutions as exact
+from tests.reference import sps4
+from tests.reference.clearance_simulation import simulate
+
+#: made by `python -m tests.reference.clearance_simulation`
+KEPT = Path(__file__).resolve().parents[1] / "reference" / "csj.json"
+SCENE = "sps4/csj"
+#: a contact short enough for sums over microseconds; the first impact of the run lies in it
+CLOSE_UP = (("output.interval", "1 us"), ("time.end", "7.2 ms"))
+LEG = ("rod1", "cylinder1", "ball_A1", "ball_B1")
+
+
+@cache
+def kept() -> dict[str, np.ndarray]:
+    """Numbers of the second derivation."""
+    return {name: np.array(values) for name, values in json.loads(KEPT.read_text()).items()}
+
+
+def test_number_of_impacts_is_the_same() -> None:
+    assert len(impacts(run(SCENE))["start"]) == np.sum(kept()["impact_approach"] > 1e-4)
+
+
+def test_impacts_happen_when_and_as_hard_as_in_the_second_derivation() -> None:
+    found = impacts(run(SCENE))
+    # the motion is not chaotic: errors of 1e-10 grow some ten times over the run
+    assert found["start"] == pytest.approx(kept()["impact_start"], abs=1e-7)
+    assert found["approach"] == pytest.approx(kept()["impact_approach"], abs=1e-5)
+    assert found["peak_force"] == pytest.approx(kept()["impact_peak_force"], rel=1e-3)
+    assert found["separation"][:-1] == pytest.approx(kept()["impact_separation"][:-1], abs=1e-5)
+
+
+def test_largest_contact_force_is_the_same() -> None:
+    peak = kept()["impact_peak_force"].max()
+    assert impacts(run(SCENE))["peak_force"].max() == pytest.approx(peak, rel=1e-3)
+
+
+def test_platform_moves_as_in_the_second_derivation() -> None:
+    dataset = run(SCENE).sel(body="platform").sel(time=kept()["time"], method="nearest", tolerance=1e-9)
+    assert dataset.position.values[:, 2] == pytest.approx(kept()["height"], abs=1e-8)
+    assert dataset.velocity.values[:, 2] == pytest.approx(kept()["speed"], abs=1e-5)
+    turn = quaternion_to_matrix(dataset["quaternion"].values).reshape(-1, 9)
+    assert turn == pytest.approx(kept()["rotation"], abs=1e-7)
+
+
+def test_friction_spins_leg_1_as_in_the_second_derivation() -> None:
+    dataset = run(SCENE).sel(time=kept()["time"], method="nearest", tolerance=1e-9)
+    rod = dataset.sel(body="rod1")
+    axes = rotate(rod["quaternion"].values, np.array([0.0, 0.0, 1.0]))
+    spin = np.sum(rod.angular_velocity.values * axes, axis=1)
+    assert spin == pytest.approx(kept()["spin"], abs=1e-4)
+
+
+def test_rebounds_follow_the_closed_form_where_contacts_are_short() -> None:
+    """What else acts during a contact changes the rebound by at most its acceleration times the duration."""
+    dataset, found = run(SCENE), impacts(run(SCENE))
+    e = exact.delivered_restitution(exact.hysteresis(0.9))
+    time, rate = dataset.time.values, dataset.contact_rate.values[:, 0]
+    close = 0
+    for start, approach, separation, duration in zip(
+        *(found[k][:-1] for k in ("start", "approach", "separation", "duration")), strict=True
+    ):
+        before = np.flatnonzero(time < start - 1e-9)[-2:]
+        acceleration = (rate[before[1]] - rate[before[0]]) / (time[before[1]] - time[before[0]])
+        pushed = abs(acceleration) * duration
+        assert abs(separation - e * approach) <= pushed + 2e-3 * approach
+        close += bool(pushed < 0.05 * approach)
+    assert close >= 5
+
+
+def test_impulse_of_the_contact_is_the_change_of_angular_momentum() -> None:
+    """Leg 1 turns about B1, on which nothing but the contact has a moment."""
+    dataset = run(SCENE, CLOSE_UP)
+    time = dataset.time.values
+    momentum = sum(_angular_momentum(dataset, body) for body in LEG)
+    socket = dataset.frame_position.sel(frame="socket_A1.centre").values
+    offset = dataset.contact_offset.values[:, 0]
+    world = rotate(dataset.sel(body="socket_A1")["quaternion"].values, offset)
+    reach = sps4.Contact().ball_radius * world / np.linalg.norm(world, axis=1, keepdims=True).clip(1e-12)
+    moment = np.cross(socket + world + reach - sps4.B[0], dataset.contact_force.values[:, 0])
+    impulse = np.sum(0.5 * (moment[1:] + moment[:-1]) * np.diff(time)[:, None], axis=0)
+    pushed = np.linalg.norm(impulse)
+    assert pushed > 0.1 * np.linalg.norm(momentum[0] - momentum[-1]) > 0.0
+    # trapezia of 1 us on a pulse of 157 us
+    assert momentum[-1] - momentum[0] == pytest.approx(impulse, abs=1e-4 * pushed)
+
+
+def _angular_momentum(dataset: object, body: str) -> np.ndarray:
+    """Of one body about B1 [kg m^2/s], from its recorded motion."""
+    data = {"rod1": sps4.ROD, "cylinder1": sps4.CYLINDER}.get(body, sps4.BALL)
+    motion = dataset.sel(body=body)
+    R = quaternion_to_matrix(motion["quaternion"].values)
+    inertia = R @ np.diag([data.transverse, data.transverse, data.axial]) @ np.swapaxes(R, 1, 2)
+    spin = np.einsum("tij,tj->ti", inertia, motion.angular_velocity.values)
+    return spin + data.mass * np.cross(motion.position.values - sps4.B[0], motion.velocity.values)
+
+
+def test_friction_never_drives() -> None:
+    for overrides in ((), CLOSE_UP):
+        assert run(SCENE, overrides).contact_friction_power.max() <= 0.0
+
+
+def test_normal_force_never_pulls() -> None:
+    dataset = run(SCENE, CLOSE_UP)
+    assert dataset.contact_normal_force.min() >= 0.0
+    assert dataset.contact_normal_force.where(dataset.contact_gap > 0.0, drop=True).max() == 0.0
+
+
+def test_energy_ledger_closes() -> None:
+    dataset = run(SCENE)
+    assert np.abs(dataset.energy_error).max() <= 1e-7 * dataset.kinetic.max()
+
+
+def test_loops_stay_closed() -> None:
+    assert run(SCENE).constraint_error.max() <= 1e-10
+
+
+def test_deviation_from_ideal_has_the_known_magnitude() -> None:
+    """1.59 mrad about y0, 0.13 mm, 15.4 mm/s: the clearance through the mechanism's kinematics."""
+    csj, ideal = run(SCENE).sel(body="platform"), run("sps4/ideal").sel(body="platform")
+    same = csj.sel(time=ideal.time, method="nearest", tolerance=1e-9)
+    assert np.abs(same.position.values - ideal.position.values).max() == pytest.approx(0.130e-3, abs=1e-6)
+    assert np.abs(same.velocity.values - ideal.velocity.values).max() == pytest.approx(15.4e-3, abs=1e-4)
+    tilt = [np.arcsin(quaternion_to_matrix(d["quaternion"].values)[:, 0, 2]) for d in (same, ideal)]
+    assert np.abs(tilt[0] - tilt[1]).max() == pytest.approx(1.59e-3, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_second_derivation_gives_its_kept_numbers() -> None:
+    """Some minutes: the numbers in csj.json are what the code beside them computes."""
+    result = simulate(until=0.0165)
+    expected = kept()["impact_start"]
+    assert [i.start for i in result.impacts] == pytest.approx(expected[: len(result.impacts)], abs=1e-8)
+    assert len(result.impacts) == np.sum(expected < 0.0165)
+    peaks = [i.peak_force for i in result.impacts]
+    assert peaks == pytest.approx(kept()["impact_peak_force"][: len(peaks)], rel=1e-6)

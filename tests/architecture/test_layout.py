@@ -1,0 +1,142 @@
+"""The shape of the project: where things are, who imports whom, how long a module may be."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from stages.__main__ import parser
+
+TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
+BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
+#: longest module; what does not fit is two things
+LINES = 300
+
+
+def sources(root: Path) -> list[Path]:
+    return [
+        p for folder in ("pipeline", "stages", "tests", "benchmarks") for p in sorted((root / folder).rglob("*.py"))
+    ]
+
+
+def test_top_level_is_as_agreed(root: Path):
+    there = {path.name for path in root.iterdir() if not path.name.startswith(".")}
+    assert there >= TOP
+    assert there - TOP - BESIDES <= {"results", "build", "dist", "flexclear.egg-info"}
+
+
+def test_modules_stay_short(root: Path):
+    long = {str(p.relative_to(root)): n for p in sources(root) if (n := len(p.read_text().splitlines())) > LINES}
+    assert long == {}
+
+
+def test_no_module_is_a_drawer(root: Path):
+    """A name like `utils` says that nobody knew what the module is about."""
+    drawers = {"utils", "util", "helpers", "misc", "common", "manager", "managers"}
+    assert [p for p in sources(root) if p.stem in drawers and "tests" not in p.parts] == []
+
+
+def _lint_imports(folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()", "--no-cache"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def test_import_rules_hold(root: Path):
+    done = _lint_imports(root)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    "module, line, broken",
+    [
+        ("pipeline/post/errors.py", "import pipeline.dynamics.tables", "three towers"),
+        ("pipeline/core/units.py", "import pipeline.post.errors", "three towers"),
+        ("pipeline/dynamics/tables.py", "import stages.graph", "three towers"),
+        ("pipeline/post/errors.py", "import meshio", "finite elements"),
+        ("stages/graph.py", "import skfem", "finite elements"),
+        ("pipeline/dynamics/tables.py", "import matplotlib", "plots"),
+        ("pipeline/post/errors.py", "import pyvista", "shapes"),
+    ],
+)
+def test_import_rules_can_be_broken(root: Path, tmp_path: Path, module: str, line: str, broken: str):
+    """Each rule notices a violation, so that the test above means something."""
+    for name in ("pipeline", "stages"):
+        shutil.copytree(root / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(root / "pyproject.toml", tmp_path)
+    path = tmp_path / module
+    path.write_text(path.read_text() + f"\n{line}\n")
+    done = _lint_imports(tmp_path)
+    assert done.returncode != 0
+    assert re.search(rf"^{broken}.* BROKEN", done.stdout, re.MULTILINE), done.stdout
+
+
+def test_every_dependency_is_pinned(root: Path):
+    """Two installs a month apart get the same versions."""
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    pinned = {
+        line.partition("==")[0].lower().replace("_", "-")
+        for line in (root / "constraints.txt").read_text().splitlines()
+        if "==" in line
+    }
+    wanted = [*project["dependencies"], *project["optional-dependencies"]["dev"]]
+    assert {re.split(r"[<>=]", name)[0].lower() for name in wanted} <= pinned
+
+
+def test_every_library_that_is_imported_is_declared(root: Path):
+    """An indirect dependency may vanish with the next version of what brought it."""
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in project["dependencies"]}
+    declared |= {"skfem", "vtkmodules", "pipeline", "stages"} | set(sys.stdlib_module_names)
+    found = set()
+    for path in sources(root):
+        if path.parts[len(root.parts)] in ("pipeline", "stages"):
+            for node in ast.walk(ast.parse(path.read_text())):
+                if isinstance(node, ast.Import):
+                    found |= {alias.name.partition(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and not node.level:
+                    found.add((node.module or "").partition(".")[0])
+    assert {name.lower() for name in found} <= {name.lower() for name in declared}
+
+
+def test_no_path_of_a_developers_machine(root: Path):
+    """Everything here must mean the same on every machine."""
+    home = re.compile(r"(?<![\w.])/(?:home|Users|root|work|farm)/\w")
+    folders = (".ci", "docs", "scenes", "meshes", "pipeline", "stages", "tests", "benchmarks")
+    files = [*root.glob("*"), *(path for folder in folders for path in (root / folder).rglob("*"))]
+    texts = {".py", ".md", ".toml", ".txt", ".json", ".sh", ""}
+    visible = [p for p in files if p.is_file() and p.suffix in texts and not _hidden(p.relative_to(root))]
+    assert len(visible) > 50
+    found = [f"{p}: {line}" for p in visible for line in p.read_text().splitlines() if home.search(line)]
+    assert found == []
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts if part != ".ci")
+
+
+def test_the_readme_names_only_commands_that_exist(root: Path):
+    text = (root / "README.md").read_text()
+    verbs = re.findall(r"`flexclear ([a-z]+)", text)
+    assert len(verbs) >= 6
+    actions = next(a for a in parser()._actions if a.choices)
+    assert set(verbs) == set(actions.choices or {})
+    targets = set(re.findall(r"^([a-z-]+):.*##", (root / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"\bmake ([a-z-]+)", text)) <= targets
+    for link in re.findall(r"\]\(([^)#]+)\)", text):
+        assert link.startswith("http") or (root / link).exists(), link
+
+
+def test_the_makefile_lists_itself(root: Path):
+    make = shutil.which("make")
+    assert make is not None
+    listed = subprocess.run([make, "help"], cwd=root, capture_output=True, text=True, check=True).stdout
+    phony = re.search(r"^\.PHONY: (.*)$", (root / "Makefile").read_text(), re.MULTILINE)
+    assert phony is not None
+    assert {line.split()[1] for line in listed.splitlines()} == set(phony[1].split())

@@ -1,0 +1,100 @@
+"""Every figure and table is there, is made of what it asks for, and has bytes that depend on nothing else."""
+
+from __future__ import annotations
+
+import ast
+import struct
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline.core.registry import lookup
+from pipeline.post import figures
+from pipeline.post.figures import fig06
+from pipeline.post.plotting import shape_figure
+from tests.paper.material import everything
+
+TREE = Path(pipeline.__file__).parent.parent
+ARTIFACTS = {"run", "post", "ensemble", "modes", "bundle", "timing"}
+#: their layout takes seconds, and the module that draws them is also tested through others
+SIMILAR = {"fig11": "fig12", "fig13": "fig12", "fig14": "fig16", "fig15": "fig16"}
+
+
+@pytest.fixture(autouse=True)
+def _lines_only(monkeypatch):
+    """Shapes as lines: what is tested here must hold without GL libraries."""
+    monkeypatch.setattr(shape_figure.gl, "works", lambda: False)
+
+
+def made(name):
+    """Files of one figure or table from the made-up artifacts, and nothing but those it asks for."""
+    asked = {reference: everything()[reference] for reference in figures.needs(name)}
+    return lookup("pipeline.post.figures", name, where="test")(asked)
+
+
+def test_all_figures_and_tables_of_the_paper_are_listed():
+    plots = {f"fig{n:02d}" for n in (3, 4, 6, 8, 9, 11, 12, 13, 14, 15, 16, 17)}
+    assert set(figures.NAMES) == plots | {f"table{n:02d}" for n in (4, 5, 7, 8, 9, 10)}
+
+
+@pytest.mark.parametrize("name", figures.NAMES)
+def test_needs_are_literal_and_name_scenes_and_artifacts_that_exist(name):
+    module = import_module(f"pipeline.post.figures.{name}")
+    assigned = [node for node in ast.parse(Path(module.__file__).read_text()).body if isinstance(node, ast.Assign)]
+    literal = {node.targets[0].id: node.value for node in assigned}
+    assert ast.literal_eval(literal["NEEDS"]) == module.NEEDS
+    for reference in module.NEEDS:
+        scene, _, artifact = reference.partition(":")
+        assert artifact.partition("/")[0] in ARTIFACTS
+        assert (TREE / "scenes" / f"{scene}.toml").is_file() or (
+            artifact == "timing" and (TREE / "scenes" / scene).is_dir()
+        )
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow if name in SIMILAR else ()) for name in figures.NAMES]
+)
+def test_makes_the_files_of_its_name(name):
+    found = made(name)
+    suffixes = {"csv", "md"} if name.startswith("table") else {"png", "svg"}
+    assert set(found) == {f"{name}.{suffix}" for suffix in suffixes}
+    assert all(found.values())
+
+
+@pytest.mark.parametrize("name", ["fig08", "table09"])
+def test_equal_artifacts_give_equal_bytes(name):
+    assert made(name) == made(name)
+
+
+@pytest.mark.parametrize("name", ["fig06", "fig17"])
+def test_pictures_hold_no_date_and_are_wide_enough_to_read(name):
+    found = made(name)
+    assert b"<dc:date>" not in found[f"{name}.svg"]
+    assert b"tIME" not in found[f"{name}.png"]
+    width, height = struct.unpack(">II", found[f"{name}.png"][16:24])
+    assert width >= 1200
+    assert height >= 400
+
+
+def test_friction_curve_goes_through_its_corners_and_is_odd():
+    law = (2e-4, 1e-2, 0.15, 0.1)
+    v = np.array([-1.0, -1e-2, -2e-4, 0.0, 2e-4, 1e-2, 1.0])
+    # corners of the law, exact up to rounding
+    np.testing.assert_allclose(fig06.coefficient(v, *law), [-0.1, -0.1, -0.15, 0.0, 0.15, 0.1, 0.1], atol=1e-15)
+
+
+def test_observed_friction_is_read_from_force_and_power():
+    run = everything()["sps4/csj:run"].sel(contact="A1")
+    speed, mu = fig06.observed(run)
+    # the made-up run slides at 20 mm/s with a tangential force of a tenth of the normal one
+    np.testing.assert_allclose(mu, 0.1, rtol=1e-9)
+    np.testing.assert_allclose(speed, 0.02, rtol=1e-9)
+    assert mu.size > 10
+
+
+def test_an_unknown_figure_is_an_error_that_names_the_nearest():
+    with pytest.raises(Exception, match="fig16"):
+        figures.needs("fig1666")

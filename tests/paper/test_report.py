@@ -1,0 +1,99 @@
+"""The report shows what there is, links to what exists, and lists every assumption and discrepancy."""
+
+from __future__ import annotations
+
+import json
+import re
+from itertools import pairwise
+
+import pytest
+
+from pipeline.core.registry import lookup
+from pipeline.post import figures, report
+from pipeline.post.discrepancies import DISCREPANCIES
+from tests.paper.material import everything
+
+REASON = "assumed: not printed in the paper"
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A results folder with two figures, two tables and a film that is none."""
+    root = tmp_path_factory.mktemp("results")
+    for name in ("fig08", "table08", "table10"):
+        folder = root / ("tables" if name.startswith("table") else "figures")
+        folder.mkdir(exist_ok=True)
+        for file, content in lookup("pipeline.post.figures", name, where="test")(everything()).items():
+            (folder / file).write_bytes(content)
+    headline = root / "runs" / report.HEADLINE
+    headline.mkdir(parents=True)
+    for file in ("film.mp4", "mechanism.png", "mode_rod1.html", "modes_rod1.vtu"):
+        (headline / file).write_bytes(b"stand-in")
+    (root / "report").mkdir()
+    return root
+
+
+@pytest.fixture(scope="module")
+def content(results):
+    """What the report finds there."""
+    attributes = {name: everything()[f"{name}:run"].attrs for name in ("sps4/ideal", "sps4/csj")}
+    return report.collect(results, attributes)
+
+
+def test_every_link_of_the_page_leads_somewhere(results, content):
+    page = report.page(content).decode()
+    links = re.findall(r"(?:src|href)='([^'#]+)'", page)
+    assert links
+    assert [link for link in links if not (results / "report" / link).is_file()] == []
+
+
+def test_page_needs_nothing_from_outside(content):
+    page = report.page(content).decode()
+    assert "http" not in page
+    assert "<script" not in page
+
+
+def test_page_shows_figures_tables_film_assumptions_and_discrepancies(content):
+    page = report.page(content).decode()
+    assert page.count("<video") == 1
+    for text in ("Figure 8", "Table 8", "Table 10", "not printed in the paper", DISCREPANCIES[0].place):
+        assert text in page
+
+
+def test_an_empty_results_folder_gives_a_page_without_figures(tmp_path):
+    page = report.page(report.collect(tmp_path, {})).decode()
+    assert "<img" not in page
+    assert "Discrepancies" in page
+
+
+def test_assumptions_are_merged_over_scenes():
+    told = {
+        "a": {"assumptions": json.dumps({"x": REASON, "y": REASON})},
+        "b": {"assumptions": json.dumps({"x": REASON})},
+    }
+    merged = report.merged_assumptions(told)
+    assert merged == {"x": (REASON, ("a", "b")), "y": (REASON, ("a",))}
+
+
+def test_assumptions_that_differ_between_scenes_are_all_kept():
+    told = {
+        "a": {"assumptions": json.dumps({"x": "assumed: 1"})},
+        "b": {"assumptions": json.dumps({"x": "assumed: 2"})},
+    }
+    assert sorted(text for text, _ in report.merged_assumptions(told).values()) == ["assumed: 1", "assumed: 2"]
+
+
+def test_paper_page_lists_every_figure_with_its_command(content):
+    text = report.paper_markdown(content)
+    for name in figures.NAMES:
+        assert f"| {figures.title(name)} |" in text
+        assert f"`{report.command(name)}`" in text
+    assert "| CPU time, ours (ideal = 1) |" in text
+
+
+def test_tables_of_the_paper_page_are_whole(content):
+    """Every row of every pipe table has as many cells as its head."""
+    lines = report.paper_markdown(content).splitlines()
+    for above, line in pairwise(lines):
+        if above.startswith("|") and line.startswith("|"):
+            assert line.count("|") == above.count("|"), line

@@ -1,0 +1,209 @@
+"""The scene files load, fit together at the start, and hold the paper's data and the declared assumptions."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.scene.fields import Pose
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from tests.reference import sps4
+
+TREE = Path(__file__).resolve().parents[2]
+SCENES = TREE / "scenes"
+FILES = sorted(p.relative_to(SCENES).as_posix() for p in SCENES.glob("**/*.toml") if "sweeps" not in p.parts)
+MECHANISMS = [f for f in FILES if f.startswith("sps4/") and "frequencies" not in f]
+MAIN = ["ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb"]
+#: positions are typed to 17 digits; sums of a few lengths below 1 m round to this
+ROUNDING = 5e-16
+
+Placement = tuple[np.ndarray, np.ndarray]
+
+
+def scene(name: str) -> Scene:
+    """A scene by its path below scenes/."""
+    return load_scene(SCENES / name)
+
+
+def placed(pose: Pose | None) -> Placement:
+    """Rotation matrix and position of a pose."""
+    pose = pose or Pose()
+    return quaternion_to_matrix(pose.as_quaternion()), np.array(pose.position)
+
+
+def after(outer: Placement, inner: Placement) -> Placement:
+    """The inner frame, seen from the parent of the outer one."""
+    return outer[0] @ inner[0], outer[1] + outer[0] @ inner[1]
+
+
+def inverse(frame: Placement) -> Placement:
+    """The parent, seen from the frame."""
+    return frame[0].T, -frame[0].T @ frame[1]
+
+
+def frames_in_bodies(s: Scene) -> dict[str, Placement]:
+    """Every named frame in its body; those of a flexible body from its recipe."""
+    found = {}
+    for name, body in s.body.items():
+        if hasattr(body, "frames"):
+            found |= {f"{name}.{f}": placed(p) for f, p in body.frames.items()}
+            continue
+        with Path(body.mesh).open("rb") as file:
+            recipe = tomllib.load(file)
+        # z of a rod's frame along the beam: columns are mesh y, z, x
+        turn = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+        for frame, entry in recipe["frames"].items():
+            place = float(entry["x"].removesuffix(" mm")) * 1e-3
+            found[f"{name}.{frame}"] = (turn, np.array([place, 0.0, 0.0]))
+    return found
+
+
+def start(s: Scene) -> dict[str, Placement]:
+    """Every named frame in the world at the start; bodies without a pose hang on fixed joints."""
+    frames = frames_in_bodies(s)
+    bodies = {n: placed(getattr(b, "pose", None)) for n, b in s.body.items() if n == "ground" or b.pose is not None}
+    links = [j.between for j in s.joint.values() if j.type == "fixed"]
+    for _ in links:
+        for pair in links:
+            for known, other in (pair, pair[::-1]):
+                body, new = known.split(".")[0], other.split(".")[0]
+                if body in bodies and new not in bodies:
+                    bodies[new] = after(after(bodies[body], frames[known]), inverse(frames[other]))
+    return {f: after(bodies[f.split(".")[0]], p) for f, p in frames.items()}
+
+
+def parts(s: Scene) -> dict[str, object]:
+    """Every body, joint, drive and load as plain data without its texts on sources."""
+    table = s.model_dump(include={"body", "joint", "drive", "load"})
+    return {f"{family}.{n}": _bare(p) for family, group in table.items() for n, p in group.items()}
+
+
+def _bare(part: object) -> object:
+    return {k: _bare(v) for k, v in part.items() if k != "source"} if isinstance(part, dict) else part
+
+
+def differing(a: str, b: str) -> set[str]:
+    """Names of the parts that two scenes do not share."""
+    one, two = parts(scene(a)), parts(scene(b))
+    return {n for n in one.keys() | two.keys() if one.get(n) != two.get(n)}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_every_scene_loads_under_its_own_name(name: str) -> None:
+    assert scene(name).name == name.removesuffix(".toml")
+
+
+@pytest.mark.parametrize("name", MAIN)
+def test_the_papers_eight_scenes_are_there(name: str) -> None:
+    assert f"sps4/{name}.toml" in FILES
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_every_part_with_numbers_says_where_they_are_from(name: str) -> None:
+    s = scene(name)
+    told = {place.split(".")[0] + "." + place.split(".")[1] for place in s.sources() if "." in place}
+    numbers = {f"body.{n}" for n in s.body} | {f"drive.{n}" for n in s.drive} | {f"load.{n}" for n in s.load}
+    numbers |= {f"joint.{n}" for n in s.contacts()}
+    assert numbers <= told
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_the_frames_of_every_joint_meet_at_the_start(name: str) -> None:
+    s = scene(name)
+    frames = start(s)
+    for joint in s.joint.values():
+        (R_a, p_a), (R_b, p_b) = (frames[f] for f in joint.between)
+        assert np.abs(p_a - p_b).max() <= ROUNDING
+        if joint.type in ("fixed", "prismatic"):
+            assert np.abs(R_a - R_b).max() <= ROUNDING
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_joint_centres_are_the_assumed_ones(name: str) -> None:
+    frames = start(scene(name))
+    for k in range(4):
+        up = np.array([0.0, 0.0, sps4.HEIGHT])
+        assert frames[f"socket_A{k + 1}.centre"][1] == pytest.approx(sps4.A[k] + up, abs=ROUNDING)
+        assert frames[f"ball_B{k + 1}.centre"][1] == pytest.approx(sps4.B[k], abs=ROUNDING)
+    assert frames["ball_C.centre"][1] == pytest.approx([0.0, 0.0, sps4.HEIGHT], abs=ROUNDING)
+
+
+def test_masses_and_inertias_are_those_of_table_1() -> None:
+    s = scene("sps4/ideal.toml")
+    known = {
+        "rod": sps4.ROD,
+        "cylinder": sps4.CYLINDER,
+        "ball": sps4.BALL,
+        "socket": sps4.SOCKET,
+        "platform": sps4.PLATE,
+    }
+    known["central"] = sps4.CENTRAL_ROD
+    for name, body in s.rigid().items():
+        expected = next(data for start_of, data in known.items() if name.startswith(start_of))
+        assert body.mass == expected.mass
+        inertia = np.diag([expected.transverse, expected.transverse, expected.axial])
+        assert np.array(body.inertia) == pytest.approx(inertia, rel=1e-14)
+
+
+def test_legs_add_up_to_the_lengths_of_the_parts() -> None:
+    s, frames = scene("sps4/ideal.toml"), start(scene("sps4/ideal.toml"))
+    for k in range(1, 5):
+        axis = frames[f"ball_A{k}.centre"][1] - frames[f"ball_B{k}.centre"][1]
+        length = np.linalg.norm(axis)
+        assert length == pytest.approx(sps4.LENGTH, abs=ROUNDING)
+        for frame, along in (
+            (f"rod{k}.bottom", length - 0.28),
+            (f"rod{k}.top", length - 0.04),
+            (f"cylinder{k}.bottom", 0.04),
+        ):
+            away = frames[frame][1] - frames[f"ball_B{k}.centre"][1]
+            assert away == pytest.approx(along * axis / length, abs=ROUNDING)
+        assert s.body[f"ball_B{k}"].com[2] == -s.body[f"ball_A{k}"].com[2] == sps4.BALL_CENTRE
+
+
+def test_clearance_joint_is_that_of_tables_3_and_6() -> None:
+    joint, known = scene("sps4/csj.toml").contacts()["A1"], sps4.Contact()
+    assert (joint.clearance, joint.ball_radius, joint.floor) == (known.clearance, known.ball_radius, known.floor)
+    for material in (joint.socket_material, joint.ball_material):
+        assert (material.youngs_modulus, material.poisson) == (known.youngs_modulus, known.poisson)
+    assert joint.normal.restitution == known.restitution
+    friction = joint.friction
+    assert (friction.static, friction.dynamic) == (known.mu_static, known.mu_dynamic)
+    assert (friction.v_static, friction.v_dynamic) == (known.v_static, known.v_dynamic)
+
+
+def test_restitution_gravity_height_and_counts_are_declared_assumptions() -> None:
+    said = scene("sps4/far_csj_cb.toml").assumptions()
+    for place in ("joint.A1.normal.restitution", "body.platform.pose", "body.rod1.modes", "joint.P1", "drive.P3"):
+        assert place in said
+    assert "load.gravity" in scene("sps4/variants/gravity.toml").assumptions()
+
+
+def test_an_effect_is_one_part_of_a_scene() -> None:
+    assert differing("sps4/ideal.toml", "sps4/csj.toml") == {"joint.A1"}
+    assert differing("sps4/ideal.toml", "sps4/far_cb.toml") == {"body.rod1"}
+    assert differing("sps4/csj.toml", "sps4/far_csj_fixed.toml") == {"body.rod1"}
+    assert differing("sps4/far_free.toml", "sps4/far_csj_free.toml") == {"joint.A1"}
+    assert differing("sps4/ideal.toml", "sps4/variants/gravity.toml") == {"load.gravity"}
+
+
+@pytest.mark.parametrize("millimetres", [60, 120])
+def test_prismatic_variants_move_only_the_prismatic_joints(millimetres: int) -> None:
+    moved = {f"{part}{k}" for part in ("joint.P", "body.cylinder") for k in range(1, 5)}
+    assert differing("sps4/ideal.toml", f"sps4/variants/prismatic_{millimetres}mm.toml") == moved
+    clearance = f"sps4/variants/prismatic_{millimetres}mm_csj.toml"
+    assert differing(f"sps4/variants/prismatic_{millimetres}mm.toml", clearance) == {"joint.A1"}
+    assert parts(scene(clearance))["joint.A1"] == parts(scene("sps4/csj.toml"))["joint.A1"]
+
+
+def test_stacked_variant_raises_centres_of_mass_only() -> None:
+    moved = {"body.platform"} | {f"body.socket_{n}" for n in ("A1", "A2", "A3", "A4", "C")}
+    assert differing("sps4/ideal.toml", "sps4/variants/stacked.toml") == moved
+    s = scene("sps4/variants/stacked.toml")
+    assert s.body["platform"].com == pytest.approx((0.0, 0.0, 22.5e-3), abs=1e-18)
+    assert s.body["socket_C"].com == pytest.approx((0.0, 0.0, 7.048e-3), abs=1e-18)

@@ -1,0 +1,117 @@
+"""The tables say what the runs say, in the paper's units, beside the paper's own numbers."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from pipeline.post.figures import table04, table05, table07, table08, table09, table10
+from pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
+from pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
+from tests.paper.material import WOBBLE, everything
+
+
+def rows(module, name, data=None):
+    """Rows of a table's CSV as dictionaries."""
+    return list(csv.DictReader(io.StringIO(module.make(data or everything())[f"{name}.csv"].decode())))
+
+
+def test_markdown_is_read_back_as_it_was_written():
+    table = Table("A title", ("quantity", "value"), (("one", "1.0"), ("two", "2 ± 3")), ("First note.", "Second note."))
+    assert from_markdown(as_markdown(table)) == table
+
+
+def test_text_that_is_no_table_is_refused():
+    with pytest.raises(ValueError, match="not a table"):
+        from_markdown("just text")
+
+
+def test_rows_of_the_wrong_length_are_refused():
+    with pytest.raises(ValueError, match="2 columns"):
+        Table("t", ("a", "b"), (("1",),))
+
+
+def test_csv_keeps_cells_with_commas():
+    table = Table("t", ("a, b", "c"), (("1", "2"),))
+    assert list(csv.reader(io.StringIO(as_csv(table)))) == [["a, b", "c"], ["1", "2"]]
+
+
+def test_html_escapes_what_is_in_the_cells():
+    assert "&lt;b&gt;" in as_html(Table("t", ("a",), (("<b>",),)))
+
+
+@pytest.mark.parametrize("module, name", [(table04, "table04"), (table05, "table05")])
+def test_frequencies_that_agree_as_printed_say_so(module, name):
+    assert {row["agrees as printed"] for row in rows(module, name)} == {"yes"}
+
+
+def test_a_frequency_off_by_one_printed_digit_is_found():
+    square, _ = table04.NEEDS
+    data = dict(everything())
+    # 1576.805 reads 1576.8; 0.1 Hz more reads 1576.9
+    data[square] = data[square].assign(frequency=data[square].frequency + 0.1 * (np.arange(7) == 0))
+    assert [row["agrees as printed"] for row in rows(table04, "table04", data)] == ["no"] + ["yes"] * 5
+    assert "5 of 6" in table04.make(data)["table04.md"].decode()
+
+
+def test_free_free_table_starts_with_six_rigid_modes():
+    assert [row["kind"] for row in rows(table05, "table05")] == ["rigid"] * 6 + ["bending"] * 4 + ["torsion", "bending"]
+
+
+def test_ratio_of_beam_frequencies():
+    # tabulated roots of cos x cosh x = 1: 7.853204624, 10.995607838 (ten digits)
+    assert euler_bernoulli_ratio() == pytest.approx((10.995607838 / 7.853204624) ** 2, rel=1e-9)
+
+
+def test_table_7_gives_the_wobble_that_the_runs_were_made_with():
+    found = {row["largest error"]: row for row in rows(table07, "table07")}
+    for name, head in (("far_free", "ours, free-free"), ("far_fixed", "ours, fixed-fixed")):
+        # outputs every 0.1 ms of a 300 Hz wobble miss its top by up to 0.1 %; four digits are printed
+        assert float(found["displacement z0 (mm)"][head]) == pytest.approx(1e3 * WOBBLE[name], rel=2e-3)
+        assert float(found["angle about y0 (rad)"][head]) == pytest.approx(10.0 * WOBBLE[name], rel=2e-3)
+
+
+def test_table_7_says_when_fixed_modes_do_nothing():
+    data = dict(everything())
+    assert "vanish at both ends" not in table07.make(data)["table07.md"].decode()
+    data["sps4/far_fixed:run"] = data["sps4/ideal:run"]
+    assert "vanish at both ends" in table07.make(data)["table07.md"].decode()
+
+
+def test_table_8_compares_the_clearance_run_with_the_paper():
+    found = {row["largest error"]: row for row in rows(table08, "table08")}
+    assert found["velocity z0 (mm/s)"]["paper"] == "13.570"
+    assert float(found["displacement z0 (mm)"]["ours"]) == pytest.approx(0.1, rel=2e-3)  # made with 1e-4 m, see above
+
+
+def test_table_9_says_how_far_single_runs_count():
+    data = everything()
+    horizon = 1e3 * float(data["sps4/far_csj_free:post"].horizon)
+    heads = rows(table09, "table09")[0].keys()
+    assert f"ours, free-free, to {horizon:.1f} ms" in heads
+    assert 20.0 < horizon < 180.0  # the made-up ensemble parts inside the stroke
+
+
+def test_table_9_spread_is_that_of_the_members():
+    data = everything()
+    ensemble, ideal = data["sps4/far_csj_free:ensemble"], data["sps4/ideal:run"]
+    velocity = (
+        ensemble.velocity.sel(body="platform", axis="z").values - ideal.velocity.sel(body="platform", axis="z").values
+    )
+    expected = 1e3 * np.abs(velocity).max(axis=1)
+    cell = {row["largest error"]: row for row in rows(table09, "table09")}["velocity z0 (mm/s)"][
+        "ours, free-free, whole stroke"
+    ]
+    mean, _, std = cell.partition(" ± ")
+    assert float(mean) == pytest.approx(expected.mean(), abs=5e-4)  # three decimals are printed
+    assert float(std) == pytest.approx(expected.std(ddof=1), rel=0.05)  # two digits are printed
+
+
+def test_table_10_divides_medians_by_the_ideal_one():
+    found = {row["model"]: row for row in rows(table10, "table10")}
+    assert found["sps4/csj"]["CPU time, ours (ideal = 1)"] == "10.00"
+    assert found["sps4/csj"]["CPU time, paper (ideal = 1)"] == "19.95"
+    assert found["sps4/far_csj_fixed"]["evaluations (ideal = 1)"] == "60.00"

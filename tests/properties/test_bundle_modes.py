@@ -1,0 +1,208 @@
+"""Modes: the same in every process, oriented and signed, whole clusters only, complete when asked."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.structure.fe import beam, mesh
+from pipeline.structure.modes import eigen, reference, select, solve
+
+ROOT = Path(__file__).parents[2]
+WHOLE = [("free-free", 7), ("free-free", 8), ("free-free", 13), ("fixed-fixed", 7), ("craig-bampton", 13)]
+#: more elements than the dense limit allows, so that the sparse solver is at work; nodes at 60 mm and 120 mm
+MANY = 4 * (eigen.DENSE_LIMIT // (4 * beam.N_DOFS) + 1)
+
+
+def rod(elements: int = 12) -> xr.Dataset:
+    return mesh.build(mesh.read_recipe(ROOT / "meshes" / "actuated_rod.toml") | {"elements": elements})
+
+
+@pytest.fixture(scope="module")
+def paper_rod() -> xr.Dataset:
+    return rod()
+
+
+def test_no_reference_condition_is_left_out() -> None:
+    """A condition added to the family has to appear in these tests."""
+    assert {name for name, _ in WHOLE} == set(reference.NAMES)
+
+
+@pytest.mark.parametrize("condition, count", WHOLE)
+def test_whole_counts_are_taken(paper_rod: xr.Dataset, condition: str, count: int) -> None:
+    modes = solve(paper_rod, condition, count)
+    assert modes.sizes["mode"] == modes.attrs["count"] == count
+    assert modes["frequency"].values[0] > 0.0
+
+
+@pytest.mark.parametrize(
+    "condition, count, whole",
+    [
+        ("free-free", 6, "5 and 7"),
+        ("free-free", 12, "11 and 13"),
+        ("free-free", 1, "2"),
+        ("fixed-fixed", 6, "5 and 7"),
+        ("fixed-fixed", 3, "2 and 4"),
+        ("craig-bampton", 12, "11 and 13"),
+        ("craig-bampton", 7, "6 and 8"),
+    ],
+)
+def test_a_count_that_cuts_a_pair_names_the_whole_counts(
+    paper_rod: xr.Dataset, condition: str, count: int, whole: str
+) -> None:
+    with pytest.raises(InputError, match=rf"{count} modes cut a cluster of 2 equal.*\n.*counts? (are|is) {whole}$"):
+        solve(paper_rod, condition, count)
+
+
+@pytest.mark.parametrize("condition, most", [("free-free", 72), ("fixed-fixed", 66), ("craig-bampton", 72)])
+def test_complete_bases_have_every_elastic_coordinate(paper_rod: xr.Dataset, condition: str, most: int) -> None:
+    modes = solve(paper_rod, condition, None)
+    shapes = modes["shape"].values.reshape(-1, most)
+    assert modes.sizes["mode"] == most
+    assert np.linalg.matrix_rank(shapes / np.linalg.norm(shapes, axis=0)) == most
+    with pytest.raises(InputError, match=f"{most + 1} modes are asked for, the mesh has {most}"):
+        solve(paper_rod, condition, most + 1)
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_craig_bampton_needs_its_constraint_modes(paper_rod: xr.Dataset, count: int) -> None:
+    with pytest.raises(InputError, match="6 constraint modes"):
+        solve(paper_rod, "craig-bampton", count)
+
+
+def test_interfaces_must_be_frames_on_different_nodes(paper_rod: xr.Dataset) -> None:
+    with pytest.raises(InputError, match=r"no frame called 'topp'\n.*'top'"):
+        solve(paper_rod, "craig-bampton", 13, ("bottom", "topp"))
+    with pytest.raises(InputError, match="at least one interface"):
+        solve(paper_rod, "craig-bampton", 13, ())
+    with pytest.raises(InputError, match="same node"):
+        solve(paper_rod, "craig-bampton", 13, ("top", "top"))
+    with pytest.raises(InputError, match=r"no reference condition is called 'free'\n.*'free-free'"):
+        solve(paper_rod, "free", 7)
+
+
+def test_fixed_fixed_needs_something_between_the_ends() -> None:
+    recipe = mesh.read_recipe(ROOT / "meshes" / "actuated_rod.toml")
+    recipe |= {"elements": 1, "frames": {"top": {"x": 0.24}}, "interfaces": []}
+    with pytest.raises(InputError, match="no coordinate between two clamped ends"):
+        solve(mesh.build(recipe), "fixed-fixed", None)
+
+
+@pytest.mark.parametrize("condition, count", WHOLE)
+def test_equal_pairs_bend_in_y_then_z(paper_rod: xr.Dataset, condition: str, count: int) -> None:
+    modes = solve(paper_rod, condition, count)
+    bending = np.flatnonzero(modes["kind"].values == "bending")
+    shapes = modes["shape"].values
+    for first, second in bending.reshape(-1, 2):
+        size = np.abs(shapes[:, :, [first, second]]).max()
+        # what is left in the other plane is the rotation's rounding
+        assert np.abs(shapes[:, [0, 2, 3, 4], first]).max() < 1e-10 * size
+        assert np.abs(shapes[:, [0, 1, 3, 5], second]).max() < 1e-10 * size
+        # ry = -dw/dx, so the two are one shape in two planes
+        np.testing.assert_allclose(shapes[:, 1, first], shapes[:, 2, second], atol=1e-8 * size)
+        np.testing.assert_allclose(shapes[:, 5, first], -shapes[:, 4, second], atol=1e-8 * size)
+
+
+@pytest.mark.parametrize("condition, count", WHOLE)
+def test_largest_component_is_positive(paper_rod: xr.Dataset, condition: str, count: int) -> None:
+    modes = solve(paper_rod, condition, count)
+    for j, kind in enumerate(modes["kind"].values):
+        part = modes["shape"].values[:, 3 if kind == "torsion" else slice(0, 3), j].ravel()
+        # ends of an antisymmetric shape are equal up to rounding; then the first of them is positive
+        large = part[np.abs(part) >= (1.0 - 1e-6) * np.abs(part).max()]
+        assert large[0] > 0.0
+
+
+SHAPES = """
+from pathlib import Path
+import hashlib
+import numpy as np
+from tests.properties.test_bundle_modes import MANY, rod
+from pipeline.structure.modes import solve
+np.random.seed({seed})
+shapes = [solve(rod(n), "free-free", 7)["shape"].values for n in (12, MANY)]
+print(hashlib.sha256(b"".join(s.tobytes() for s in shapes)).hexdigest())
+"""
+
+
+def test_every_process_gets_the_same_shapes() -> None:
+    """Dense and sparse solver; ARPACK would start from numpy's random state unless told otherwise."""
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", SHAPES.format(seed=seed)], cwd=ROOT, check=True, capture_output=True, text=True
+        ).stdout
+        for seed in (1, 2)
+    }
+    assert len(digests) == 1
+
+
+@pytest.mark.parametrize("condition, count", [("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 13)])
+def test_sparse_and_dense_solver_agree(monkeypatch: pytest.MonkeyPatch, condition: str, count: int) -> None:
+    fine = rod(MANY)
+    sparse = solve(fine, condition, count)
+    monkeypatch.setattr(eigen, "DENSE_LIMIT", 10**6)
+    dense = solve(fine, condition, count)
+    # eps times the ratio of the largest to the lowest eigenvalue is 1e-6 as a bound; a hundredth of it is usual
+    np.testing.assert_allclose(sparse["frequency"], dense["frequency"], rtol=1e-7)
+    assert list(sparse["kind"].values) == list(dense["kind"].values)
+    scale = np.abs(dense["shape"].values).max(axis=(0, 1))
+    assert np.all(np.abs(sparse["shape"].values - dense["shape"].values).max(axis=(0, 1)) < 1e-6 * scale)
+
+
+def test_a_missed_mode_is_noticed() -> None:
+    """Sylvester's count sees a frequency that an eigensolver left out."""
+    matrices = beam.assemble(rod())
+    free = np.arange(6, matrices.size)
+    K, M = matrices.stiffness[free][:, free], matrices.mass[free][:, free]
+    values, _ = eigen.lowest(K, M, 8, shift=0.0)
+    eigen._nothing_missed(K, M, values)
+    with pytest.raises(SolverError, match="the eigensolver found"):
+        eigen._nothing_missed(K, M, np.delete(values, 2))
+
+
+def test_rigid_modes_are_told_by_a_gap() -> None:
+    select.without_rigid(np.array([0.0, 1e-3, 1e-2, 9e7]), 3)
+    with pytest.raises(SolverError, match="expected below a gap"):
+        select.without_rigid(np.array([0.0, 1e-3, 1e6, 9e7]), 3)  # a mechanism or a missing rigid mode
+    with pytest.raises(SolverError, match="expected below a gap"):
+        select.without_rigid(np.array([0.0, 1e-3, 1e-2, 1.1e-2, 9e7]), 3)
+
+
+def test_a_body_a_million_times_softer_keeps_its_modes() -> None:
+    """No frequency in Hz is built in: the rod of jelly has the same shapes, a thousand times slower."""
+    recipe = mesh.read_recipe(ROOT / "meshes" / "actuated_rod.toml")
+    soft = recipe | {"material": recipe["material"] | {"youngs_modulus": 7.17e4}}
+    stiff, slow = (solve(mesh.build(r), "free-free", 8) for r in (recipe, soft))
+    np.testing.assert_allclose(slow["frequency"] * 1e3, stiff["frequency"], rtol=1e-9)
+    np.testing.assert_allclose(slow["shape"], stiff["shape"], atol=1e-7)
+
+
+def test_complete_bases_span_the_same_deformations(paper_rod: xr.Dataset) -> None:
+    """Held at the same node, each complete basis has the frequencies of the whole clamped model."""
+    cantilever = solve(paper_rod, "craig-bampton", None, ("bottom",))["frequency"].values
+    both = solve(paper_rod, "craig-bampton", None, ("bottom", "top"))["frequency"].values
+    middle = solve(paper_rod, "craig-bampton", None, ("bottom", "at_60mm", "top"))["frequency"].values
+    free = solve(paper_rod, "free-free", None)["shape"].values.reshape(-1, 72)
+    matrices = beam.assemble(paper_rod)
+    rigid = beam.rigid_vectors(matrices)
+    # elastic shapes seen from the bottom's frame; with the rigid part free they deform as the clamped rod
+    from_bottom = free - rigid @ free[:6]
+    values, _ = eigen.rediagonalise(matrices.stiffness, matrices.mass, from_bottom)
+    for found in (both, middle, eigen.frequency(values)):
+        # three reductions of one model, each through its own basis: eps times the span of eigenvalues, 1e7
+        np.testing.assert_allclose(found, cantilever, rtol=1e-7)
+
+
+def test_craig_bampton_frequencies_fall_to_the_clamped_rod(paper_rod: xr.Dataset) -> None:
+    """Rayleigh-Ritz: from above, and monotonic as normal modes are added."""
+    exact = solve(paper_rod, "craig-bampton", None, ("bottom",))["frequency"].values
+    errors = [solve(paper_rod, "craig-bampton", n)["frequency"].values[:6] / exact[:6] - 1.0 for n in (6, 8, 13, 25)]
+    assert np.all(np.diff(errors, axis=0) <= 1e-10)
+    assert np.min(errors) > -1e-10
+    assert errors[2][:4].max() < 2e-3

@@ -1,0 +1,109 @@
+"""Recipes and meshes: what they hold, what they refuse, and that other programs can open them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.errors import InputError
+from pipeline.structure.fe import mesh, section
+from pipeline.structure.modes import bundle, solve
+
+MESHES = Path(__file__).parents[2] / "meshes"
+
+
+@pytest.fixture
+def recipe() -> dict[str, Any]:
+    return mesh.read_recipe(MESHES / "actuated_rod.toml")
+
+
+@pytest.mark.parametrize("path", sorted(MESHES.glob("*.toml")), ids=lambda path: path.stem)
+def test_every_recipe_builds_and_says_where_its_values_come_from(path: Path) -> None:
+    rod = mesh.build(mesh.read_recipe(path))
+    assert rod.sizes["node"] == rod.sizes["cell"] + 1
+    for part in ("shape", "material", "section", "elements"):
+        assert f"{part}: Table 2" in rod.attrs["source"]
+
+
+def test_the_equal_area_square_changes_only_the_mass() -> None:
+    circle, square = (
+        mesh.build(mesh.read_recipe(MESHES / f"{name}.toml"))
+        for name in ("actuated_rod", "actuated_rod_square_inertia")
+    )
+    changed = [name for name in circle.data_vars if not circle[name].equals(square[name])]
+    assert changed == ["inertia_moment"]
+    ratio = (square["inertia_moment"] / circle["inertia_moment"]).values
+    np.testing.assert_allclose(ratio, np.pi / 3.0, rtol=1e-14)
+
+
+def test_section_constants() -> None:
+    # St. Venant constant of the square: 0.140577 side^4 (Timoshenko & Goodier, sec. 109), six printed digits
+    assert section.square(2.0).torsion / 16.0 == pytest.approx(0.140577, abs=5e-7)
+    assert section.circle(2.0).torsion == pytest.approx(section.circle(2.0).polar, rel=1e-15)
+    assert section.circle_shear_coefficient(0.33) == pytest.approx(0.888641425389755, rel=1e-14)
+
+
+def test_a_frame_between_nodes_is_refused_with_the_nearest_nodes(recipe: dict[str, Any]) -> None:
+    recipe["frames"]["at_60mm"]["x"] = "67 mm"
+    with pytest.raises(InputError, match=r"rod\.toml \[frames\.at_60mm\.x\]: 67 mm lies on no node.*60 mm and 80 mm"):
+        mesh.build(recipe, place="rod.toml")
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"elements": 0}, r"\[elements\].*greater than or equal to 1"),
+        ({"section": {"type": "circle", "radius": "10 kg"}}, r"\[section\.radius\].*is a mass, but a length"),
+        ({"section": {"type": "circle", "radius": -0.01}}, r"\[section\.radius\].*greater than 0"),
+        ({"inertia_section": {"type": "hexagon"}}, r"\[inertia_section\].*hexagon"),
+        ({"interfaces": ["bottom", "topp"]}, "interface 'topp' is no frame of the recipe; did you mean 'top'"),
+        ({"interfaces": ["top", "top"]}, "name a frame twice"),
+        ({"frames": {}}, r"\[frames\]"),
+        ({"length": "240 mm"}, r"\[length\]: unknown key"),
+    ],
+)
+def test_mistakes_are_named(recipe: dict[str, Any], change: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        mesh.build(recipe | change)
+    assert caught.value.exit_code == 2
+
+
+def test_all_mistakes_are_named_at_once(recipe: dict[str, Any]) -> None:
+    del recipe["material"]["density"]
+    with pytest.raises(InputError, match=r"(?s)\[elements\].*\[material\.density\]: is missing"):
+        mesh.build(recipe | {"elements": -3})
+
+
+def test_a_file_that_is_not_there_is_an_input_error() -> None:
+    with pytest.raises(InputError, match="no such file"):
+        mesh.read_recipe(MESHES / "actuated_rot.toml")
+
+
+def test_raw_and_read_recipes_give_the_same_mesh(recipe: dict[str, Any]) -> None:
+    """Text with units and SI numbers are the same recipe."""
+    text = {**recipe, "shape": {"type": "straight-beam", "length": "24 cm", "source": "Table 2"}}
+    xr.testing.assert_identical(mesh.build(text), mesh.build(recipe))
+
+
+def test_other_programs_read_the_mesh(recipe: dict[str, Any], tmp_path: Path) -> None:
+    rod = mesh.build(recipe)
+    mesh.write_vtu(rod, tmp_path / "rod.vtu")
+    read = meshio.read(tmp_path / "rod.vtu")
+    np.testing.assert_array_equal(read.points, rod["node_position"])
+    np.testing.assert_array_equal(read.cells_dict["line"], rod["cell"])
+    np.testing.assert_array_equal(read.cell_data["area"][0], rod["area"])
+
+
+def test_artifacts_survive_a_file(recipe: dict[str, Any], tmp_path: Path) -> None:
+    rod = mesh.build(recipe)
+    modes = solve(rod, "free-free", 7)
+    for name, data in {"mesh": rod, "modes": modes, "bundle": bundle.build(rod, modes)}.items():
+        path = tmp_path / f"{name}.nc"
+        data.to_netcdf(path)
+        with xr.open_dataset(path) as read:
+            xr.testing.assert_identical(read.load(), data)

@@ -1,0 +1,169 @@
+"""What post derives from runs: angles, deviations, horizons, impacts, sections, spectra."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.core.algebra import quaternion_product, rotation_vector_to_quaternion
+from pipeline.post import derive
+from pipeline.post.errors import common_times, ensemble_deviations, max_deviation
+from pipeline.post.horizon import horizon, spread
+from pipeline.post.poincare import at_times, strobe_times
+from pipeline.post.rotations import angle_about_y, rotation_between
+from pipeline.post.spectra import amplitude_spectrum, dominant_frequency
+from tests.paper import synthetic
+
+angles = st.floats(-1.5, 1.5)
+vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
+
+
+@given(angles)
+def test_angle_about_y_is_the_angle_of_a_rotation_about_y(angle):
+    q = rotation_vector_to_quaternion(np.array([0.0, angle, 0.0]))
+    # asin loses digits as the square of the distance to 90 degrees: 1/cos(1.5) = 14
+    assert angle_about_y(q) == pytest.approx(angle, abs=1e-14)
+
+
+@given(vectors, vectors, vectors)
+def test_rotation_between_two_poses_does_not_depend_on_the_world(a, b, world):
+    qa, qb, qw = (rotation_vector_to_quaternion(v) for v in (a, b, world))
+    turned = rotation_between(quaternion_product(qw, qa), quaternion_product(qw, qb))
+    assert turned == pytest.approx(rotation_between(qa, qb), abs=1e-12)  # products of three unit quaternions
+
+
+@given(st.floats(1e-12, 3.1), vectors)
+def test_rotation_between_is_accurate_for_tiny_angles(angle, axis):
+    axis = axis / np.linalg.norm(axis) if np.linalg.norm(axis) > 1e-3 else np.array([1.0, 0.0, 0.0])
+    base = rotation_vector_to_quaternion(np.array([0.3, -0.2, 0.5]))
+    turned = quaternion_product(base, rotation_vector_to_quaternion(angle * axis))
+    assert rotation_between(base, turned) == pytest.approx(angle, rel=1e-6, abs=1e-15)
+    assert rotation_between(base, -turned) == pytest.approx(rotation_between(base, turned), abs=1e-15)
+
+
+def test_a_run_does_not_deviate_from_itself():
+    run = synthetic.run()
+    found = max_deviation(run, run, "platform")
+    assert (found.angle, found.rotation, found.displacement, found.velocity) == (0.0, 0.0, 0.0, 0.0)
+
+
+def test_deviation_is_taken_at_common_times_only():
+    a, b = synthetic.run(), synthetic.run("sps4/csj", clearance=True, noise=1e-4)
+    assert b.sizes["time"] > a.sizes["time"]
+    i, j = common_times(a.time.values, b.time.values)
+    assert i.size == a.sizes["time"]
+    np.testing.assert_allclose(a.time.values[i], b.time.values[j], atol=1e-9)  # a nanosecond: the rounding
+    # the wobble is a sine of 300 Hz sampled every 0.1 ms: its top is missed by at most 0.1 %
+    assert max_deviation(b, a, "platform").displacement == pytest.approx(1e-4, rel=2e-3)
+
+
+def test_deviation_stops_at_the_given_time():
+    a, b = synthetic.run(), synthetic.run(noise=1e-4)
+    early, late = max_deviation(b, a, "platform", until=0.01), max_deviation(b, a, "platform")
+    assert early.until == pytest.approx(0.01, abs=1e-9)
+    assert early.displacement < 0.6 * late.displacement  # the wobble grows linearly over the first 20 ms
+
+
+def test_runs_without_common_times_are_refused():
+    run = synthetic.run()
+    with pytest.raises(ValueError, match="no output time in common"):
+        max_deviation(run, run.assign_coords(time=run.time + 3e-5), "platform")
+
+
+def test_horizon_is_where_members_part():
+    run = synthetic.run("sps4/csj", clearance=True)
+    found = synthetic.ensemble(run, growth=60.0)
+    time, velocity = found.time.values, found.velocity.values
+    end = horizon(time, velocity)
+    peak = np.linalg.norm(velocity, axis=-1).max()
+    at = int(np.searchsorted(time, end - 1e-12))
+    assert spread(velocity)[at] > 1e-3 * peak
+    assert (spread(velocity)[:at] <= 1e-3 * peak).all()
+
+
+def test_horizon_of_members_that_stay_together_is_the_end():
+    run = synthetic.run("sps4/csj", clearance=True)
+    assert (
+        horizon(*(synthetic.ensemble(run, growth=0.0)[name].values for name in ("time", "velocity")))
+        == run.time.values[-1]
+    )
+
+
+def test_faster_growth_shortens_the_horizon():
+    run = synthetic.run("sps4/csj", clearance=True)
+    ends = [float(derive(run, synthetic.ensemble(run, growth=g)).horizon) for g in (0.0, 40.0, 60.0, 90.0)]
+    assert ends == sorted(ends, reverse=True)
+    assert len(set(ends)) == 4
+
+
+def test_ensemble_deviation_of_one_member_is_that_of_its_run():
+    run, ideal = synthetic.run("sps4/csj", clearance=True, noise=1e-4), synthetic.run()
+    same = synthetic.ensemble(run, members=3, growth=0.0)
+    middle = ensemble_deviations(same, ideal, "platform")[1]  # the middle member is the run itself
+    assert middle.velocity == max_deviation(run, ideal, "platform").velocity
+
+
+def test_scene_without_contact_gets_no_contact_series():
+    post = derive(synthetic.run())
+    assert not [name for name in post.data_vars if str(name).startswith(("impact", "contact", "clearance", "eccentr"))]
+    assert float(post.horizon) == synthetic.END
+
+
+def test_contact_force_is_the_reaction_of_a_joint_with_clearance():
+    run = synthetic.run("sps4/csj", clearance=True)
+    post = derive(run)
+    force = np.linalg.norm(run.contact_force.sel(contact="A1").values, axis=-1)
+    np.testing.assert_array_equal(post.reaction.sel(joint="A1").values, force)
+    np.testing.assert_array_equal(
+        post.reaction.sel(joint="A2").values, np.linalg.norm(run.joint_force.sel(joint="A2").values, axis=-1)
+    )
+
+
+def test_impacts_are_closings_paired_with_their_openings():
+    post = derive(synthetic.run("sps4/csj", clearance=True))
+    assert post.sizes["impact"] == synthetic.BURSTS.size == int(post.impact_count[0])
+    np.testing.assert_allclose(post.impact_duration.values, synthetic.BURST_LENGTH, rtol=1e-9)
+    assert set(post.impact_separation_speed.values) == {0.18}
+    assert float(post.clearance[0]) == pytest.approx(0.5e-3, rel=1e-12)
+
+
+def test_slow_closings_are_no_impacts():
+    run = synthetic.run("sps4/csj", clearance=True)
+    speed = run.event_approach_speed.values.copy()
+    speed[0] = 0.9e-4  # just below the threshold of 1e-4 m/s
+    post = derive(run.assign(event_approach_speed=("event", speed)))
+    assert post.sizes["impact"] == synthetic.BURSTS.size - 1
+
+
+def test_an_impact_that_has_not_ended_is_counted_but_not_listed():
+    run = synthetic.run("sps4/csj", clearance=True).isel(event=slice(0, -1))
+    post = derive(run)
+    assert int(post.impact_count[0]) == synthetic.BURSTS.size
+    assert post.sizes["impact"] == synthetic.BURSTS.size - 1
+
+
+def test_sections_are_never_interpolated():
+    time = np.array([0.0, 0.1, 0.2, 0.3])
+    (found,) = at_times(time, np.array([0.1, 0.15, 0.3]), 10.0 * time)
+    np.testing.assert_allclose(found, [1.0, 3.0])
+
+
+def test_strobe_leaves_the_transient_out():
+    np.testing.assert_allclose(strobe_times(0.0, 1.0, 0.2, transient=2), [0.4, 0.6, 0.8, 1.0])
+    assert strobe_times(0.0, 0.18, 0.18, transient=5).size == 0
+
+
+def test_amplitude_of_a_sine_on_a_bin():
+    time = np.arange(0.0, 0.2, 1e-4)
+    frequency, amplitude = amplitude_spectrum(time, 3.0 + 2.0 * np.sin(2 * np.pi * 250.0 * time), 1e-4)
+    k = int(np.argmin(np.abs(frequency - 250.0)))
+    assert frequency[k] == pytest.approx(250.0, rel=1e-12)
+    assert amplitude[k] == pytest.approx(2.0, rel=1e-9)  # Hann is exact on a bin; the rest is rounding
+    assert dominant_frequency(time, np.sin(2 * np.pi * 250.0 * time), 1e-4) == pytest.approx(250.0, rel=1e-12)
+
+
+def test_too_short_a_series_has_no_spectrum():
+    with pytest.raises(ValueError, match="too few"):
+        amplitude_spectrum(np.arange(5.0), np.zeros(5), 1.0)

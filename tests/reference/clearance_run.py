@@ -1,0 +1,174 @@
+"""From contact to contact: runs with one clearance joint, events located, nothing shared with the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.integrate import DOP853, OdeSolution
+from scipy.optimize import brentq, minimize_scalar
+
+from tests.reference.clearance_contact import Touch
+from tests.reference.clearance_platform import GRID
+from tests.reference.ideal_motion import Motion
+
+Array = np.ndarray
+RightHandSide = Callable[[float, Array], Array]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A mechanism as functions of time, side of a drive break, state, and latched impact rate (None in flight)."""
+
+    start: Array
+    rhs: Callable[[int, float | None], RightHandSide]
+    touch: Callable[[float, int, Array, float | None], Touch]
+    platform: Callable[[float, int, Array], Motion]
+    floor: float
+
+
+@dataclass(frozen=True)
+class Impact:
+    """A contact: times [s], approach and separation speed [m/s], largest normal force [N] and depth [m].
+
+    One that is still open at the end of the run has neither end nor separation (nan).
+    """
+
+    start: float
+    end: float
+    approach: float
+    separation: float
+    peak_force: float
+    depth: float
+
+
+@dataclass(frozen=True)
+class Result:
+    """States on the output grid, shape (time, n), the platform's motion there, and all contacts."""
+
+    time: Array
+    state: Array
+    platform: list[Motion]
+    impacts: list[Impact]
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """Relative and absolute tolerance; longest step in flight and in contact [s]."""
+
+    rtol: float = 1e-11
+    atol: float = 1e-15
+    flight: float = 1e-4
+    contact: float = 2e-5
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Motion between two events: its end, whether the gap changed sign there, and a way to ask for states."""
+
+    start: float
+    end: float
+    state: Array
+    event: bool
+    states: OdeSolution
+    evaluations: int
+
+
+def advance(rhs: RightHandSide, t: float, y: Array, end: float, tol: Tolerance) -> Array:
+    """State at `end` from (t, y), no events watched."""
+    if end <= t:
+        return y
+    solver = DOP853(rhs, t, y, end, rtol=tol.rtol, atol=tol.atol, first_step=end - t)
+    while solver.status == "running":
+        solver.step()
+    return solver.y
+
+
+def integrate(
+    m: Mechanism, t: float, y: Array, end: float, side: int, latched: float | None, tol: Tolerance
+) -> Stretch:
+    """Integrate until the gap changes sign or `end` is reached."""
+    rhs = m.rhs(side, latched)
+    longest = tol.flight if latched is None else tol.contact
+    solver = DOP853(rhs, t, y, end, rtol=tol.rtol, atol=tol.atol, max_step=longest, first_step=min(1e-7, end - t))
+    away = 1.0 if latched is None else -1.0
+    times, pieces = [t], []
+    while solver.status == "running":
+        before, y_before = solver.t, solver.y.copy()
+        solver.step()
+        pieces.append(solver.dense_output())
+        times.append(solver.t)
+        # the first step leaves the event itself, where the sign is that of rounding
+        if len(pieces) > 1 and away * m.touch(solver.t, side, solver.y, None).gap < 0.0:
+            dense = pieces[-1]
+
+            def gap(x: float, f: Callable[[float], Array] = dense) -> float:
+                return m.touch(x, side, f(x), None).gap
+
+            times[-1] = brentq(gap, before, solver.t, xtol=1e-17, rtol=1e-15)
+            y = advance(rhs, before, y_before, times[-1], tol)
+            return Stretch(t, times[-1], y, True, OdeSolution(times, pieces), solver.nfev)
+    return Stretch(t, end, solver.y, False, OdeSolution(times, pieces), solver.nfev)
+
+
+def largest(f: Callable[[float], float], times: Array) -> float:
+    """Maximum of a smooth function that has one hump near its largest sample."""
+    k = int(np.argmax([f(t) for t in times]))
+    bounds = (times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)])
+    # a maximum is flat: 1e-4 of the bracket in time is 1e-8 of the height
+    options = {"xatol": 1e-4 * (bounds[1] - bounds[0])}
+    return float(-minimize_scalar(lambda t: -f(t), bounds=bounds, method="bounded", options=options).fun)
+
+
+def with_peak(m: Mechanism, impact: Impact, piece: Stretch, side: int, latched: float) -> Impact:
+    """The impact with the largest force and depth of one more stretch of contact."""
+
+    def at(t: float) -> Touch:
+        return m.touch(t, side, piece.states(t), latched)
+
+    times = np.linspace(piece.start, piece.end, 40)
+    force, depth = largest(lambda t: at(t).normal, times), largest(lambda t: -at(t).gap, times)
+    return replace(impact, peak_force=max(impact.peak_force, force), depth=max(impact.depth, depth))
+
+
+def simulate(m: Mechanism, until: float = 0.18, tol: Tolerance | None = None) -> Result:
+    """Run from the start to `until` [s] <= 0.18."""
+    tol = tol or Tolerance()
+    y, t, latched = m.start, 0.0, None
+    samples: list[tuple[float, Array]] = [(0.0, y)]
+    impacts: list[Impact] = []
+    evaluations = 0
+    while t < until:
+        # right-hand values at 0, left-hand ones at 0.18 s; at 0.09 s only the jerk differs
+        side = 1 if t < 0.09 else -1
+        piece = integrate(m, t, y, min(until, 0.09 if t < 0.09 else 0.18), side, latched, tol)
+        evaluations += piece.evaluations
+        grid = [k * GRID for k in range(int(t / GRID + 1e-6) + 1, int(piece.end / GRID + 1e-6) + 1)]
+        samples += [(x, piece.states(x)) for x in grid]
+        if latched is not None:
+            impacts[-1] = with_peak(m, impacts[-1], piece, side, latched)
+        t, y = piece.end, piece.state
+        if not piece.event:
+            continue
+        rate = m.touch(t, side, y, None).rate
+        if latched is None:
+            latched = max(rate, m.floor)
+            impacts.append(Impact(t, np.nan, rate, np.nan, 0.0, 0.0))
+        else:
+            impacts[-1] = replace(impacts[-1], end=t, separation=-rate)
+            latched = None
+    time, state = np.array([x for x, _ in samples]), np.array([y for _, y in samples])
+    platform = [m.platform(x, 1 if x < 0.18 else -1, y) for x, y in samples]
+    return Result(time, state, platform, impacts, evaluations)
+
+
+def table(result: Result, every: int = 10) -> dict[str, list[float]]:
+    """The numbers kept for comparison: the impacts, and the platform on each `every`-th grid point."""
+    columns = {f"impact_{name}": [getattr(i, name) for i in result.impacts] for name in Impact.__dataclass_fields__}
+    columns["time"] = result.time[::every].tolist()
+    for name in ("height", "speed", "tilt"):
+        columns[name] = [float(getattr(m, name)) for m in result.platform[::every]]
+    columns["rotation"] = [m.rotation.ravel().tolist() for m in result.platform[::every]]
+    return columns

@@ -1,0 +1,134 @@
+r"""What a free impact, a bounce and a ball in its socket must do, in closed form or in one dimension.
+
+Free impact of a mass m: :math:`m\ddot\delta = -K\delta^n(1 + a\dot\delta/\dot\delta_0)`.  With
+:math:`w=\dot\delta/\dot\delta_0` the depth separates from the speed, so that the rebound
+:math:`w = -e` obeys :math:`\ln[(1+a)/(1-ae)] = a(1+e)` for every K, n, m and speed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+from scipy.special import beta, ellipk
+
+
+def hysteresis(restitution: float) -> float:
+    """Factor a of Lankarani and Nikravesh for a wanted coefficient of restitution (Wang & Wang 2019, eq. 25)."""
+    return 0.75 * (1.0 - restitution**2)
+
+
+def delivered_restitution(a: float) -> float:
+    """Rebound over approach speed that the law gives a free impact; 1 for a = 0."""
+    if a == 0.0:
+        return 1.0
+
+    def defect(e: float) -> float:
+        return math.log1p(a) - math.log1p(-a * e) - a * (1.0 + e)
+
+    return float(brentq(defect, 1e-12, min(1.0, (1.0 - 1e-15) / a), xtol=1e-15))
+
+
+def largest_depth(mass: float, speed: float, stiffness: float, a: float, exponent: float = 1.5) -> float:
+    r"""Largest penetration [m] of a free impact.
+
+    :math:`\delta^{n+1} = (n+1)\,(m v^2/K)\,[1/a - \ln(1+a)/a^2]`, and half of it for a = 0.
+    """
+    share = 0.5 if a == 0.0 else 1.0 / a - math.log1p(a) / a**2
+    return float(((exponent + 1.0) * mass * speed**2 / stiffness * share) ** (1.0 / (exponent + 1.0)))
+
+
+def hertz_time(mass: float, speed: float, stiffness: float, exponent: float = 1.5) -> float:
+    r"""Duration [s] of a lossless impact.
+
+    :math:`2(\delta/v)\int_0^1(1-x^{n+1})^{-1/2}dx = 2(\delta/v)\,B(\tfrac1{n+1},\tfrac12)/(n+1)`.
+    """
+    depth = largest_depth(mass, speed, stiffness, 0.0, exponent)
+    power = exponent + 1.0
+    return float(2.0 * depth / speed * beta(1.0 / power, 0.5) / power)
+
+
+@dataclass(frozen=True)
+class Bounce:
+    """One contact of a falling ball: times [s], speeds [m/s], largest depth [m]."""
+
+    start: float
+    end: float
+    approach: float
+    separation: float
+    depth: float
+
+
+def bounces(
+    mass: float, stiffness: float, restitution: float, gravity: float, height: float, until: float
+) -> list[Bounce]:
+    """A ball let go at `height` above a Lankarani-Nikravesh floor; gravity acts during the contacts too."""
+    a, found = hysteresis(restitution), []
+    t, speed = math.sqrt(2.0 * height / gravity), math.sqrt(2.0 * gravity * height)
+    while t < until:
+        approach = speed
+
+        def rhs(_: float, y: np.ndarray, v0: float = approach) -> list[float]:
+            depth = max(0.0, y[0])
+            return [y[1], gravity - stiffness * depth**1.5 * max(0.0, 1.0 + a * y[1] / v0) / mass]
+
+        def left(_: float, y: np.ndarray) -> float:
+            return y[0]
+
+        def turned(_: float, y: np.ndarray) -> float:
+            return y[1]
+
+        left.terminal, left.direction, turned.direction = True, -1.0, -1.0  # type: ignore[attr-defined]
+        longest = 10.0 * hertz_time(mass, approach, stiffness)
+        tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-16, "max_step": longest / 1000.0}
+        run = solve_ivp(rhs, (0.0, longest), [0.0, approach], events=(left, turned), **tight)
+        speed = -float(run.y[1, -1])
+        found.append(Bounce(t, t + float(run.t[-1]), approach, speed, float(run.y_events[1][0][0])))
+        t += float(run.t[-1]) + 2.0 * speed / gravity
+    return found
+
+
+def resting_depth(mass: float, stiffness: float, gravity: float, exponent: float = 1.5) -> float:
+    """Penetration [m] of a ball resting under its weight."""
+    return float((mass * gravity / stiffness) ** (1.0 / exponent))
+
+
+def vertical_frequency(mass: float, stiffness: float, gravity: float, exponent: float = 1.5) -> float:
+    """Frequency [Hz] of small vertical vibrations about rest: contact stiffness n K d^(n-1)."""
+    depth = resting_depth(mass, stiffness, gravity, exponent)
+    return math.sqrt(exponent * stiffness * depth ** (exponent - 1.0) / mass) / (2.0 * math.pi)
+
+
+def lateral_frequency(clearance: float, depth: float, gravity: float) -> float:
+    """Frequency [Hz] of small swings on the floor of a smooth socket: a pendulum of length clearance + depth."""
+    return math.sqrt(gravity / (clearance + depth)) / (2.0 * math.pi)
+
+
+def swing_period(clearance: float, depth: float, gravity: float, amplitude: float) -> float:
+    """Period [s] of a swing of any amplitude [rad] on a smooth floor so stiff that `depth` hardly changes."""
+    return float(4.0 * math.sqrt((clearance + depth) / gravity) * ellipk(math.sin(amplitude / 2.0) ** 2))
+
+
+@dataclass(frozen=True)
+class Conical:
+    """Steady circling on the socket's floor: depth [m], rate [rad/s], radius and height [m], speed [m/s], force [N]."""
+
+    depth: float
+    rate: float
+    radius: float
+    height: float
+    speed: float
+    force: float
+
+
+def conical(mass: float, stiffness: float, clearance: float, gravity: float, half_angle: float) -> Conical:
+    """A ball circling at a constant angle [rad] from the vertical without friction."""
+    force = mass * gravity / math.cos(half_angle)
+    depth = (force / stiffness) ** (2.0 / 3.0)
+    reach = clearance + depth
+    rate = math.sqrt(gravity / (reach * math.cos(half_angle)))
+    radius = reach * math.sin(half_angle)
+    return Conical(depth, rate, radius, -reach * math.cos(half_angle), rate * radius, force)

@@ -1,0 +1,164 @@
+"""A copy of the project with small engines in place of the real ones, to watch the workflow at work.
+
+The copy's `simulate` and `derive` write little datasets, and log each call to a file.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ENGINE = """
+import os, time
+from pathlib import Path
+import numpy as np
+import xarray as xr
+from pipeline.core.errors import SolverError
+from pipeline.core.scene.schema import Scene
+
+def log(text):
+    with open(os.environ["CALLS"], "a") as file:
+        file.write(text + "\\n")
+
+def simulate(scene, bundles, progress):
+    log(f"simulate {scene.name}")
+    progress(0.5, "half way")
+    if "fails" in scene.name:
+        raise SolverError("at t = 0.1 s joint A1: no step is small enough")
+    time.sleep(float(os.environ.get("SECONDS", "0")))
+    time_axis = np.arange(5) * scene.output.interval
+    names = ["a", "platform"]
+    data = {"position": (("time", "body"), np.outer(time_axis, [1.0, 2.0]))}
+    attributes = {"scene": scene.name, "parameters": scene.model_dump_json()}
+    return xr.Dataset(data, coords={"time": time_axis, "body": names}, attrs=attributes)
+
+def ensemble(scene, bundles, progress):
+    log(f"ensemble {scene.name}")
+    return xr.Dataset({"position": (("member",), np.zeros(scene.ensemble.members))})
+"""
+
+POST = """
+from pipeline.dynamics import log
+
+def derive(run, ensemble):
+    log(f"post {run.attrs['scene']}")
+    return run.mean("time")
+"""
+
+SCENE = """
+title = "Ball in a socket"
+[time]
+end = "1 s"
+[output]
+interval = "0.1 ms"
+[body.ground]
+type = "ground"
+frames.S = {}
+[body.ball]
+type = "rigid"
+mass = "1 kg"
+inertia = [1.0, 1.0, 1.0]
+pose = {}
+frames.B = {}
+"""
+
+JOINT = """
+[joint.J]
+type = "spherical"
+between = ["ground.S", "ball.B"]
+"""
+
+CONTACT = """
+extends = "ideal.toml"
+title = "Ball in a socket, with clearance"
+[replace.joint.J]
+type = "clearance-spherical"
+between = ["ground.S", "ball.B"]
+clearance = "0.5 mm"
+ball_radius = "20 mm"
+normal = { law = "lankarani-nikravesh", restitution = 0.9, stiffness = 1e11 }
+"""
+
+
+@dataclass(frozen=True)
+class Project:
+    """The copy: its folder, its results, and the calls that its engines logged."""
+
+    folder: Path
+
+    @property
+    def results(self) -> Path:
+        return self.folder / "results"
+
+    def environment(self, **more: str) -> dict[str, str]:
+        kept = {name: value for name, value in os.environ.items() if name != "FLEXCLEAR_RESULTS"}
+        return {**kept, "CALLS": str(self.folder / "calls"), "PYTHONWARNINGS": "ignore", **more}
+
+    def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+        """The command, running."""
+        return subprocess.Popen(
+            [sys.executable, "-m", "stages", *arguments],
+            cwd=self.folder,
+            env=self.environment(**environment),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        """The command, done."""
+        with self.start(*arguments, **environment) as process:
+            out, err = process.communicate(timeout=120)
+        return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+    def calls(self) -> list[str]:
+        """What the engines did since this was asked last."""
+        path = self.folder / "calls"
+        lines = path.read_text().splitlines() if path.exists() else []
+        path.unlink(missing_ok=True)
+        return lines
+
+    def edit(self, file: str, old: str, new: str) -> None:
+        path = self.folder / file
+        text = path.read_text()
+        assert old in text
+        path.write_text(text.replace(old, new))
+
+    def artifact(self, stage: str) -> Path:
+        """The only dataset of a stage in the cache."""
+        (path,) = (self.results / "cache" / stage).glob("*.nc")
+        return path
+
+
+@pytest.fixture
+def project(tmp_path: Path, root: Path) -> Project:
+    """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
+    folder = tmp_path / "project"
+    folder.mkdir()
+    for name in ("pipeline", "stages"):
+        shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(root / "pyproject.toml", folder)
+    (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)
+    (folder / "pipeline" / "post" / "__init__.py").write_text(POST)
+    scenes = folder / "scenes" / "tiny"
+    scenes.mkdir(parents=True)
+    (scenes / "ideal.toml").write_text(SCENE + JOINT)
+    (scenes / "contact.toml").write_text(CONTACT)
+    return Project(folder)
+
+
+@pytest.fixture
+def add_scene(project: Project) -> Callable[[str, str], None]:
+    """Write one more scene of the family tiny."""
+
+    def add(name: str, text: str) -> None:
+        (project.folder / "scenes" / "tiny" / f"{name}.toml").write_text(text)
+
+    return add

@@ -1,0 +1,154 @@
+"""What the command says to a user who made a mistake: place, value, rule, remedy, and the exit code."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from stages.__main__ import main, parser
+from stages.graph import STAGES
+from tests.stages.conftest import CONTACT, JOINT, SCENE
+
+Said = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Said:
+    """Run the command here; exit code, stdout, stderr."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        try:
+            code = main(list(arguments))
+        except SystemExit as end:
+            code = int(end.code or 0)
+        told = capsys.readouterr()
+        return code, told.out, told.err
+
+    return run
+
+
+ROD = """
+[body.rod]
+type = "flexible"
+mesh = "rod.toml"
+modes = { reference = "free-free", count = 7 }
+"""
+
+WRONG = {
+    "unknown key": (SCENE + JOINT + "\n[body.ball.colour]\nred = 1\n", ["body.ball", "colour", "unknown key"]),
+    "unit of another dimension": (
+        SCENE.replace('"1 kg"', '"1 mm"') + JOINT,
+        ["body.ball", "mass", "'1 mm' is a length"],
+    ),
+    "unknown unit": (SCENE.replace('"1 kg"', '"1 lb"') + JOINT, ["unknown unit 'lb'", "kg"]),
+    "negative mass": (SCENE.replace('"1 kg"', "-1") + JOINT, ["body.ball", "mass", "greater than 0"]),
+    "not TOML": ("title = \n", ["is not TOML", "line 1"]),
+    "no body": ('title = "a"\n[time]\nend = 1\n', ["body", "is missing"]),
+    "extends nothing": (
+        'extends = "idea.toml"\ntitle = "a"\n',
+        ["idea.toml", "no such file", "did you mean 'ideal.toml'"],
+    ),
+    "extends itself": ('extends = "scene.toml"\ntitle = "a"\n', ["extends itself", "break the circle"]),
+    "replaces nothing": (
+        'extends = "ideal.toml"\ntitle = "a"\n[replace.joint.K]\ntype = "fixed"\n',
+        ["replace.joint.K", "no joint called 'K'"],
+    ),
+    "unknown law": (
+        CONTACT.replace("lankarani-nikravesh", "lankarani"),
+        ["joint.J.normal", "did you mean 'lankarani-nikravesh'"],
+    ),
+    "unknown integrator": (
+        SCENE + JOINT + '\n[solver]\nintegrator = "rk4"\n',
+        ["[solver]", "no integrator is called 'rk4'"],
+    ),
+    "no such recipe": (
+        SCENE + ROD,
+        ["rod.toml", "no such file"],
+    ),
+    "unknown reference condition": (
+        SCENE + ROD.replace("rod.toml", "{root}/meshes/actuated_rod.toml").replace("free-free", "fre"),
+        ["body.rod.modes", "fre", "free-free"],
+    ),
+}
+
+
+@pytest.mark.parametrize("verb", ["run", "why"])
+@pytest.mark.parametrize("text, told", WRONG.values(), ids=WRONG.keys())
+def test_wrong_scenes_are_refused_before_anything_runs(
+    command: Said, tmp_path: Path, root: Path, verb: str, text: str, told: list[str]
+):
+    (tmp_path / "ideal.toml").write_text(SCENE + JOINT)
+    path = tmp_path / "scene.toml"
+    path.write_text(text.replace("{root}", str(root)))
+    code, out, err = command(verb, str(path))
+    assert code == 2
+    assert out == ""
+    assert err.startswith("flexclear: ")
+    assert "Traceback" not in err
+    for part in told:
+        assert part in err
+
+
+def test_all_mistakes_of_all_scenes_are_told_at_once(command: Said, tmp_path: Path):
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.toml").write_text(SCENE.replace('"1 kg"', "-1").replace('"1 s"', '"1 kg"') + JOINT)
+    code, _, err = command("run", str(tmp_path / "one.toml"), str(tmp_path / "two.toml"), "sps4/nothing")
+    assert code == 2
+    assert err.count("one.toml [body.ball.mass]") == err.count("two.toml [time.end]") == 1
+    assert "sps4/nothing" in err
+
+
+@pytest.mark.parametrize(
+    "name, told", [("sps4/csk", "did you mean 'sps4/csj'"), ("nowhere/a.toml", "no such file"), (".", "is neither")]
+)
+def test_scenes_that_are_not_there(command: Said, name: str, told: str):
+    code, _, err = command("run", name)
+    assert code == 2
+    assert told in err
+
+
+def test_scenes_are_named_by_file_or_by_name(command: Said, root: Path):
+    by_name, by_file = command("why", "sps4/ideal"), command("why", str(root / "scenes" / "sps4" / "ideal.toml"))
+    assert by_name == by_file
+    assert by_name[1].splitlines()[0] == "sps4/ideal"
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "sps4/ideal", "--to", "moon"]])
+def test_usage_mistakes_end_with_2(command: Said, arguments: list[str]):
+    code, _, err = command(*arguments)
+    assert code == 2
+    assert "usage: flexclear" in err
+
+
+def test_help_names_every_stage(command: Said):
+    code, out, _ = command("run", "--help")
+    assert code == 0
+    assert all(stage in out for stage in STAGES)
+    assert parser().prog == "flexclear"
+
+
+def test_schema_is_json_and_knows_the_parts(command: Said):
+    code, out, _ = command("schema")
+    assert code == 0
+    assert {"body", "joint", "drive", "load", "time"} <= json.loads(out)["properties"].keys()
+
+
+def test_cite_names_methods_that_are_used_and_no_others(command: Said):
+    _, contact, _ = command("cite", "sps4/csj")
+    _, ideal, _ = command("cite", "sps4/ideal")
+    assert "Lankarani & Nikravesh (1990)" in contact
+    assert "Lankarani" not in ideal
+    assert "Hairer" in ideal
+    assert "Table 1" in ideal
+
+
+def test_report_lists_only_commands_that_do_something(command: Said):
+    """Each verb of the help has its own help, and a function behind it."""
+    _, out, _ = command("--help")
+    verbs = [line.split()[0] for line in out.splitlines() if line.startswith("    ") and line.split()[0].isalpha()]
+    assert {"run", "why", "render", "report", "schema", "cite"} <= set(verbs)
+    for verb in verbs:
+        assert command(verb, "--help")[0] == 0

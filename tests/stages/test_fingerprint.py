@@ -1,0 +1,63 @@
+"""The fingerprint is sound: whatever a stage imports while it runs is among the modules of its key."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import STORE, in_order
+from stages.graph import Graph
+
+#: runs one task in a fresh process and prints the own modules that it loaded
+LOADED = """
+import json, sys
+from pathlib import Path
+from importlib import import_module
+root, label, scene, shortened = sys.argv[1], sys.argv[2], sys.argv[3], json.loads(sys.argv[4])
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.execute import execute
+from pipeline.core.artifacts.store import Store
+from pipeline.core.workflow.task import in_order
+from stages.graph import Graph
+store, sources, records = Store(Path(root)), Sources(Path.cwd()), {}
+for task in in_order(Graph(load_scene(scene, shortened), shown=False).up_to("post")):
+    before = {name for name in sys.modules}
+    if task.label == label:
+        for name in list(sys.modules):
+            if name.startswith(("pipeline.structure", "pipeline.dynamics", "pipeline.post")):
+                del sys.modules[name]
+        before = {name for name in sys.modules}
+    inputs = {name: records[id(above)] for name, above in task.inputs.items()}
+    records[id(task)] = execute(task, inputs, store, sources, lambda fraction, text: None)
+    if task.label == label:
+        print(*sorted(name for name in sys.modules.keys() - before if name.split(".")[0] in ("pipeline", "stages")))
+        break
+"""
+
+CASES = [
+    ("sps4/frequencies/fixed_square", "mesh rod"),
+    ("sps4/frequencies/fixed_square", "modes rod"),
+    ("sps4/frequencies/fixed_square", "bundle rod"),
+    pytest.param("sps4/ideal", "simulate", marks=pytest.mark.slow),
+    pytest.param("sps4/csj", "simulate", marks=pytest.mark.slow),
+    pytest.param("sps4/csj", "post", marks=pytest.mark.slow),
+    pytest.param("sps4/far_csj_cb", "simulate", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize("scene, label", CASES)
+def test_every_module_that_runs_is_in_the_key(root: Path, tmp_path: Path, scene: str, label: str):
+    path = root / "scenes" / f"{scene}.toml"
+    command = [sys.executable, "-c", LOADED, str(tmp_path / "results"), label, str(path), '{"time.end": 0.001}']
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    loaded = set(done.stdout.split())
+    (task,) = (task for task in in_order(Graph(load_scene(path)).up_to("post")) if task.label == label)
+    known = Sources(root).closure([task.run.partition(":")[0], STORE, *task.modules]).keys()
+    assert len(loaded) > 2
+    assert loaded <= known

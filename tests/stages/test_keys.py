@@ -1,0 +1,226 @@
+"""What an artifact's key depends on, and what it does not."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.core.artifacts.store import Record
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.execute import key_of
+from pipeline.core.workflow.fingerprint import Sources, imported
+from pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
+from stages import s4_simulate
+from stages.graph import Graph
+
+LEAVES = (
+    st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=4)
+)
+TREES = st.recursive(
+    LEAVES, lambda t: st.lists(t, max_size=3) | st.dictionaries(st.text("ab", max_size=2), t, max_size=3)
+)
+
+
+@given(TREES, TREES)
+def test_different_parameters_have_different_text(one: object, other: object):
+    """Bare lists are compared as text; 1 and 1.0 and true are three different things in a scene."""
+    same = repr(one) == repr(other) or _sorted(one) == _sorted(other)
+    assert (flatten({"p": one}) == flatten({"p": other}) and not same) is False
+
+
+def _sorted(tree: object) -> str:
+    """Text that ignores the order of keys and nothing else."""
+    if isinstance(tree, dict):
+        return "{" + ",".join(f"{k!r}:{_sorted(v)}" for k, v in sorted(tree.items())) + "}"
+    if isinstance(tree, list):
+        return "[" + ",".join(map(_sorted, tree)) + "]"
+    return repr(tree)
+
+
+def test_order_of_keys_does_not_matter():
+    assert sorted(flatten({"a": 1, "b": {"c": 2.5}})) == sorted(flatten({"b": {"c": 2.5}, "a": 1}))
+
+
+def test_floats_keep_every_digit():
+    """The next float up is another parameter."""
+    assert flatten(0.1) != flatten(0.1 + 2**-56)
+
+
+def test_reasons_are_words():
+    old = {"parameter joint.A1.clearance": "0.0005", "module a.b": "1", "input mesh": "2", "library numpy": "2.0"}
+    new = {"parameter joint.A1.clearance": "0.0002", "module a.c": "1", "input mesh": "3", "library numpy": "2.1"}
+    assert reasons(new, old) == [
+        "input mesh changed",
+        "library numpy: 2.0 -> 2.1",
+        "module a.b is no longer used",
+        "module a.c is new",
+        "joint.A1.clearance: 0.0005 -> 0.0002",
+    ]
+    assert reasons(new, None) == ["never run"]
+    assert reasons(old, old) == []
+    assert reasons({}, {"input mesh": "2"}, frozenset({"mesh"})) == []
+
+
+def test_imports_are_found_wherever_they_stand():
+    text = b"""
+import numpy as np
+from pipeline.core import units
+from . import near
+from ..far import thing
+from typing import TYPE_CHECKING
+if TYPE_CHECKING:
+    import pandas
+else:
+    import scipy.sparse
+def f():
+    try:
+        import stages.run
+    except ImportError:
+        match f:
+            case 1:
+                from xarray import Dataset
+"""
+    own, libraries = imported(text, "pipeline.post.module", package=False)
+    assert {"pipeline.core", "pipeline.core.units", "pipeline.post.near", "pipeline.far.thing", "stages.run"} <= own
+    assert libraries == {"numpy", "scipy", "xarray"}
+    own, _ = imported(b"from .near import x", "pipeline.post", package=True)
+    assert own == {"pipeline.post.near", "pipeline.post.near.x"}
+
+
+def test_a_root_that_does_not_exist_is_an_error(root: Path):
+    with pytest.raises(LookupError, match=r"no module stages\.nowhere"):
+        Sources(root).closure(["stages.nowhere"])
+
+
+def graph(root: Path, name: str) -> Graph:
+    return Graph(load_scene(root / "scenes" / f"{name}.toml"))
+
+
+def keys(graph: Graph, sources: Sources) -> dict[str, str]:
+    """Key of each task when every input is as its own key says: no stage is run for that."""
+    found: dict[int, str] = {}
+    for task in in_order(graph.up_to("post")):
+        above = {name: Record(t.stage, found[id(t)], {"nc": found[id(t)]}, {}) for name, t in task.inputs.items()}
+        found[id(task)] = key_of(task, above, sources)
+    return {task.label: found[id(task)] for task in in_order(graph.up_to("post"))}
+
+
+def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
+    assert before.keys() == after.keys()
+    return {label for label in before if before[label] != after[label]}
+
+
+@pytest.fixture
+def copy(root: Path, tmp_path: Path) -> Path:
+    """Source and scenes, to be edited."""
+    for name in ("pipeline", "stages", "scenes", "meshes"):
+        shutil.copytree(root / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def test_clearance_reruns_exactly_the_last_stages_of_that_scene(root: Path):
+    path = root / "scenes" / "sps4" / "far_csj_cb.toml"
+    sources = Sources(root)
+    before = keys(Graph(load_scene(path)), sources)
+    after = keys(Graph(load_scene(path, {"joint.A1.clearance": "0.2 mm"})), sources)
+    assert changed(before, after) == {"simulate", "ensemble", "post"}
+
+
+def test_number_of_modes_does_not_remesh(root: Path):
+    path = root / "scenes" / "sps4" / "far_csj_cb.toml"
+    sources = Sources(root)
+    before = keys(Graph(load_scene(path)), sources)
+    after = keys(Graph(load_scene(path, {"body.rod1.modes.count": 8})), sources)
+    assert changed(before, after) == {"modes rod1", "bundle rod1", "simulate", "ensemble", "post"}
+
+
+def test_members_rerun_only_the_ensemble(root: Path):
+    path = root / "scenes" / "sps4" / "far_csj_cb.toml"
+    sources = Sources(root)
+    before = keys(Graph(load_scene(path)), sources)
+    after = keys(Graph(load_scene(path, {"ensemble.members": 8})), sources)
+    assert changed(before, after) == {"ensemble", "post"}
+
+
+def test_titles_and_places_on_disk_do_not_count(root: Path, copy: Path):
+    scene = copy / "scenes" / "sps4" / "far_cb.toml"
+    text = scene.read_text()
+    scene.write_text(re.sub(r"^title = .*", 'title = "Another title"', text, flags=re.MULTILINE))
+    assert text != scene.read_text()
+    sources = Sources(root)
+    moved = Graph(load_scene(scene))
+    assert str(copy) not in str([facts(task, {}, sources) for task in in_order(moved.up_to("post"))])
+    before = keys(graph(root, "sps4/far_cb"), sources)
+    assert changed(before, keys(moved, sources)) == set()
+
+
+def test_content_of_the_recipe_counts(root: Path, copy: Path):
+    recipe = copy / "meshes" / "actuated_rod.toml"
+    recipe.write_text(recipe.read_text().replace("elements = 12", "elements = 24"))
+    sources = Sources(root)
+    before, after = keys(graph(root, "sps4/far_cb"), sources), keys(graph(copy, "sps4/far_cb"), sources)
+    assert "mesh rod1" in changed(before, after)
+
+
+@pytest.mark.parametrize(
+    "module, scenes",
+    [
+        ("dynamics/contact/friction/modified_coulomb.py", {"sps4/csj"}),
+        ("dynamics/contact/normal/lankarani_nikravesh.py", {"sps4/csj"}),
+        ("dynamics/joints/prismatic.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
+        ("structure/modes/reference/craig_bampton.py", {"sps4/far_cb"}),
+        ("dynamics/loads/gravity.py", set()),
+        ("post/figures/fig11.py", set()),
+    ],
+)
+def test_editing_a_module_reruns_only_scenes_that_reach_it(root: Path, copy: Path, module: str, scenes: set[str]):
+    before = {name: keys(graph(root, name), Sources(root)) for name in ("sps4/ideal", "sps4/csj", "sps4/far_cb")}
+    path = copy / "pipeline" / module
+    path.write_text(path.read_text() + "\n# one more line\n")
+    after = {name: keys(graph(root, name), Sources(copy)) for name in before}
+    assert {name for name in before if changed(before[name], after[name])} == scenes
+
+
+def test_the_memo_of_imports_notices_edits(copy: Path):
+    """Closures with and without the memo are the same before and after an edit."""
+    memo = copy / "imports.json"
+    roots = ["stages.s4_simulate"]
+    assert Sources(copy, memo).closure(roots) == Sources(copy).closure(roots)
+    assert memo.is_file()
+    path = copy / "stages" / "s4_simulate.py"
+    path.write_text(path.read_text() + "\nimport pipeline.core.algebra\nimport wave\nimport meshio\n")
+    edited = Sources(copy, memo).closure(roots)
+    assert edited == Sources(copy).closure(roots)
+    assert "meshio" in edited["stages.s4_simulate"].libraries
+    memo.write_text("{ not json")
+    assert Sources(copy, memo).closure(roots) == edited
+
+
+def test_library_versions_count(root: Path):
+    task = Task("s", "scene", "stages.s3_bundle:run", {}, "")
+    found = facts(task, {}, Sources(root))
+    assert {"library numpy", "library scikit-fem", "library skfem", "library xarray"} & found.keys() >= {
+        "library numpy",
+        "library skfem",
+        "library xarray",
+    }
+    assert re.match(r"\d+\.\d+", found["library skfem"])
+    assert key(found) != key({**found, "library skfem": "0.0"})
+
+
+def test_a_scene_survives_the_way_through_its_parameters(root: Path):
+    """What the engine is given says the same as the file, apart from what is left out on purpose."""
+    for path in sorted((root / "scenes").rglob("*.toml")):
+        scene = load_scene(path)
+        again = s4_simulate.rebuild(s4_simulate.params(scene, ensemble=True))
+        assert again.name == scene.name
+        left_out = {"title", "description", "accuracy"}
+        one, other = scene.model_dump(exclude=left_out), again.model_dump(exclude=left_out)
+        for body in scene.flexible():
+            one["body"][body]["mesh"] = other["body"][body]["mesh"] = ""
+        assert one == other

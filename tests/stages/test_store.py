@@ -1,0 +1,208 @@
+"""The store: atomic, checked, deterministic, and honest about full disks."""
+
+from __future__ import annotations
+
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.artifacts.store import Record, Store, publish, write_dataset
+from pipeline.core.errors import ResourceError
+
+KEY = "k" * 32
+
+
+def dataset(rows: int = 50) -> xr.Dataset:
+    """Numbers that do not compress, text, an integer, a scalar and attributes."""
+    rng = np.random.default_rng(1)
+    return xr.Dataset(
+        {
+            "position": (("time", "body"), rng.standard_normal((rows, 3)), {"units": "m"}),
+            "count": (("body",), np.arange(3)),
+            "mass": ((), 2.5),
+            "empty": (("event",), np.zeros(0)),
+        },
+        coords={"time": ("time", np.arange(rows) * 1e-4, {"units": "s"}), "body": ["a", "rod1", "platform"]},
+        attrs={"scene": "tiny", "evaluations": 12},
+    )
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+@pytest.fixture
+def store(tmp_path: Path, said: list[str]) -> Store:
+    return Store(tmp_path / "results", say=said.append)
+
+
+def put(store: Store) -> Record:
+    return store.put("simulate", KEY, {"nc": dataset(), "vtu": b"mesh"}, {"parameter c": "1"})
+
+
+def test_what_is_stored_comes_back_exactly(store: Store):
+    record = put(store)
+    assert store.find("simulate", KEY) == record
+    assert store.load(record).identical(dataset())
+
+
+def test_equal_datasets_give_equal_bytes(tmp_path: Path):
+    """In another process, so that nothing of this one can be shared: no times, names or random seeds."""
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); from pathlib import Path;"
+        "from test_store import dataset, write_dataset; print(write_dataset(Path(sys.argv[2]), dataset()))"
+    )
+    here = str(Path(__file__).parent)
+    printed = [
+        subprocess.run(
+            [sys.executable, "-c", code, here, str(tmp_path / name)],
+            capture_output=True,
+            text=True,
+            check=True,
+            cwd=Path(__file__).parents[2],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+        ).stdout
+        for name, seed in (("one.nc", "1"), ("two.nc", "2"))
+    ]
+    assert printed[0] == printed[1]
+    assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
+    assert write_dataset(tmp_path / "three.nc", dataset(51)) != printed[0].strip()
+
+
+def test_every_flipped_bit_is_found(store: Store, said: list[str]):
+    record = put(store)
+    path = store.path("simulate", KEY, "nc")
+    whole = path.read_bytes()
+    for place in range(0, len(whole), len(whole) // 37):
+        broken = bytearray(whole)
+        broken[place] ^= 0x10
+        path.write_bytes(bytes(broken))
+        assert store.find("simulate", KEY) is None
+        with pytest.raises(ResourceError):
+            store.load(record)
+    assert "corrupt" in said[0]
+    assert "results/cache/simulate" in said[0]
+    assert len(said[0].splitlines()) == 1
+    path.write_bytes(whole)
+    assert store.find("simulate", KEY) == record
+
+
+@pytest.mark.parametrize("file", ["nc", "vtu", "json"])
+def test_a_truncated_or_missing_file_makes_the_artifact_absent(store: Store, file: str):
+    put(store)
+    path = store.path("simulate", KEY, file)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    assert store.find("simulate", KEY) is None
+    path.unlink()
+    assert store.find("simulate", KEY) is None
+
+
+def test_without_a_record_there_is_no_artifact(store: Store):
+    """A process killed between the data and the record has left valid-looking data."""
+    put(store)
+    store.path("simulate", KEY, "json").unlink()
+    assert store.find("simulate", KEY) is None
+    assert store.find("simulate", "0" * 32) is None
+
+
+def test_a_failed_read_back_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The disk returns something else than was written: the new file must not take the name."""
+    path = tmp_path / "a.bin"
+    publish(path, b"old")
+    monkeypatch.setattr(Path, "read_bytes", lambda self: b"not what was written")
+    with pytest.raises(OSError, match="does not read back"):
+        publish(path, b"new")
+    monkeypatch.undo()
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["a.bin"]
+
+
+FULL = """
+import resource, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from test_store import KEY, Store, dataset, ResourceError
+store = Store(Path(sys.argv[2]))
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), resource.RLIM_INFINITY))
+content = dataset(20_000) if sys.argv[4] == "nc" else bytes(1_000_000)
+try:
+    store.put("simulate", KEY, {sys.argv[4]: content}, {})
+except ResourceError as error:
+    print(error)
+    sys.exit(error.exit_code)
+"""
+
+
+@pytest.mark.parametrize("kind", ["nc", "png"])
+@pytest.mark.parametrize("limit", [0, 5_000, 300_000])
+def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, root: Path, kind: str, limit: int):
+    """A limit on the size of files answers a write as a full disk does: with an error from the system."""
+    results = tmp_path / "results"
+    arguments = [sys.executable, "-c", FULL, str(Path(__file__).parent), str(results), str(limit), kind]
+    done = subprocess.run(arguments, capture_output=True, text=True, cwd=root, check=False)
+    assert done.returncode == ResourceError.exit_code, done.stderr
+    assert "disk is full" in done.stdout
+    assert [path for path in results.rglob("*") if path.is_file()] == []
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
+
+
+def test_what_a_killed_process_left_is_swept_and_never_read(store: Store):
+    folder = store.path("simulate", KEY, "nc").parent
+    folder.mkdir(parents=True)
+    left = folder / f".{KEY}.4711.0badcafe.tmp"
+    left.write_bytes(b"half a dataset")
+    other = folder / f".{'o' * 32}.4711.0badcafe.tmp"
+    other.write_bytes(b"another key, perhaps being written right now")
+    assert store.find("simulate", KEY) is None
+    with store.lock("simulate", KEY):
+        assert not left.exists()
+    assert other.exists()
+
+
+def test_the_lock_holds_between_processes(store: Store):
+    code = (
+        "import sys; from pathlib import Path; from pipeline.core.artifacts.store import Store\n"
+        "with Store(Path(sys.argv[1])).lock('simulate', sys.argv[2], lambda: print('waiting', flush=True)):\n"
+        "    print('mine', flush=True)"
+    )
+    with store.lock("simulate", KEY):
+        command = [sys.executable, "-c", code, str(store.root), KEY]
+        other = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2])
+        assert other.stdout is not None
+        assert other.stdout.readline() == "waiting\n"
+    with other:
+        assert other.stdout.read() == "mine\n"
+    assert other.returncode == 0
+
+
+def test_shown_files_follow_the_current_artifact(store: Store):
+    first = put(store)
+    store.show(first, "runs/tiny", {"nc": "run.nc"}, "simulate")
+    shown = store.root / "runs" / "tiny" / "run.nc"
+    assert shown.read_bytes() == store.path("simulate", KEY, "nc").read_bytes()
+    second = store.put("simulate", "l" * 32, {"nc": dataset(9)}, {"parameter c": "2"})
+    store.show(second, "runs/tiny", {"nc": "run.nc"}, "simulate")
+    assert store.load(second).equals(xr.load_dataset(shown, decode_times=False))
+    last = store.last("runs/tiny", "simulate")
+    assert last is not None
+    assert (last.key, dict(last.facts)) == ("l" * 32, {"parameter c": "2"})
+    assert not list(store.root.rglob("*.tmp"))
+
+
+def test_files_are_copied_where_links_are_not_possible(store: Store, monkeypatch: pytest.MonkeyPatch):
+    def refuse(source: Path, target: Path) -> None:
+        raise PermissionError(1, "links are not permitted here")
+
+    monkeypatch.setattr(os, "link", refuse)
+    record = put(store)
+    for _ in range(2):
+        store.show(record, "runs/tiny", {}, "simulate")
+        assert (store.root / "runs" / "tiny" / "vtu").read_bytes() == b"mesh"

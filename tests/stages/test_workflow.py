@@ -1,0 +1,209 @@
+"""The command at work on a copy of the project with small engines: what runs, when, and how often."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import time
+from collections.abc import Callable
+
+import pytest
+import xarray as xr
+
+from tests.stages.conftest import CONTACT, JOINT, SCENE, Project
+
+
+def test_what_is_fresh_is_not_run_again(project: Project):
+    assert project.run("run", "tiny/contact").returncode == 0
+    assert project.calls() == ["simulate tiny/contact", "post tiny/contact"]
+    shown = project.results / "runs" / "tiny" / "contact"
+    assert xr.load_dataset(shown / "run.nc", decode_times=False).attrs["scene"] == "tiny/contact"
+    assert (shown / "post.nc").is_file()
+    again = project.run("run", "tiny/contact")
+    assert (again.returncode, again.stderr, project.calls()) == (0, "", [])
+
+
+def test_why_says_what_changed_and_run_does_just_that(project: Project):
+    assert project.run("why", "tiny/contact").stdout.split() == [
+        "tiny/contact",
+        "simulate",
+        "never",
+        "run",
+        "post",
+        "never",
+        "run",
+    ]
+    project.run("run", "tiny/contact")
+    project.edit("scenes/tiny/contact.toml", "0.5 mm", "0.2 mm")
+    with (project.folder / "pipeline/dynamics/contact/normal/lankarani_nikravesh.py").open("a") as file:
+        file.write("\n# edited\n")
+    lines = [line.strip() for line in project.run("why", "tiny/contact").stdout.splitlines()]
+    assert lines == [
+        "tiny/contact",
+        "simulate         module pipeline.dynamics.contact.normal.lankarani_nikravesh changed",
+        "scene.joint.J.clearance: 0.0005 -> 0.0002",
+        "post             its input run would be made again",
+    ]
+    project.calls()
+    project.run("run", "tiny/contact")
+    assert project.calls() == ["simulate tiny/contact", "post tiny/contact"]
+    project.edit("scenes/tiny/contact.toml", "0.2 mm", "0.5 mm")
+    project.edit("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", "\n# edited\n", "")
+    project.run("run", "tiny/contact")
+    assert project.calls() == []  # what was made before the edits is still in the cache
+
+
+def test_equal_results_stop_the_chain(project: Project):
+    """A new title of nothing else: simulate runs again after an edit, post has the same input."""
+    project.run("run", "tiny/ideal")
+    project.calls()
+    project.edit("stages/s4_simulate.py", '"""One run (schema RUN)', '"""A run (schema RUN)')
+    project.run("run", "tiny/ideal", "--to", "simulate")
+    assert project.calls() == ["simulate tiny/ideal"]
+    assert "post             fresh" in project.run("why", "tiny/ideal").stdout
+
+
+def test_a_corrupt_artifact_is_told_in_one_line_and_rebuilt(project: Project):
+    project.run("run", "tiny/ideal")
+    path = project.artifact("simulate")
+    whole = path.read_bytes()
+    for broken in (whole[:-1] + bytes([whole[-1] ^ 1]), whole[:100], b""):
+        project.calls()
+        path.write_bytes(broken)
+        assert "is corrupt" in project.run("why", "tiny/ideal").stdout
+        done = project.run("run", "tiny/ideal")
+        assert (done.returncode, project.calls()) == (0, ["simulate tiny/ideal"])
+        assert sum("is corrupt" in line for line in done.stderr.splitlines()) == 1
+        assert path.read_bytes() == whole
+
+
+def test_two_commands_at_once_do_the_work_once(project: Project):
+    both = [project.start("run", "tiny/ideal", SECONDS="2") for _ in range(2)]
+    ends = [process.communicate(timeout=60) for process in both]
+    assert [process.returncode for process in both] == [0, 0], ends
+    assert project.calls() == ["simulate tiny/ideal", "post tiny/ideal"]
+    assert any("waiting for another process" in err for _, err in ends)
+    assert project.run("why", "tiny/ideal").stdout.count("fresh") == 2
+
+
+def test_a_killed_run_is_simply_run_again(project: Project):
+    process = project.start("run", "tiny/ideal", SECONDS="60")
+    _wait_for(lambda: (project.folder / "calls").exists())
+    process.kill()
+    process.communicate(timeout=60)
+    project.calls()
+    done = project.run("run", "tiny/ideal")
+    assert (done.returncode, project.calls()) == (0, ["simulate tiny/ideal", "post tiny/ideal"])
+
+
+@pytest.mark.parametrize("scenes", [["tiny/ideal"], ["tiny/ideal", "tiny/contact"]], ids=["alone", "workers"])
+def test_an_interrupt_ends_everything_with_130(project: Project, scenes: list[str]):
+    process = project.start("run", *scenes, SECONDS="60")
+    _wait_for(lambda: (project.folder / "calls").exists())
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "interrupted" in err
+    assert "Traceback" not in err
+    assert not list(project.results.rglob("*.nc"))
+
+
+def test_a_solver_that_gives_up_stops_only_what_depends_on_it(project: Project, add_scene: Callable[[str, str], None]):
+    add_scene("fails", SCENE + JOINT)
+    done = project.run("run", "tiny/fails", "tiny/ideal")
+    assert done.returncode == 3
+    assert "flexclear: tiny/fails simulate: at t = 0.1 s joint A1: no step is small enough" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(project.calls()) == ["post tiny/ideal", "simulate tiny/fails", "simulate tiny/ideal"]
+
+
+def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
+    code = (
+        "import resource, sys; from stages.__main__ import main;"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY)); sys.exit(main(['run', 'tiny/ideal']))"
+    )
+    import subprocess
+    import sys
+
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=project.folder,
+        env=project.environment(CALLS=os.devnull),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 4, done.stderr
+    assert "the disk is full" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert [path.name for path in project.results.rglob("*") if path.is_file() and path.stat().st_size] == []
+
+
+def test_a_scene_that_says_the_same_is_run_under_its_own_name(project: Project, add_scene: Callable[[str, str], None]):
+    """Two scenes may be equal in all but the name; each has its own artifacts, named as it is."""
+    add_scene("twin", SCENE + JOINT)
+    for name in ("ideal", "twin"):
+        project.run("run", f"tiny/{name}", "--to", "simulate")
+        run = xr.load_dataset(project.results / "runs" / "tiny" / name / "run.nc", decode_times=False)
+        assert run.attrs["scene"] == f"tiny/{name}"
+
+
+def test_the_ensemble_is_a_stage_of_its_own(project: Project, add_scene: Callable[[str, str], None]):
+    add_scene("many", CONTACT + "\n[ensemble]\nmembers = 3\n")
+    project.run("run", "tiny/many")
+    assert sorted(project.calls()) == ["ensemble tiny/many", "post tiny/many", "simulate tiny/many"]
+    project.edit("scenes/tiny/many.toml", "members = 3", "members = 4")
+    project.run("run", "tiny/many")
+    assert project.calls() == ["ensemble tiny/many", "post tiny/many"]
+    stored = xr.load_dataset(project.results / "runs" / "tiny" / "many" / "ensemble.nc")
+    assert stored.sizes["member"] == 4
+
+
+def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
+    import subprocess
+    import sys
+
+    project.run("run", "tiny/contact", "--to", "simulate")
+    shown = project.results / "runs" / "tiny" / "contact" / "run.nc"
+    before = shown.read_bytes()
+    code = (
+        "import pipeline\n"
+        "scene = pipeline.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
+        "run = pipeline.run(scene)\n"
+        "print(float(run.time[1]), run.attrs['title'])"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(
+        command, cwd=project.folder, env=project.environment(), capture_output=True, text=True, check=True
+    )
+    assert done.stdout == "0.001 Ball in a socket, with clearance\n"
+    assert shown.read_bytes() == before
+    assert "fresh" in project.run("why", "tiny/contact", "--to", "simulate").stdout
+
+
+def test_out_copies_the_run(project: Project):
+    target = project.folder / "mine.nc"
+    assert project.run("run", "tiny/ideal", "--out", "mine.nc").returncode == 0
+    copied = xr.load_dataset(target, decode_times=False)
+    assert copied.attrs["title"] == "Ball in a socket"
+    assert copied.sizes["time"] == 5
+    refused = project.run("run", "tiny/ideal", "--out", "nowhere/mine.nc")
+    assert refused.returncode == 2
+    assert "its folder does not exist" in refused.stderr
+    assert project.run("run", "tiny/ideal", "tiny/contact", "--out", "mine.nc").returncode == 2
+
+
+def test_progress_goes_to_stderr_only(project: Project):
+    done = project.run("run", "tiny/ideal")
+    assert done.stdout == ""
+    assert "flexclear: [0/2] tiny/ideal: simulate" in done.stderr.splitlines()
+    json.loads(project.run("schema").stdout)
+
+
+def _wait_for(condition: Callable[[], bool]) -> None:
+    """Until something has happened in another process; ten seconds are ample."""
+    end = time.monotonic() + 10.0
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.02)
