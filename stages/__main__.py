@@ -74,6 +74,8 @@ def _run(options: argparse.Namespace) -> None:
 
     if options.out is not None and len(options.scenes) > 1:
         raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
+    if options.out is not None:
+        run.check_target(options.out)
     graphs = run.graphs(options.scenes)
     place = run.workplace()
     run.check(place.bring([task for graph in graphs for task in graph.up_to(options.to)]))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.core.artifacts.paths import results_root
-from pipeline.core.artifacts.store import Store
+from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import Sources
@@ -113,8 +113,14 @@ def graphs(names: list[str]) -> list[Graph]:
 
 def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
     """Write the dataset of the run to a file of the user's, titled, and atomically like any other."""
-    from pipeline.core.artifacts.store import write_dataset
+    dataset = run(graph.scene, place)
+    with disk_limits(target.parent):
+        write_dataset(target, dataset)
 
+
+def check_target(target: Path) -> None:
+    """InputError when a file cannot be put there; asked before the work, not after it."""
     if not target.parent.is_dir():
         raise InputError(f"--out {target}", "its folder does not exist", f"mkdir -p {target.parent}")
-    write_dataset(target, run(graph.scene, place))
+    if target.is_dir():
+        raise InputError(f"--out {target}", "is a folder", "name a file in it")

@@ -58,7 +58,7 @@ NUMBERS = {
     "LINK_NUMBERS": 10,  # mass, centre of mass (3), inertia about it (xx yy zz xy xz yz), link axes
     "SITE_NUMBERS": 12,  # position (3), rotation (9) in the link
     "FLEX_NUMBERS": 13,  # mass, first moment (3), second moment (9)
-    "FLEX_DATA": 1,  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n n), damping (n)
+    "FLEX_DATA": 1,  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
     "MOMENT_VALUES": 1,
     "PORT_NUMBERS": 12,  # undeformed position (3), rotation (9)
     "PORT_DATA": 1,  # per port: translation shape (3n), rotation shape (3n)

@@ -10,7 +10,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-kernel = njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+# No kernel allocates, so none counts references; and none is called from Python through a C function.
+kernel = njit(
+    error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, _nrt=False, no_cfunc_wrapper=True
+)
 
 
 #: type of an index: unsigned, because compiled code must otherwise ask of each whether it is negative

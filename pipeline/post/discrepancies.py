@@ -70,6 +70,17 @@ DISCREPANCIES = (
         "The step follows a tolerance; the instants of first and last touch are located.",
     ),
     Discrepancy(
+        "section 6",
+        "Whether gravity acts, and how the ball lies in its socket at the start, is not said.",
+        "No gravity, the ball concentric and at rest; a variant of the scene has gravity.",
+    ),
+    Discrepancy(
+        "Table 1",
+        "The opening of the sockets is not given; with the balls' stems as thick as the inertias imply, a stem "
+        "would touch its socket's lip at the largest tilts.",
+        "Sockets have no lip: only ball and socket touch.",
+    ),
+    Discrepancy(
         "Figs. 14-16",
         "The plots are called Poincaré maps; one stroke has no period to strobe, so they are phase plots.",
         "Phase plots as printed, and beside them the states at the instants when impacts begin.",

@@ -48,6 +48,7 @@ class Motion:
     reaction: np.ndarray  #: at A1 [N]
     ball: np.ndarray  #: centre of ball A1, world axes [mm], shape (time, 3)
     horizon: float  #: [s]
+    impacts: np.ndarray  #: middle [s] and largest normal force [N] of each impact, shape (impact, 2)
 
 
 def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
@@ -64,4 +65,13 @@ def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
         reaction=post.reaction.sel(joint=JOINT).values,
         ball=1e3 * run.frame_position.sel(frame=BALL_FRAME).values,
         horizon=float(post.horizon),
+        impacts=_impacts(post),
     )
+
+
+def _impacts(post: xr.Dataset) -> np.ndarray:
+    if "impact_time" not in post:
+        return np.empty((0, 2))
+    own = post.impact_contact.values.astype(int) == list(post.contact.values).index(JOINT)
+    middle = post.impact_time.values + 0.5 * post.impact_duration.values
+    return np.column_stack([middle, post.impact_peak_force.values])[own]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.post.figures import table04, table05, table07, table08, table09, table10
+from pipeline.post.plotting.error_table import number
 from pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
 from pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
 from tests.paper.material import WOBBLE, everything
@@ -72,6 +73,12 @@ def test_table_7_gives_the_wobble_that_the_runs_were_made_with():
         # outputs every 0.1 ms of a 300 Hz wobble miss its top by up to 0.1 %; four digits are printed
         assert float(found["displacement z0 (mm)"][head]) == pytest.approx(1e3 * WOBBLE[name], rel=2e-3)
         assert float(found["angle about y0 (rad)"][head]) == pytest.approx(10.0 * WOBBLE[name], rel=2e-3)
+
+
+def test_rounding_noise_is_not_printed():
+    assert number(3e-13) == "< 1e-10"
+    assert number(2.776e-4) == "2.776e-04"
+    assert number(13.57) == "13.570"
 
 
 def test_table_7_says_when_fixed_modes_do_nothing():

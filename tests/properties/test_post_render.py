@@ -129,5 +129,5 @@ def test_pictures_of_a_run_are_all_there_and_repeat():
     assert {name.partition(".")[0] for name in first} == {"mechanism", "film", "mode_rod1", "modes_rod1"}
     assert b"vtk" in first["mode_rod1.html"]
     again = pictures(run, {"rod1": synthetic.bundle()})
-    for name in ("mechanism.png", "film.mp4", "modes_rod1.vtu"):
+    for name in ("mechanism.png", "film.mp4", "modes_rod1.vtu", "mode_rod1.html"):
         assert first[name] == again[name], name

@@ -189,9 +189,9 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
     return clearance_run.Mechanism(start(n), rhs, touch, platform, s.contact.floor)
 
 
-def simulate(until: float, rtol: float = 1e-9) -> clearance_run.Result:
+def simulate(until: float, rtol: float = 1e-11) -> clearance_run.Result:
     """The paper's scene with the flexible rod, up to `until` [s]; chaotic beyond some tens of milliseconds."""
-    tolerance = clearance_run.Tolerance(rtol=rtol, atol=1e-14, flight=5e-5, contact=1e-5)
+    tolerance = clearance_run.Tolerance(rtol=rtol, atol=1e-15, flight=5e-5, contact=5e-6)
     return clearance_run.simulate(mechanism(setting()), until, tolerance)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import re
 import shutil
 from pathlib import Path
@@ -49,6 +50,11 @@ def test_order_of_keys_does_not_matter():
 def test_floats_keep_every_digit():
     """The next float up is another parameter."""
     assert flatten(0.1) != flatten(0.1 + 2**-56)
+
+
+def test_what_json_cannot_say_is_kept_as_text():
+    """A nan or a date in a recipe is for the recipe's check to refuse, in words."""
+    assert flatten({"a": float("nan"), "b": datetime.date(2019, 3, 10)}) == [("a", "NaN"), ("b", '"2019-03-10"')]
 
 
 def test_reasons_are_words():
@@ -115,6 +121,12 @@ def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
     return {label for label in before if before[label] != after[label]}
 
 
+@pytest.fixture(scope="module")
+def sources(root: Path) -> Sources:
+    """The project's own source, read once."""
+    return Sources(root)
+
+
 @pytest.fixture
 def copy(root: Path, tmp_path: Path) -> Path:
     """Source and scenes, to be edited."""
@@ -123,46 +135,41 @@ def copy(root: Path, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_clearance_reruns_exactly_the_last_stages_of_that_scene(root: Path):
+def test_clearance_reruns_exactly_the_last_stages_of_that_scene(root: Path, sources: Sources):
     path = root / "scenes" / "sps4" / "far_csj_cb.toml"
-    sources = Sources(root)
     before = keys(Graph(load_scene(path)), sources)
     after = keys(Graph(load_scene(path, {"joint.A1.clearance": "0.2 mm"})), sources)
     assert changed(before, after) == {"simulate", "ensemble", "post"}
 
 
-def test_number_of_modes_does_not_remesh(root: Path):
+def test_number_of_modes_does_not_remesh(root: Path, sources: Sources):
     path = root / "scenes" / "sps4" / "far_csj_cb.toml"
-    sources = Sources(root)
     before = keys(Graph(load_scene(path)), sources)
     after = keys(Graph(load_scene(path, {"body.rod1.modes.count": 8})), sources)
     assert changed(before, after) == {"modes rod1", "bundle rod1", "simulate", "ensemble", "post"}
 
 
-def test_members_rerun_only_the_ensemble(root: Path):
+def test_members_rerun_only_the_ensemble(root: Path, sources: Sources):
     path = root / "scenes" / "sps4" / "far_csj_cb.toml"
-    sources = Sources(root)
     before = keys(Graph(load_scene(path)), sources)
     after = keys(Graph(load_scene(path, {"ensemble.members": 8})), sources)
     assert changed(before, after) == {"ensemble", "post"}
 
 
-def test_titles_and_places_on_disk_do_not_count(root: Path, copy: Path):
+def test_titles_and_places_on_disk_do_not_count(root: Path, copy: Path, sources: Sources):
     scene = copy / "scenes" / "sps4" / "far_cb.toml"
     text = scene.read_text()
     scene.write_text(re.sub(r"^title = .*", 'title = "Another title"', text, flags=re.MULTILINE))
     assert text != scene.read_text()
-    sources = Sources(root)
     moved = Graph(load_scene(scene))
     assert str(copy) not in str([facts(task, {}, sources) for task in in_order(moved.up_to("post"))])
     before = keys(graph(root, "sps4/far_cb"), sources)
     assert changed(before, keys(moved, sources)) == set()
 
 
-def test_content_of_the_recipe_counts(root: Path, copy: Path):
+def test_content_of_the_recipe_counts(root: Path, copy: Path, sources: Sources):
     recipe = copy / "meshes" / "actuated_rod.toml"
     recipe.write_text(recipe.read_text().replace("elements = 12", "elements = 24"))
-    sources = Sources(root)
     before, after = keys(graph(root, "sps4/far_cb"), sources), keys(graph(copy, "sps4/far_cb"), sources)
     assert "mesh rod1" in changed(before, after)
 
@@ -178,11 +185,14 @@ def test_content_of_the_recipe_counts(root: Path, copy: Path):
         ("post/figures/fig11.py", set()),
     ],
 )
-def test_editing_a_module_reruns_only_scenes_that_reach_it(root: Path, copy: Path, module: str, scenes: set[str]):
-    before = {name: keys(graph(root, name), Sources(root)) for name in ("sps4/ideal", "sps4/csj", "sps4/far_cb")}
+def test_editing_a_module_reruns_only_scenes_that_reach_it(
+    root: Path, sources: Sources, copy: Path, module: str, scenes: set[str]
+):
+    before = {name: keys(graph(root, name), sources) for name in ("sps4/ideal", "sps4/csj", "sps4/far_cb")}
     path = copy / "pipeline" / module
     path.write_text(path.read_text() + "\n# one more line\n")
-    after = {name: keys(graph(root, name), Sources(copy)) for name in before}
+    edited = Sources(copy)
+    after = {name: keys(graph(root, name), edited) for name in before}
     assert {name for name in before if changed(before[name], after[name])} == scenes
 
 

@@ -141,8 +141,7 @@ except ResourceError as error:
 """
 
 
-@pytest.mark.parametrize("kind", ["nc", "png"])
-@pytest.mark.parametrize("limit", [0, 5_000, 300_000])
+@pytest.mark.parametrize("kind, limit", [("nc", 0), ("nc", 300_000), ("png", 5_000)])
 def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, root: Path, kind: str, limit: int):
     """A limit on the size of files answers a write as a full disk does: with an error from the system."""
     results = tmp_path / "results"

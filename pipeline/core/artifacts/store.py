@@ -87,7 +87,7 @@ class Store:
         """
         digests: dict[str, str] = {}
         folder = self.root / "cache" / stage
-        with _disk_limits(folder):
+        with disk_limits(folder):
             folder.mkdir(parents=True, exist_ok=True)
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
@@ -116,7 +116,7 @@ class Store:
             return
         shown = {name: self.root / folder / names.get(name, name) for name in record.files}
         shown["json"] = self.root / folder / ".facts" / f"{label.replace(' ', '.')}.json"
-        with _disk_limits(self.root / folder):
+        with disk_limits(self.root / folder):
             for name, target in shown.items():
                 link(self.path(record.stage, record.key, name), target)
 
@@ -134,7 +134,7 @@ class Store:
         process that dies.
         """
         path = self.path(stage, key, "lock")
-        with _disk_limits(path.parent):
+        with disk_limits(path.parent):
             path.parent.mkdir(parents=True, exist_ok=True)
             handle = path.open("ab")
         with handle:
@@ -231,7 +231,7 @@ def _settle(temporary: Path, path: Path) -> None:
 
 
 @contextlib.contextmanager
-def _disk_limits(folder: Path) -> Iterator[None]:
+def disk_limits(folder: Path) -> Iterator[None]:
     """OSError on the way to disk, as a limit of the machine, in words."""
     try:
         yield

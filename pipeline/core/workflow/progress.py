@@ -12,7 +12,7 @@ from typing import TextIO
 SPARSE = 10.0
 #: least time between two redraws of the line on a terminal [s]
 REDRAW = 0.1
-#: an estimate of the rest is shown from this share on; before, it jumps about
+#: the rest is estimated once this share has been done; before, the estimate jumps about
 ENOUGH = 0.02
 
 
@@ -22,6 +22,7 @@ class Job:
 
     name: str
     begun: float
+    since: tuple[float, float] | None = None  #: time and done share from which on the pace is known
     fraction: float | None = None
     text: str = ""
     said: float = 0.0
@@ -55,6 +56,9 @@ class Monitor:
         if job is None:
             return
         news = fraction is None and text != job.text
+        # what has no share (compiling, waiting) says nothing about the pace of the rest
+        if fraction is None or job.since is None:
+            job.since = None if fraction is None else (self.clock(), fraction)
         job.fraction, job.text = fraction, text
         if self.out.isatty() or news or self.clock() - job.said >= SPARSE:
             job.said = self.clock()
@@ -86,8 +90,10 @@ class Monitor:
         parts = [job.name]
         if job.fraction is not None:
             parts.append(f"{job.fraction:4.0%}")
-            if job.fraction >= ENOUGH:
-                parts.append(f"{duration((self.clock() - job.begun) * (1.0 / job.fraction - 1.0))} left")
+            begun, share = job.since or (self.clock(), job.fraction)
+            if job.fraction - share >= ENOUGH:
+                pace = (self.clock() - begun) / (job.fraction - share)
+                parts.append(f"{duration(pace * (1.0 - job.fraction))} left")
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _show(self, text: str) -> None:
@@ -105,9 +111,10 @@ class Monitor:
 
 def duration(seconds: float) -> str:
     """``4.2 s``, ``3 min 10 s``."""
-    if seconds < 60.0:
+    if round(seconds, 1) < 60.0:
         return f"{seconds:.1f} s"
-    return f"{seconds // 60:.0f} min {seconds % 60:.0f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest} s"
 
 
 def _columns(out: TextIO) -> int:

@@ -84,14 +84,15 @@ def key(task_facts: Mapping[str, str]) -> str:
 def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
     """Dotted place -> canonical text of every leaf of a JSON tree; floats by repr.
 
-    Empty tables and lists are leaves, so that adding an empty one is seen.
+    Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
+    date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
     """
     if isinstance(node, Mapping) and node:
         items = [(str(name), value) for name, value in node.items()]
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (Mapping, list, tuple)) for x in node):
         items = [(str(n), value) for n, value in enumerate(node)]
     else:
-        return [(place, json.dumps(node, allow_nan=False, ensure_ascii=False))]
+        return [(place, json.dumps(node, ensure_ascii=False, default=str))]
     return [leaf for name, value in items for leaf in flatten(value, f"{place}.{name}".lstrip("."))]
 
 

@@ -101,49 +101,54 @@ def rows(h, w, c):
 
 @kernel
 def jacobian(h, w, c):
-    """Jacobian of closure c on its support, row after row."""
+    """J^T of closure c on its support: slot after slot, the rows of the closure side by side."""
     start, size, count = h[JACOBIAN] + closure(h, c, JACOBIAN0), closure(h, c, N_SUPPORT), closure(h, c, N_ROWS)
     for k in range(start, start + size * count):
         w[index(k)] = 0.0
     first, wrenches = h[ENTRIES] + 3 * closure(h, c, ENTRY0), h[ROWS] + 6 * closure(h, c, ROW0)
-    for e in range(closure(h, c, N_ENTRIES)):
-        slot, col, sign = h[index(first + 3 * e)], column(h, h[index(first + 3 * e + 1)]), h[index(first + 3 * e + 2)]
+    for e in range(first, first + 3 * closure(h, c, N_ENTRIES), 3):
+        col, sign = column(h, h[index(e + 1)]), float(h[index(e + 2)])
+        angular, linear = scale(sign, at(w, col)), scale(sign, at(w, col + 3))
+        slot = start + count * h[index(e)]
         for k in range(count):
-            w[index(start + k * size + slot)] += sign * dot6(w, wrenches + 6 * k, w, col)
+            o = wrenches + 6 * k
+            w[index(slot + k)] += dot(angular, at(w, o)) + dot(linear, at(w, o + 3))
 
 
 @kernel
 def spread(h, w, c):
-    """L^-1 J^T of closure c, on its support."""
-    size, support = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0)
-    j0 = closure(h, c, JACOBIAN0)
-    for r in range(closure(h, c, N_ROWS)):
-        J, S = h[JACOBIAN] + j0 + r * size, h[SPREAD] + j0 + r * size
-        for a in range(size):
-            i = h[index(support + a)]
-            first, row = h[index(h[ENVELOPE] + 2 * i)], base(h, h[ENVELOPE], h[MASS], i)
-            total = w[index(J + a)]
-            for b in range(a):
-                k = h[index(support + b)]
-                if k >= first:
-                    total -= w[index(row + k)] * w[index(S + b)]
-            w[index(S + a)] = total / w[index(row + i)]
+    """L^-1 J^T of closure c, laid out like J^T."""
+    size, support, count = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0), closure(h, c, N_ROWS)
+    J, S = h[JACOBIAN] + closure(h, c, JACOBIAN0), h[SPREAD] + closure(h, c, JACOBIAN0)
+    for a in range(size):
+        i = h[index(support + a)]
+        first, row, mine = h[index(h[ENVELOPE] + 2 * i)], base(h, h[ENVELOPE], h[MASS], i), S + count * a
+        for r in range(count):
+            w[index(mine + r)] = w[index(J + count * a + r)]
+        for b in range(a):
+            k = h[index(support + b)]
+            if k >= first:
+                l_ik, other = w[index(row + k)], S + count * b
+                for r in range(count):
+                    w[index(mine + r)] -= l_ik * w[index(other + r)]
+        inverse = 1.0 / w[index(row + i)]
+        for r in range(count):
+            w[index(mine + r)] *= inverse
 
 
 @kernel
 def couple(h, w, p):
-    """The block of J M^-1 J^T between the closures of pair p."""
+    """The block of J M^-1 J^T between the closures of pair p, added to zeros."""
     o = h[CLOSURE_PAIRS] + 4 * p
-    a, b, common, count = h[index(o)], h[index(o + 1)], h[COMMON] + 2 * h[index(o + 2)], h[index(o + 3)]
+    a, b, common = h[index(o)], h[index(o + 1)], h[COMMON] + 2 * h[index(o + 2)]
     A, B = h[SPREAD] + closure(h, a, JACOBIAN0), h[SPREAD] + closure(h, b, JACOBIAN0)
-    size_a, size_b = closure(h, a, N_SUPPORT), closure(h, b, N_SUPPORT)
-    for r in range(closure(h, b, N_ROWS)):
-        row = base(h, h[CLOSURE_ENVELOPE], h[SCHUR], closure(h, b, ROW0) + r) + closure(h, a, ROW0)
-        for s in range(r + 1 if a == b else closure(h, a, N_ROWS)):
-            total = 0.0
-            for k in range(count):
-                total += w[index(A + s * size_a + h[index(common + 2 * k)])] * w[index(B + r * size_b + h[index(common + 2 * k + 1)])]
-            w[index(row + s)] = total
+    rows_a, rows_b, row0, col0 = closure(h, a, N_ROWS), closure(h, b, N_ROWS), closure(h, b, ROW0), closure(h, a, ROW0)
+    for k in range(common, common + 2 * h[index(o + 3)], 2):
+        left, right = A + rows_a * h[index(k)], B + rows_b * h[index(k + 1)]
+        for r in range(rows_b):
+            value, row = w[index(right + r)], base(h, h[CLOSURE_ENVELOPE], h[SCHUR], row0 + r) + col0
+            for s in range(r + 1 if a == b else rows_a):
+                w[index(row + s)] += value * w[index(left + s)]
 
 
 @kernel
@@ -165,12 +170,13 @@ def prepare(h, w, n):
 def add_spread(h, w, y, weight):
     """y <- y + weight L^-1 J^T lambda, y in w."""
     for c in range(h[N_CLOSURES]):
-        size, support = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0)
-        for r in range(closure(h, c, N_ROWS)):
-            amount = weight * w[index(h[MULTIPLIER] + closure(h, c, ROW0) + r)]
-            S = h[SPREAD] + closure(h, c, JACOBIAN0) + r * size
-            for a in range(size):
-                w[index(y + h[index(support + a)])] += amount * w[index(S + a)]
+        count, support = closure(h, c, N_ROWS), h[SUPPORT] + closure(h, c, SUPPORT0)
+        S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, ROW0)
+        for a in range(closure(h, c, N_SUPPORT)):
+            total = 0.0
+            for r in range(count):
+                total += w[index(S + count * a + r)] * w[index(first + r)]
+            w[index(y + h[index(support + a)])] += weight * total
 
 
 @kernel
@@ -186,14 +192,15 @@ def close(h, w, n):
     prepare(h, w, n)
     if n[EVALUATION] != OK:
         return
+    for k in range(h[N_CLOSURE_ROWS]):
+        w[index(h[MULTIPLIER] + k)] = w[index(h[GAMMA] + k)]
     for c in range(h[N_CLOSURES]):
-        size, support = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0)
-        for r in range(closure(h, c, N_ROWS)):
-            row, S = closure(h, c, ROW0) + r, h[SPREAD] + closure(h, c, JACOBIAN0) + r * size
-            total = w[index(h[GAMMA] + row)]
-            for a in range(size):
-                total -= w[index(S + a)] * w[index(h[FORCE] + h[index(support + a)])]
-            w[index(h[MULTIPLIER] + row)] = total
+        count, support = closure(h, c, N_ROWS), h[SUPPORT] + closure(h, c, SUPPORT0)
+        S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, ROW0)
+        for a in range(closure(h, c, N_SUPPORT)):
+            force = w[index(h[FORCE] + h[index(support + a)])]
+            for r in range(count):
+                w[index(first + r)] -= w[index(S + count * a + r)] * force
     solve(h, w)
     add_spread(h, w, h[FORCE], 1.0)
 

@@ -8,6 +8,8 @@ in h from place `e`, for `n` rows.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipeline.dynamics.vectors import index, kernel
 
 
@@ -41,7 +43,7 @@ def factor(h, e, w, a, n, threshold):
         if not ratio > threshold:
             return ratio
         worst = min(worst, ratio)
-        w[index(row + i)] = pivot**0.5
+        w[index(row + i)] = np.sqrt(pivot)
     return worst
 
 

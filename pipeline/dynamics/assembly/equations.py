@@ -57,7 +57,7 @@ from pipeline.dynamics.tables import (
     port,
     wrench,
 )
-from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot6, kernel, put, scale, turn_symmetric
+from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot6, index, kernel, put, scale, turn_symmetric
 
 #: pivots of M below this share of their diagonal mean a coordinate that moves no mass
 MASSLESS_PIVOT = 1e-15
@@ -109,12 +109,12 @@ def gather(h, w, i):
     first = link(h, i, C0)
     for k in range(first, first + link(h, i, N_SPEEDS)):
         carry(h, w, i, k)
-        w[h[BIAS] + k] = dot6(w, column(h, k), w, o)
+        w[index(h[BIAS] + k)] = dot6(w, column(h, k), w, o)
     up, parent = wrench(h, link(h, i, PARENT)), h[INERTIA] + INERTIA_SIZE * link(h, i, PARENT)
     accumulate(w, up, at(w, o))
     accumulate(w, up + 3, at(w, o + 3))
     for e in range(INERTIA_SIZE):
-        w[parent + e] += w[h[INERTIA] + INERTIA_SIZE * i + e]
+        w[index(parent + e)] += w[index(h[INERTIA] + INERTIA_SIZE * i + e)]
 
 
 @kernel
@@ -130,7 +130,7 @@ def gather_port(h, w, i):
         carry(h, w, i, k)
         accumulate(w, momentum(h, c0 + j), at(w, momentum(h, k)))
         accumulate(w, momentum(h, c0 + j) + 3, at(w, momentum(h, k) + 3))
-        w[h[MODAL_BIAS] + c0 + j] += dot6(w, column(h, k), w, wrench(h, i))
+        w[index(h[MODAL_BIAS] + c0 + j)] += dot6(w, column(h, k), w, wrench(h, i))
 
 
 @kernel
@@ -139,21 +139,21 @@ def modal_forces(h, w):
     for b in range(h[N_FLEX]):
         c0 = flex(h, b, FLEX_C0)
         for j in range(c0, c0 + flex(h, b, N_MODES)):
-            w[h[BIAS] + j] = w[h[MODAL_BIAS] + j]
+            w[index(h[BIAS] + j)] = w[index(h[MODAL_BIAS] + j)]
 
 
 @kernel
 def known_motion(h, f, w, n, t):
     """Prescribed coordinates, speeds and accelerations at time t, from the piece in force."""
     for d in range(h[N_DRIVES]):
-        piece = h[PIECES] + 7 * n[n[ACTIVE] + d]
-        s = t - f[piece]
-        x, v, a = f[piece + 6], 0.0, 0.0
+        piece = h[PIECES] + 7 * n[index(n[ACTIVE] + d)]
+        s = t - f[index(piece)]
+        x, v, a = f[index(piece + 6)], 0.0, 0.0
         for k in range(5, 0, -1):
             a = a * s + 2.0 * v
             v = v * s + x
-            x = x * s + f[piece + k]
-        w[h[X] + h[NQ] + d], w[h[U] + h[NV] + d], w[h[DU] + h[NV] + d] = x, v, a
+            x = x * s + f[index(piece + k)]
+        w[index(h[X] + h[NQ] + d)], w[index(h[U] + h[NV] + d)], w[index(h[DU] + h[NV] + d)] = x, v, a
 
 
 @kernel
@@ -162,18 +162,18 @@ def assemble_mass(h, w):
     o = h[PAIRS]
     for p in range(h[N_PAIRS]):
         e = o + 3 * p
-        w[h[MASS] + h[e + 2]] += dot6(w, momentum(h, h[e]), w, column(h, h[e + 1]))
+        w[index(h[MASS] + h[index(e + 2)])] += dot6(w, momentum(h, h[index(e)]), w, column(h, h[index(e + 1)]))
 
 
 @kernel
 def drive_forces(h, w):
     """Forces that the prescribed coordinates need: their rows of the equations of motion."""
     for d in range(h[N_DRIVES]):
-        w[h[DRIVE_FORCE] + d] = w[h[BIAS] + h[NV] + d]
+        w[index(h[DRIVE_FORCE] + d)] = w[index(h[BIAS] + h[NV] + d)]
     for p in range(h[N_KNOWN_PAIRS]):
         e = h[KNOWN_PAIRS] + 4 * p
-        entry = dot6(w, momentum(h, h[e]), w, column(h, h[e + 1]))
-        w[h[DRIVE_FORCE] + h[e + 2]] += entry * w[h[DU] + h[e + 3]]
+        entry = dot6(w, momentum(h, h[index(e)]), w, column(h, h[index(e + 1)]))
+        w[index(h[DRIVE_FORCE] + h[index(e + 2)])] += entry * w[index(h[DU] + h[index(e + 3)])]
 
 
 def flexible_inertia(inertia: Callable, mass_matrix: Callable) -> Callable:
@@ -203,25 +203,25 @@ def compose(
     @kernel
     def spread_state(h, w, y):
         for k in range(h[NQ]):
-            w[h[X] + k] = w[y + k]
+            w[index(h[X] + k)] = w[index(y + k)]
         for k in range(h[NV]):
-            w[h[U] + k] = w[y + h[NQ] + k]
-            w[h[DU] + k] = 0.0
+            w[index(h[U] + k)] = w[index(y + h[NQ] + k)]
+            w[index(h[DU] + k)] = 0.0
 
     @kernel
     def forces(h, f, w, n):
         """Inertia, contacts, then the tree from its leaves to the ground."""
         for k in range(h[MASS], h[MASS] + h[MASS_SIZE]):
-            w[k] = 0.0
+            w[index(k)] = 0.0
         for e in range(6):
-            w[wrench(h, 0) + e] = 0.0
+            w[index(wrench(h, 0) + e)] = 0.0
         for i in range(1, h[N_LINKS]):
             if link(h, i, FLEX) < 0:
                 rigid_inertia(h, f, w, i)
         flexible(h, f, w)
         contacts(h, f, w, n)
         for k in range(INERTIA_SIZE * h[N_LINKS]):
-            w[h[INERTIA] + k] = w[h[OWN] + k]
+            w[index(h[INERTIA] + k)] = w[index(h[OWN] + k)]
         for i in range(h[N_LINKS] - 1, 0, -1):
             port_load(h, w, i)
             gather(h, w, i)
@@ -232,14 +232,14 @@ def compose(
         """Positions' rates, accelerations, and the ledger's powers."""
         power = 0.0
         for d in range(h[N_DRIVES]):
-            power += w[h[DRIVE_FORCE] + d] * w[h[U] + h[NV] + d]
-        w[h[LEDGER_RATE] + DRIVE_WORK] = power
+            power += w[index(h[DRIVE_FORCE] + d)] * w[index(h[U] + h[NV] + d)]
+        w[index(h[LEDGER_RATE] + DRIVE_WORK)] = power
         for k in range(h[NQ]):
-            w[dy + k] = w[h[POSITION_RATE] + k]
+            w[index(dy + k)] = w[index(h[POSITION_RATE] + k)]
         for k in range(h[NV]):
-            w[dy + h[NQ] + k] = w[h[DU] + k]
+            w[index(dy + h[NQ] + k)] = w[index(h[DU] + k)]
         for k in range(h[N_LEDGER]):
-            w[dy + h[NQ] + h[NV] + k] = w[h[LEDGER_RATE] + k]
+            w[index(dy + h[NQ] + h[NV] + k)] = w[index(h[LEDGER_RATE] + k)]
 
     @kernel
     def evaluate(h, f, w, n, t, y, dy):
@@ -247,7 +247,7 @@ def compose(
         spread_state(h, w, y)
         known_motion(h, f, w, n, t)
         for k in range(h[N_LEDGER]):
-            w[h[LEDGER_RATE] + k] = 0.0
+            w[index(h[LEDGER_RATE] + k)] = 0.0
         kinematics(h, f, w)
         forces(h, f, w, n)
         assemble_mass(h, w)
@@ -256,12 +256,12 @@ def compose(
             n[EVALUATION] = NOT_POSITIVE
             return
         for k in range(h[NV]):
-            w[h[FORCE] + k] = -w[h[BIAS] + k]
+            w[index(h[FORCE] + k)] = -w[index(h[BIAS] + k)]
         forward(h, h[ENVELOPE], w, h[MASS], h[NV], h[FORCE])
         close(h, w, n)
         backward(h, h[ENVELOPE], w, h[MASS], h[NV], h[FORCE])
         for k in range(h[NV]):
-            w[h[DU] + k] = w[h[FORCE] + k]
+            w[index(h[DU] + k)] = w[index(h[FORCE] + k)]
         drive_forces(h, w)
         known_forces(h, w)
         rates(h, w, dy)

@@ -53,13 +53,17 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
 
 
 def _data(bundle: xr.Dataset, damping: float) -> np.ndarray:
-    """C1 (3n), E (9n), modal mass, stiffness (n n each), damping 2 zeta omega (n)."""
-    omega = 2.0 * np.pi * bundle["frequency"].values
+    """C1 (3n), E (9n), modal mass (n n), stiffness omega^2 (n), damping 2 zeta omega (n).
+
+    The coordinates of a bundle are mass-normalised eigenmodes of its reduced matrices.
+    """
+    stiffness = np.diag(bundle["modal_stiffness"].values)
+    omega = np.sqrt(stiffness)
     chunks = [
         bundle["modal_first_moment"].values,
         bundle["position_mode_moment"].values,
         bundle["modal_mass"].values,
-        bundle["modal_stiffness"].values,
+        stiffness,
         2.0 * damping * omega,
     ]
     return np.concatenate([c.ravel() for c in chunks])

@@ -84,15 +84,15 @@ def invariants(h, f, w, k):
     P = h[MODAL]
     V = P + 9 * n
     for e in range(9 * n):
-        w[P + e] = f[data + 3 * n + e]
-        w[V + e] = 0.0
+        w[index(P + e)] = f[index(data + 3 * n + e)]
+        w[index(V + e)] = 0.0
     first, count = flex(h, k, MOMENT0), flex(h, k, N_MOMENTS)
     index, values = h[MOMENTS] + 2 * first, h[MOMENT_VALUES] + first
     for e in range(count):
-        row, i = h[index + 2 * e], h[index + 2 * e + 1]
-        value = f[values + e]
-        w[P + row] += value * w[x + i]
-        w[V + row] += value * w[u + i]
+        row, i = h[index(index + 2 * e)], h[index(index + 2 * e + 1)]
+        value = f[index(values + e)]
+        w[index(P + row)] += value * w[index(x + i)]
+        w[index(V + row)] += value * w[index(u + i)]
 
 
 @kernel
@@ -102,35 +102,35 @@ def _sums(h, f, w, k):
     P, numbers, Q = h[MODAL], h[FLEX_NUMBERS] + 13 * k, h[SCRATCH]
     c, v = at(f, numbers + 1), (0.0, 0.0, 0.0)
     for j in range(n):
-        shape = (f[data + j], f[data + n + j], f[data + 2 * n + j])
-        c = add(c, scale(w[x + j], shape))
-        v = add(v, scale(w[u + j], shape))
+        shape = (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])
+        c = add(c, scale(w[index(x + j)], shape))
+        v = add(v, scale(w[index(u + j)], shape))
     for a in range(3):
         for b in range(3):
-            both, rate = f[numbers + 4 + 3 * a + b], 0.0
+            both, rate = f[index(numbers + 4 + 3 * a + b)], 0.0
             row, mirrored = P + (3 * a + b) * n, data + 3 * n + (3 * b + a) * n
             for j in range(n):
                 # int r_a r_b = int X_a X_b + int X_b S_a q + int r_a S_b q
-                both += (f[mirrored + j] + w[row + j]) * w[x + j]
-                rate += w[row + j] * w[u + j]
-            w[Q + 3 * a + b] = both
-            w[Q + _RATE + 3 * a + b] = rate
+                both += (f[index(mirrored + j)] + w[index(row + j)]) * w[index(x + j)]
+                rate += w[index(row + j)] * w[index(u + j)]
+            w[index(Q + 3 * a + b)] = both
+            w[index(Q + _RATE + 3 * a + b)] = rate
     return c, v
 
 
 @kernel
 def _tensor(w, Q):
     """Inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment stored from Q."""
-    return (w[Q + 4] + w[Q + 8], w[Q] + w[Q + 8], w[Q] + w[Q + 4], -w[Q + 1], -w[Q + 2], -w[Q + 5])
+    return (w[index(Q + 4)] + w[index(Q + 8)], w[Q] + w[index(Q + 8)], w[Q] + w[index(Q + 4)], -w[index(Q + 1)], -w[index(Q + 2)], -w[index(Q + 5)])
 
 
 @kernel
 def _spin(w, P, n, j):
     """Antisymmetric part of column j of P (or V): int rho r x S_j (or rdot x S_j)."""
     return (
-        w[P + 5 * n + j] - w[P + 7 * n + j],
-        w[P + 6 * n + j] - w[P + 2 * n + j],
-        w[P + n + j] - w[P + 3 * n + j],
+        w[index(P + 5 * n + j)] - w[index(P + 7 * n + j)],
+        w[index(P + 6 * n + j)] - w[index(P + 2 * n + j)],
+        w[index(P + n + j)] - w[index(P + 3 * n + j)],
     )
 
 
@@ -143,7 +143,7 @@ def inertia(h, f, w, k):
     i = flex(h, k, FLEX_LINK)
     invariants(h, f, w, k)
     first, first_rate = _sums(h, f, w, k)
-    mass = f[h[FLEX_NUMBERS] + 13 * k]
+    mass = f[index(h[FLEX_NUMBERS] + 13 * k)]
     frame, Q = link_frame(h, i), h[SCRATCH]
     R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
     J = _tensor(w, Q)
@@ -169,17 +169,17 @@ def inertia(h, f, w, k):
 @kernel
 def _spatial(w, o, mass, p, c, J):
     """Store a spatial inertia; c, J: first moment and inertia about p, world axes."""
-    w[o] = mass
+    w[index(o)] = mass
     put(w, o + 1, add(scale(mass, p), c))
     square = mass * dot(p, p) + 2.0 * dot(p, c)
     for a in range(3):
-        w[o + 4 + a] = square
-    w[o + 4] += J[0] - mass * p[0] * p[0] - 2.0 * p[0] * c[0]
-    w[o + 5] += J[1] - mass * p[1] * p[1] - 2.0 * p[1] * c[1]
-    w[o + 6] += J[2] - mass * p[2] * p[2] - 2.0 * p[2] * c[2]
-    w[o + 7] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
-    w[o + 8] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
-    w[o + 9] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
+        w[index(o + 4 + a)] = square
+    w[index(o + 4)] += J[0] - mass * p[0] * p[0] - 2.0 * p[0] * c[0]
+    w[index(o + 5)] += J[1] - mass * p[1] * p[1] - 2.0 * p[1] * c[1]
+    w[index(o + 6)] += J[2] - mass * p[2] * p[2] - 2.0 * p[2] * c[2]
+    w[index(o + 7)] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
+    w[index(o + 8)] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
+    w[index(o + 9)] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
 
 
 @kernel
@@ -191,13 +191,13 @@ def _modes(h, f, w, k, R, p, a, alpha, omega):
     x, y, z = omega
     xx, yy, zz = y * y + z * z, x * x + z * z, x * x + y * y
     for j in range(n):
-        C = (f[data + j], f[data + n + j], f[data + 2 * n + j])
+        C = (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])
         angular = _spin(w, P, n, j)
-        centrifugal = x * y * (w[P + n + j] + w[P + 3 * n + j]) + x * z * (w[P + 2 * n + j] + w[P + 6 * n + j])
-        centrifugal += y * z * (w[P + 5 * n + j] + w[P + 7 * n + j])
-        centrifugal -= xx * w[P + j] + yy * w[P + 4 * n + j] + zz * w[P + 8 * n + j]
+        centrifugal = x * y * (w[index(P + n + j)] + w[index(P + 3 * n + j)]) + x * z * (w[index(P + 2 * n + j)] + w[index(P + 6 * n + j)])
+        centrifugal += y * z * (w[index(P + 5 * n + j)] + w[index(P + 7 * n + j)])
+        centrifugal -= xx * w[index(P + j)] + yy * w[index(P + 4 * n + j)] + zz * w[index(P + 8 * n + j)]
         coriolis = 2.0 * dot(_spin(w, V, n, j), omega)
-        w[h[MODAL_BIAS] + c0 + j] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
+        w[index(h[MODAL_BIAS] + c0 + j)] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
         linear = turn(R, C)
         o = momentum(h, c0 + j)
         put(w, o, add(turn(R, angular), cross(p, linear)))
@@ -214,13 +214,13 @@ def _carried(h, w, k):
     c, J = at(w, own + 1), at6(w, own + 4)
     for j in range(c0, c0 + flex(h, k, N_MODES)):
         s, o = column(h, j), momentum(h, j)
-        w[h[MODAL_BIAS] + j] += dot6(w, s, w, wrench(h, i))
+        w[index(h[MODAL_BIAS] + j)] += dot6(w, s, w, wrench(h, i))
         omega, v = at(w, s), at(w, s + 3)
         # momentum of the deformation alone stays for the mass matrix
         for e in range(6):
-            w[h[DEFORMATION] + 6 * j + e] = w[o + e]
+            w[index(h[DEFORMATION] + 6 * j + e)] = w[index(o + e)]
         accumulate(w, o, add(turn_symmetric(J, omega), cross(c, v)))
-        accumulate(w, o + 3, add(scale(w[own], v), cross(omega, c)))
+        accumulate(w, o + 3, add(scale(w[index(own)], v), cross(omega, c)))
 
 
 @kernel
@@ -229,14 +229,14 @@ def _stiffness(h, f, w, k):
     n, x, u, data = _places(h, k)
     K = data + 12 * n + n * n
     bias, rate = h[MODAL_BIAS] + flex(h, k, FLEX_C0), h[POSITION_RATE] + flex(h, k, FLEX_Q0)
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total += f[K + i * n + j] * w[x + j]
-        damping = f[K + n * n + i] * w[u + i]
-        w[bias + i] += total + damping
-        w[h[LEDGER_RATE] + MODAL_LOSS] += damping * w[u + i]
-        w[rate + i] = w[u + i]
+    loss = 0.0
+    for j in range(n):
+        speed = w[index(u + j)]
+        damping = f[index(K + n + j)] * speed
+        w[index(bias + j)] += f[index(K + j)] * w[index(x + j)] + damping
+        w[index(rate + j)] = speed
+        loss += damping * speed
+    w[h[LEDGER_RATE] + MODAL_LOSS] += loss
 
 
 @kernel
@@ -246,13 +246,13 @@ def mass_matrix(h, f, w, k):
     c0, moves = flex(h, k, FLEX_C0), flex(h, k, FLEX_INBOARD)
     for i in range(n):
         e = h[ENVELOPE] + 2 * (c0 + i)
-        start = h[MASS] + h[e + 1] - h[e] + c0
+        start = h[MASS] + h[index(e + 1)] - h[index(e)] + c0
         for j in range(i + 1):
-            value = f[data + 12 * n + i * n + j]
+            value = f[index(data + 12 * n + i * n + j)]
             if moves:
                 value += dot6(w, momentum(h, c0 + i), w, column(h, c0 + j))
                 value += dot6(w, column(h, c0 + i), w, h[DEFORMATION] + 6 * (c0 + j))
-            w[start + j] += value
+            w[index(start + j)] += value
 
 
 @kernel
@@ -265,8 +265,8 @@ def modal_inertia(h, f, w, k):
     R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for j in range(n):
-        force = add(force, scale(w[du + j], (f[data + j], f[data + n + j], f[data + 2 * n + j])))
-        moment = add(moment, scale(w[du + j], _spin(w, P, n, j)))
+        force = add(force, scale(w[index(du + j)], (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])))
+        moment = add(moment, scale(w[index(du + j)], _spin(w, P, n, j)))
     force = turn(R, force)
     accumulate(w, wrench(h, i), add(turn(R, moment), cross(p, force)))
     accumulate(w, wrench(h, i) + 3, force)
@@ -281,13 +281,13 @@ def energies(h, f, w, k):
     frame, P = link_frame(h, flex(h, k, FLEX_LINK)), h[MODAL]
     R = at9(w, frame + AXES)
     omega, v = turn_back(R, at(w, frame + OMEGA)), turn_back(R, at(w, frame + VELOCITY))
-    kinetic = 0.5 * f[h[FLEX_NUMBERS] + 13 * k] * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
+    kinetic = 0.5 * f[index(h[FLEX_NUMBERS] + 13 * k)] * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
     kinetic += 0.5 * dot(omega, turn_symmetric(_tensor(w, h[SCRATCH]), omega))
     elastic, M = 0.0, data + 12 * n
     K = M + n * n
     for i in range(n):
-        kinetic += dot(omega, _spin(w, P, n, i)) * w[u + i]
+        kinetic += dot(omega, _spin(w, P, n, i)) * w[index(u + i)]
+        elastic += 0.5 * f[index(K + i)] * w[index(x + i)] ** 2
         for j in range(n):
-            kinetic += 0.5 * f[M + i * n + j] * w[u + i] * w[u + j]
-            elastic += 0.5 * f[K + i * n + j] * w[x + i] * w[x + j]
+            kinetic += 0.5 * f[index(M + i * n + j)] * w[index(u + i)] * w[index(u + j)]
     return kinetic, elastic

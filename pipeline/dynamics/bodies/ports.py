@@ -42,6 +42,7 @@ from pipeline.dynamics.vectors import (
     at9,
     cross,
     exponential,
+    index,
     kernel,
     product,
     put,
@@ -58,7 +59,7 @@ from pipeline.dynamics.vectors import (
 @kernel
 def _shape(f, first, n, j):
     """Column j of a 3 x n shape stored from `first`."""
-    return (f[first + j], f[first + n + j], f[first + 2 * n + j])
+    return (f[index(first + j)], f[index(first + n + j)], f[index(first + 2 * n + j)])
 
 
 @kernel
@@ -76,9 +77,9 @@ def relative_motion(h, f, w, p):
     s, s_rate, s_acc, theta, theta_rate, theta_acc = zero, zero, zero, zero, zero, zero
     for j in range(n):
         phi, psi = _shape(f, move, n, j), _shape(f, spin, n, j)
-        s, theta = add(s, scale(w[x + j], phi)), add(theta, scale(w[x + j], psi))
-        s_rate, theta_rate = add(s_rate, scale(w[u + j], phi)), add(theta_rate, scale(w[u + j], psi))
-        s_acc, theta_acc = add(s_acc, scale(w[du + j], phi)), add(theta_acc, scale(w[du + j], psi))
+        s, theta = add(s, scale(w[index(x + j)], phi)), add(theta, scale(w[index(x + j)], psi))
+        s_rate, theta_rate = add(s_rate, scale(w[index(u + j)], phi)), add(theta_rate, scale(w[index(u + j)], psi))
+        s_acc, theta_acc = add(s_acc, scale(w[index(du + j)], phi)), add(theta_acc, scale(w[index(du + j)], psi))
     numbers = h[PORT_NUMBERS] + 12 * p
     local = add(at(f, numbers), s)
     turned = product(exponential(theta), at9(f, numbers + 3))
@@ -124,7 +125,7 @@ def site(h, f, w, s):
     moves, first, c0 = flex(h, k, FLEX_INBOARD), port(h, p, PORT_COLUMN), flex(h, k, FLEX_C0)
     for j in range(flex(h, k, N_MODES)):
         for e in range(6):
-            w[column(h, first + j) + e] = w[column(h, c0 + j) + e] if moves else 0.0
+            w[index(column(h, first + j) + e)] = w[index(column(h, c0 + j) + e)] if moves else 0.0
     modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
 
 
@@ -153,6 +154,6 @@ def inboard(h, f, w, i, origin, R, omega, v, alpha, a):
     c0 = flex(h, k, FLEX_C0)
     for j in range(flex(h, k, N_MODES)):
         for e in range(6):
-            w[column(h, c0 + j) + e] = 0.0
+            w[index(column(h, c0 + j) + e)] = 0.0
     modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c0)
     return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from pipeline.dynamics.integrate.dop853_coefficients import A, B, C, D, E3, E5, ERROR_ORDER, EXTENDED, STAGES
 from pipeline.dynamics.integrate.state import TIME
 from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y, Y_NEW, Y_STAGE
@@ -36,7 +38,7 @@ def error(h, w, step):
         three += (b * s) ** 2
     if five == 0.0 and three == 0.0:
         return 0.0
-    return abs(step) * five / ((five + 0.01 * three) * size) ** 0.5
+    return abs(step) * five / np.sqrt((five + 0.01 * three) * size)
 
 
 @kernel

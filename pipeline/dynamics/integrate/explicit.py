@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from pipeline.dynamics.integrate.state import (
     BUDGET,
     CAP,
@@ -18,8 +20,10 @@ from pipeline.dynamics.integrate.state import (
     EVALUATIONS,
     FRESH,
     FULL,
+    LAST_NORM,
     LENGTH,
     LOST_CLOSURE,
+    MOST_GROWTH,
     N_EVENTS,
     N_RECORDED,
     NEXT_OUTPUT,
@@ -57,9 +61,12 @@ from pipeline.dynamics.tables import (
     Y_NEW,
     Y_STAGE,
 )
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.vectors import index, kernel
 
-SAFETY, SHRINK, GROW = 0.9, 0.2, 6.0
+# step control with memory: the factor is SAFETY norm^(-exponent) last_norm^MEMORY (Hairer et al., sec. IV.2);
+# the memory keeps steps quiet where stability, not accuracy, limits them
+SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
+LEAST_NORM = 1e-4
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
 
@@ -70,10 +77,10 @@ def snapshot(h, w, n, rows, t, y):
     row, contacts = rows[n[N_RECORDED]], h[N_CONTACTS]
     row[0] = t
     for c in range(contacts):
-        row[1 + c] = n[n[MODE] + c]
-        row[1 + contacts + c] = w[h[LATCHED] + c]
+        row[1 + c] = n[index(n[MODE] + c)]
+        row[1 + contacts + c] = w[index(h[LATCHED] + c)]
     for k in range(h[NY]):
-        row[1 + 2 * contacts + k] = w[y + k]
+        row[1 + 2 * contacts + k] = w[index(y + k)]
     n[N_RECORDED] += 1
 
 
@@ -82,12 +89,12 @@ def set_magnitudes(h, f, w, y):
     """Scale of each error group: tolerance times its floor plus its largest value at both ends."""
     m, o = h[MAGNITUDE], h[Y]
     for g in range(h[N_GROUPS]):
-        w[m + g] = 0.0
+        w[index(m + g)] = 0.0
     for c in range(h[NY]):
-        g = m + h[h[GROUPS] + c]
-        w[g] = max(w[g], max(abs(w[y + c]), abs(w[o + c])))
+        g = m + h[index(h[GROUPS] + c)]
+        w[index(g)] = max(w[index(g)], max(abs(w[index(y + c)]), abs(w[index(o + c)])))
     for g in range(h[N_GROUPS]):
-        w[m + g] = w[h[CONTROL] + RTOL] * (f[h[FLOORS] + g] + w[m + g])
+        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + w[index(m + g)])
 
 
 @kernel
@@ -95,8 +102,8 @@ def scaled_norm(h, w, a):
     """Root mean square of the stretch of w from a, in units of the magnitudes."""
     total = 0.0
     for c in range(h[NY]):
-        total += (w[a + c] / w[h[MAGNITUDE] + h[h[GROUPS] + c]]) ** 2
-    return (total / h[NY]) ** 0.5
+        total += (w[index(a + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+    return np.sqrt(total / h[NY])
 
 
 @kernel
@@ -122,7 +129,7 @@ def compose_start(evaluate: Callable, start_watch: Callable, order: int) -> Call
         """False when the equations have no solution here. Source: Hairer et al., sec. II.4."""
         c, y, slope = h[CONTROL], h[Y], h[SLOPES]
         other = slope + h[NY]
-        evaluate(h, f, w, n, w[c + TIME], y, slope)
+        evaluate(h, f, w, n, w[index(c + TIME)], y, slope)
         n[EVALUATIONS] += 2
         if n[EVALUATION] != OK:
             n[STATUS] = NO_START
@@ -130,20 +137,21 @@ def compose_start(evaluate: Callable, start_watch: Callable, order: int) -> Call
         start_watch(h, w)
         set_magnitudes(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
-        step = 1e-6 * w[c + SPAN]
+        step = 1e-6 * w[index(c + SPAN)]
         if size > 0.0 and steepness > 0.0:
-            step = min(0.01 * size / steepness, 0.01 * w[c + SPAN])
-        step = min(step, w[c + END] - w[c + TIME])
+            step = min(0.01 * size / steepness, 0.01 * w[index(c + SPAN)])
+        step = min(step, w[index(c + END)] - w[index(c + TIME)])
         for k in range(h[NY]):
-            w[h[Y_STAGE] + k] = w[y + k] + step * w[slope + k]
-        evaluate(h, f, w, n, w[c + TIME] + step, h[Y_STAGE], other)
+            w[index(h[Y_STAGE] + k)] = w[index(y + k)] + step * w[index(slope + k)]
+        evaluate(h, f, w, n, w[index(c + TIME)] + step, h[Y_STAGE], other)
         if n[EVALUATION] == OK:
             for k in range(h[NY]):
-                w[other + k] -= w[slope + k]
+                w[index(other + k)] -= w[index(slope + k)]
             steepness = max(steepness, scaled_norm(h, w, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        w[c + STEP] = step
+        w[index(c + STEP)] = step
+        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = LEAST_NORM, GROW
         n[FRESH] = 0
         return True
 
@@ -158,6 +166,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
     attempt, extend = method.compose(evaluate)
     error, interpolate, last, extra = method.error, method.interpolate, method.last, method.extra
     exponent = -1.0 / (method.error_order + 1)
+    remembering = exponent + 0.2 * MEMORY
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
     first_step = compose_start(evaluate, start_watch, method.error_order + 1)
@@ -166,7 +175,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
     def must_stop(h, w, n, outputs, rows, events):
         """Whether to return now, with the reason in n[STATUS]."""
         c, waiting = h[CONTROL], outputs.shape[0] - n[NEXT_OUTPUT]
-        if w[c + TIME] >= w[c + END]:
+        if w[index(c + TIME)] >= w[index(c + END)]:
             n[STATUS] = SEGMENT_END
         elif n[EVALUATIONS] >= n[CAP]:
             n[STATUS] = CAP_REACHED
@@ -181,7 +190,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
     @kernel
     def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
         """Snapshots at the output times up to t_end, from the dense output."""
-        t = w[h[CONTROL] + TIME]
+        t = w[index(h[CONTROL] + TIME)]
         while n[NEXT_OUTPUT] < outputs.shape[0] and outputs[n[NEXT_OUTPUT]] <= t_end:
             wanted = outputs[n[NEXT_OUTPUT]]
             if wanted > t:
@@ -201,8 +210,8 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         n[EVALUATIONS] += 1
         if n[EVALUATION] != OK:
             return False
-        w[c + DRIFT] = max(w[c + DRIFT], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
-        used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[c + RTOL] * w[c + LENGTH])
+        w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
+        used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[index(c + RTOL)] * w[index(c + LENGTH)])
         if used > 0:
             n[EVALUATIONS] += used
             n[PROJECTIONS] += 1
@@ -226,9 +235,19 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         slope = h[SLOPES]
         final = slope + h[NY] * last
         for k in range(h[NY]):
-            w[h[Y] + k] = w[h[Y_NEW] + k]
-            w[slope + k] = w[final + k]
-        w[h[CONTROL] + TIME] = t_new
+            w[index(h[Y] + k)] = w[index(h[Y_NEW] + k)]
+            w[index(slope + k)] = w[index(final + k)]
+        w[index(h[CONTROL] + TIME)] = t_new
+
+    @kernel
+    def next_growth(h, w, norm):
+        """Factor from the step that has just been accepted to the next one."""
+        c = h[CONTROL]
+        norm = max(norm, LEAST_NORM)
+        growth = SAFETY * norm**remembering * w[index(c + LAST_NORM)] ** MEMORY
+        growth = min(w[index(c + MOST_GROWTH)], max(SHRINK, growth))
+        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = norm, GROW
+        return growth
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
@@ -237,27 +256,28 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         while not must_stop(h, w, n, outputs, rows, events):
             if n[FRESH] and not first_step(h, f, w, n):
                 return
-            step, t = w[c + STEP], w[c + TIME]
-            final = t + 1.0001 * step >= w[c + END]
+            step, t = w[index(c + STEP)], w[index(c + TIME)]
+            final = t + 1.0001 * step >= w[index(c + END)]
             if final:
-                step = w[c + END] - t
-            if not step > SMALLEST_STEP * max(abs(t), w[c + SPAN]):
+                step = w[index(c + END)] - t
+            if not step > SMALLEST_STEP * max(abs(t), w[index(c + SPAN)]):
                 n[STATUS] = LOST_CLOSURE if n[EVALUATION] != OK else STEP_TOO_SMALL
                 return
-            t_new = w[c + END] if final else t + step
+            t_new = w[index(c + END)] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
             if norm > 1.0:
                 n[REJECTED] += 1
-                w[c + STEP] = step * max(SHRINK, SAFETY * norm**exponent)
+                w[index(c + STEP)] = step * max(SHRINK, SAFETY * norm**exponent)
+                w[index(c + MOST_GROWTH)] = 1.0
                 continue
-            growth = GROW if norm == 0.0 else min(GROW, max(SHRINK, SAFETY * norm**exponent))
+            growth = next_growth(h, w, norm)
             happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
             n[STEPS] += 1
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
             accept(h, w, t_new)
-            w[c + STEP] = step * growth
+            w[index(c + STEP)] = step * growth
             if happened > 0:
                 snapshot(h, w, n, rows, t_new, h[Y])
                 n[FRESH] = 1

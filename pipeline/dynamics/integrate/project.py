@@ -29,7 +29,7 @@ from pipeline.dynamics.tables import (
     flex,
     link,
 )
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.vectors import index, kernel
 
 ITERATIONS = 8
 #: rounding may stop the residuals this far above a very tight tolerance
@@ -41,8 +41,8 @@ def largest(w, first, count):
     """Largest magnitude of a stretch of w; NaN counts as infinite."""
     result = 0.0
     for k in range(first, first + count):
-        if not abs(w[k]) <= result:
-            result = abs(w[k]) if w[k] == w[k] else 1e300
+        if not abs(w[index(k)]) <= result:
+            result = abs(w[index(k)]) if w[index(k)] == w[index(k)] else 1e300
     return result
 
 
@@ -59,16 +59,16 @@ def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) ->
     def move(h, w, y, step):
         """Add to the positions of y the change that a small displacement of the coordinates means."""
         for k in range(h[NV]):
-            w[h[U] + k] = w[step + k]
+            w[index(h[U] + k)] = w[index(step + k)]
         for i in range(1, h[N_LINKS]):
             q, c = link(h, i, Q0), link(h, i, C0)
             joint_motion(link(h, i, JOINT_KIND), w, h[X] + q, h[U] + c, h[DU] + c, h[JOINT], h[POSITION_RATE] + q)
         for k in range(h[N_FLEX]):
             q, c = flex(h, k, FLEX_Q0), flex(h, k, FLEX_C0)
             for j in range(flex(h, k, N_MODES)):
-                w[h[POSITION_RATE] + q + j] = w[step + c + j]
+                w[index(h[POSITION_RATE] + q + j)] = w[index(step + c + j)]
         for k in range(h[NQ]):
-            w[y + k] += w[h[POSITION_RATE] + k]
+            w[index(y + k)] += w[index(h[POSITION_RATE] + k)]
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
@@ -84,7 +84,7 @@ def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) ->
                 return used
             correction(h, w, h[RESIDUAL_RATE], step)
             for k in range(h[NV]):
-                w[y + h[NQ] + k] += w[step + k]
+                w[index(y + h[NQ] + k)] += w[index(step + k)]
             correction(h, w, h[RESIDUAL], step)
             move(h, w, y, step)
             evaluate(h, f, w, n, t, y, dy)

@@ -10,8 +10,9 @@ from __future__ import annotations
 from pipeline.dynamics.tables import MODE
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
-# size of the mechanism, largest violation of a closure before projection
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, N_CONTROLS = range(8)
+# size of the mechanism, largest violation of a closure before projection, error norm of the last
+# accepted step, largest growth of the next (1 after a rejection)
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, N_CONTROLS = range(10)
 # integers
 (
     STATUS,

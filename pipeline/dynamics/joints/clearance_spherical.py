@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from pipeline.dynamics.tables import (
     AXES,
     BALL,
@@ -65,7 +67,7 @@ def measure(h, f, w, c):
     socket, ball, o = site_frame(h, contact(h, c, SOCKET)), site_frame(h, contact(h, c, BALL)), touch(h, c)
     p_SB = sub(at(w, ball + ORIGIN), at(w, socket + ORIGIN))
     v_SB = sub(at(w, ball + VELOCITY), at(w, socket + VELOCITY))
-    distance = dot(p_SB, p_SB) ** 0.5
+    distance = np.sqrt(dot(p_SB, p_SB))
     # a concentric ball has no normal; any does, since there is no force
     normal = scale(1.0 / distance, p_SB) if distance > 0.0 else (0.0, 0.0, 1.0)
     w[o + GAP] = f[h[CONTACT_NUMBERS] + NUMBERS * c + CLEARANCE] - distance
@@ -124,7 +126,7 @@ def compose(normal: Callable, stored: Callable, friction: Callable) -> Callable:
         p_WQ = add(at(w, ball + ORIGIN), scale(f[numbers + BALL_RADIUS], normal_axis))
         slip = sub(point_velocity(w, ball, p_WQ), point_velocity(w, socket, p_WQ))
         slip = sub(slip, scale(dot(normal_axis, slip), normal_axis))
-        speed = dot(slip, slip) ** 0.5
+        speed = np.sqrt(dot(slip, slip))
         force = scale(-f_n, normal_axis)
         if speed > 0.0:
             f_t = f_n * friction(contact(h, c, FRICTION_KIND), speed, _law(f, numbers + FRICTION_LAW))

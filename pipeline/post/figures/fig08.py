@@ -35,7 +35,7 @@ def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None
     axes.annotate(
         text,
         (time[i], angle[i]),
-        xytext=(0, -18 if below else 12),
+        xytext=(0, -110 if below else 110),
         textcoords="offset points",
         ha="center",
         color=style.SOFT,

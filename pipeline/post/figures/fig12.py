@@ -23,7 +23,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         style.heading(
             figure,
             "Figure 12: CSJ model",
-            "slim panels (added): difference from the ideal model, or a zoom to its range",
+            "slim panels (added): difference from the ideal model, or a zoom to its range; "
+            "dots: largest force of each impact",
         )
         style.shared_legend(figure, labelled, 2)
         return style.files("fig12", figure)

@@ -31,7 +31,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         style.heading(
             figure,
             "Figure 13: FAR-CSJ model",
-            "beyond its horizon a single run is pale; the band is the ensemble's mean ± one standard deviation",
+            "beyond its horizon a single run is pale; the band is the ensemble's mean ± one standard deviation; "
+            "dots: largest force of each impact",
         )
         style.shared_legend(figure, labelled, 3)
         return style.files("fig13", figure)

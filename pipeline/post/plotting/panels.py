@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,8 +15,8 @@ from pipeline.post.errors import common_times
 from pipeline.post.models import PLATFORM, Motion
 from pipeline.post.plotting import style
 
-#: alpha of a curve inside and beyond its horizon
-FIRM, PALE = 0.95, 0.28
+#: alpha of a curve inside its horizon, of one that the paper does not have, and beyond the horizon
+FIRM, ADDED, PALE = 0.95, 0.6, 0.28
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,8 @@ def six_panels(
             zoomed(strip, quantity, reference, others)
         else:
             difference(strip, quantity, reference, others)
+    for motion in others:
+        _peaks(axes[4, 0], motion)
     trajectory(axes[4, 1], reference, others)
     axes[4, 1].set_title("(f) centre of ball A1 in the global frame")
     ball_distance(axes[5, 1], reference, others)
@@ -84,6 +87,7 @@ def over_time(
         lw=1.1,
         ls=(0, (5, 2)),
         label=reference.model.label,
+        zorder=2.4,
     )
     axes.set_ylabel(quantity.unit)
     axes.set_xlim(reference.time[0], reference.time[-1])
@@ -141,12 +145,20 @@ def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> No
 
 
 def _curve(axes: Axes, motion: Motion, values: np.ndarray, width: float, time: np.ndarray | None = None) -> None:
-    """Firm inside the horizon, pale beyond it."""
+    """Firm inside the horizon, pale beyond it; what the paper does not have lies below what it has."""
     time = motion.time if time is None else time
     inside = time <= motion.horizon
+    look: dict[str, Any] = {"color": motion.model.color, "lw": width, "zorder": 2.0 if motion.model.ours else 2.2}
     if not inside.all():
-        axes.plot(time[~inside], values[~inside], color=motion.model.color, lw=width, alpha=PALE)
-    axes.plot(time[inside], values[inside], color=motion.model.color, lw=width, alpha=FIRM, label=motion.model.label)
+        axes.plot(time[~inside], values[~inside], alpha=PALE, **look)
+    alpha = ADDED if motion.model.ours else FIRM
+    axes.plot(time[inside], values[inside], alpha=alpha, label=motion.model.label, **look)
+
+
+def _peaks(axes: Axes, motion: Motion) -> None:
+    """Largest force of each impact inside the horizon; the outputs in between may miss it."""
+    inside = motion.impacts[:, 0] <= motion.horizon
+    axes.plot(*motion.impacts[inside].T, "o", ms=2.2, color=motion.model.color)
 
 
 def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset) -> None:

@@ -15,14 +15,14 @@ from typing import Any
 import pyvista as pv
 
 #: how the description refers to VTK objects: by their addresses, quoted or as ${address}
-_ADDRESS = re.compile(r"(?<=[\"{])[0-9a-f]{16}(?=[\"}])")
+_ADDRESS = re.compile(r"(?<=[\"{])[0-9a-f]{16}(?=[\"}-])")
 _MTIME = re.compile(r'("mtime": )\d+')
 _WINDOW = "window"
 
 
 def page(scene: pv.Plotter) -> bytes:
     """Self-contained page with the plotter's scene; equal scenes give equal bytes."""
-    from trame_vtk.tools.vtksz2html import write_html
+    from trame_vtk.tools.vtksz2html import write_html  # type: ignore[import-untyped]
 
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -36,7 +36,7 @@ def page(scene: pv.Plotter) -> bytes:
 
 def _state(scene: pv.Plotter) -> dict[str, Any]:
     """The scene's description for vtk.js: instances, and the arrays that they name by hash."""
-    from trame_vtk.modules.vtk import serializers
+    from trame_vtk.modules.vtk import serializers  # type: ignore[import-untyped]
 
     scene.render()
     window = scene.render_window

@@ -8,6 +8,8 @@ small against the radii.
 
 from __future__ import annotations
 
+import numpy as np
+
 from pipeline.core.scene.parts import NormalLaw
 from pipeline.dynamics.vectors import kernel
 
@@ -15,7 +17,7 @@ from pipeline.dynamics.vectors import kernel
 @kernel
 def power(depth, exponent):
     """depth^exponent for depth >= 0, fast for the Hertzian 3/2."""
-    return depth * depth**0.5 if exponent == 1.5 else depth**exponent
+    return depth * np.sqrt(depth) if exponent == 1.5 else depth**exponent
 
 
 @kernel

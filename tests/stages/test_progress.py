@@ -1,0 +1,83 @@
+"""What a user sees while something runs."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+
+from pipeline.core.workflow.progress import Monitor, duration
+
+
+class Screen(io.StringIO):
+    """A stream that says whether it is a terminal."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__()
+        self.terminal = terminal
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+
+class Clock:
+    """Time that the test moves."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def watched(*, terminal: bool) -> tuple[Monitor, Screen, Clock]:
+    screen, clock = Screen(terminal=terminal), Clock()
+    monitor = Monitor(screen, clock)
+    monitor.start(2)
+    return monitor, screen, clock
+
+
+def test_lines_that_stay_are_sparse():
+    monitor, screen, clock = watched(terminal=False)
+    name = monitor.begin("sps4/csj", "simulate")
+    for percent in range(100):
+        clock.now = percent * 0.3
+        monitor.update(name, percent / 100, "")
+    monitor.finish(name, failed=False)
+    lines = screen.getvalue().splitlines()
+    assert lines[0] == "flexclear: [0/2] sps4/csj: simulate"
+    assert lines[-1] == "flexclear: [1/2] sps4/csj: simulate done after 29.7 s"
+    assert len(lines) == 4  # 30 s, one line every 10 s
+
+
+def test_the_rest_is_estimated_from_the_pace_without_compiling():
+    monitor, screen, clock = watched(terminal=False)
+    name = monitor.begin("sps4/csj", "simulate")
+    monitor.update(name, None, "compiling")
+    assert screen.getvalue().splitlines()[-1].endswith("sps4/csj: simulate compiling")
+    clock.now = 30.0
+    monitor.update(name, 0.0, "")
+    clock.now = 42.0
+    monitor.update(name, 0.25, "t = 0.045 s")
+    assert screen.getvalue().splitlines()[-1].endswith("simulate  25% 36.0 s left t = 0.045 s")
+
+
+def test_a_terminal_keeps_one_line_with_everything_that_runs():
+    monitor, screen, clock = watched(terminal=True)
+    first, second = monitor.begin("a", "simulate"), monitor.begin("b", "mesh rod1")
+    clock.now = 1.0
+    monitor.update(first, 0.5, "")
+    assert "\n" not in screen.getvalue()
+    assert screen.getvalue().split("\r\033[K")[-1] == "[0/2] a: simulate  50% | b: mesh rod1"
+    monitor.say("something broke")
+    assert screen.getvalue().endswith("\r\033[Kflexclear: something broke\n")
+    monitor.finish(first, failed=False)
+    monitor.finish(second, failed=True)
+    monitor.end()
+    assert screen.getvalue().endswith("\r\033[K")
+
+
+@pytest.mark.parametrize(
+    "seconds, text", [(4.24, "4.2 s"), (190.0, "3 min 10 s"), (59.97, "1 min 0 s"), (119.8, "2 min 0 s")]
+)
+def test_durations_read_well(seconds: float, text: str):
+    assert duration(seconds) == text

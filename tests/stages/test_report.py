@@ -1,0 +1,53 @@
+"""The report's tasks: every reference of every figure leads to an artifact that a scene has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.artifacts.store import Store
+from pipeline.core.errors import InputError
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import in_order
+from stages.report import Scenes, figure_tasks
+from stages.run import Workplace
+
+
+def test_every_figure_and_table_of_the_paper_has_its_inputs(root: Path, tmp_path: Path):
+    scenes = Scenes()
+    tasks = figure_tasks(Workplace(Store(tmp_path), Sources(root)), scenes)
+    names = {task.part for task in tasks}
+    assert {"fig03", "fig04", "fig06", "fig08", "fig09"} | {f"fig{n}" for n in range(11, 18)} <= names
+    assert {"table04", "table05", "table07", "table08", "table09", "table10"} <= names
+    models = {"ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb"}
+    run = {task.scene for task in in_order(tasks) if task.stage == "simulate"}
+    assert {f"sps4/{model}" for model in models} <= run
+    assert {task.folder for task in tasks} == {"figures", "tables"}
+
+
+def test_figures_share_the_tasks_of_a_scene():
+    scenes = Scenes()
+    assert scenes.artifact("sps4/csj:run") is scenes.artifact("sps4/csj:post").inputs["run"]
+
+
+def test_time_is_measured_alone_and_over_all_scenes_of_a_folder():
+    timing = Scenes().timing("sps4")
+    assert timing.exclusive
+    assert {"sps4/ideal", "sps4/far_csj_cb"} <= timing.params.keys()
+    assert "sps4/far_csj_cb:bundle/rod1" in timing.inputs
+
+
+@pytest.mark.parametrize(
+    "reference, told",
+    [
+        ("sps4/csj:runn", "did you mean 'run'"),
+        ("sps4/csj:bundle/rod1", "there is no bundle of 'rod1'"),
+        ("sps4/csj:ensemble", "there is no ensemble of the whole scene"),
+        ("sps4/nothing:run", "no such file"),
+        ("nowhere:timing", "there are no scenes"),
+    ],
+)
+def test_references_that_lead_nowhere_are_refused(reference: str, told: str):
+    with pytest.raises(InputError, match=told):
+        Scenes().artifact(reference)
