@@ -45,5 +45,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
     seen = observe(engine, trajectory.rows)
     bad = np.flatnonzero(seen["status"][:, 0])
     if len(bad):
-        raise SolverError(f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures")
+        raise SolverError(
+            f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
+        )
     return seen

@@ -190,7 +190,16 @@ CLEARANCE, BALL_RADIUS, FLOOR, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 7
 # a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
 ORIGIN, AXES, OMEGA, VELOCITY, ALPHA, ACCELERATION, FRAME_SIZE = 0, 3, 12, 15, 18, 21, 24
 # a joint's motion: rotation (9), position (3), rates (3 + 3), rate biases (3 + 3), then columns (6 each)
-J_ROTATION, J_POSITION, J_OMEGA, J_VELOCITY, J_ALPHA, J_ACCELERATION, J_COLUMNS, JOINT_SIZE = 0, 9, 12, 15, 18, 21, 24, 60
+J_ROTATION, J_POSITION, J_OMEGA, J_VELOCITY, J_ALPHA, J_ACCELERATION, J_COLUMNS, JOINT_SIZE = (
+    0,
+    9,
+    12,
+    15,
+    18,
+    21,
+    24,
+    60,
+)
 # spatial inertia: mass, mass * centre (3), inertia about the kernels' origin (xx yy zz xy xz yz)
 INERTIA_SIZE = 10
 # what a contact does now

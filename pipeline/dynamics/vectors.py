@@ -11,9 +11,7 @@ import numpy as np
 from numba import njit
 
 # No kernel allocates, so none counts references; and none is called from Python through a C function.
-kernel = njit(
-    error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, _nrt=False, no_cfunc_wrapper=True
-)
+kernel = njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, _nrt=False, no_cfunc_wrapper=True)
 
 
 #: type of an index: unsigned, because compiled code must otherwise ask of each whether it is negative

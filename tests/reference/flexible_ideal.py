@@ -15,7 +15,7 @@ from scipy.integrate import DOP853
 
 from tests.reference import sps4
 from tests.reference.clearance_platform import GRID, Setting, demand, platform_motion, setting
-from tests.reference.flexible_simulation import Leg, ball_motion, equations, leg, read, start, state_rate
+from tests.reference.flexible_simulation import STEM, Leg, ball_turn, carried, equations, leg, read, start, state_rate
 from tests.reference.ideal_motion import Motion, cross, motion_at, skew
 
 Array = np.ndarray
@@ -33,19 +33,15 @@ class Result:
 
 def solve(s: Setting, one: Leg, t: float, y: Array) -> tuple[Array, Motion, Array]:
     """State rate, platform motion, and force on the ball A1 by the socket, world axes; rising half of the stroke."""
-    n = one.ball_shape.shape[1]
+    n = one.shapes.shape[1]
     x, m = read(n, t, 1, y), platform_motion(s, t, 1, y[0], y[1])
     lengths, rates, accelerations = sps4.leg_lengths(t)
     lengths[0], rates[0], accelerations[0] = y[0], y[1], 1.0
     faster = motion_at(m.height, m.rotation, lengths, rates, accelerations)
     base, axes, arms = demand(s, m)
     M, right = equations(one, x)
-    r, _, _ = ball_motion(one, x)
-    ball = np.hstack([-skew(r), one.ball_shape])
-    relative = one.ball_shape @ x.q_rate
-    relative[2] += x.end_rate
-    ball_bias = cross(x.omega, cross(x.omega, r)) + 2.0 * cross(x.omega, relative)
-    ball_bias[2] += x.end_acceleration
+    point = carried(one, x, ball_turn(one, x), STEM)
+    ball = np.hstack([-skew(point.place), point.shape])
     k = 3 + n
     A, b = np.zeros((k + 9, k + 9)), np.zeros(k + 9)
     force = slice(k + 6, k + 9)
@@ -56,7 +52,7 @@ def solve(s: Setting, one: Leg, t: float, y: Array) -> tuple[Array, Motion, Arra
     A[k : k + 3, force], A[k + 3 : k + 6, force] = np.eye(3), skew(m.rotation @ sps4.A[0])
     b[k : k + 6] = -base
     A[force, :k], A[force, k] = x.R @ ball, m.legs[2][0] - faster.legs[2][0]
-    b[force] = m.legs[2][0] - x.R @ ball_bias
+    b[force] = m.legs[2][0] - x.R @ point.bias
     found = np.linalg.solve(A, b)
     return state_rate(y, x, float(found[k]), found[:k]), m, found[force]
 
@@ -64,7 +60,7 @@ def solve(s: Setting, one: Leg, t: float, y: Array) -> tuple[Array, Motion, Arra
 def simulate(until: float, rtol: float = 1e-9) -> Result:
     """Run from rest to `until` [s] <= 0.09."""
     s, one = setting(), leg()
-    y = start(one.ball_shape.shape[1])
+    y = start(one.shapes.shape[1])
     times = np.arange(0.0, until + GRID / 2.0, GRID)
     solver = DOP853(lambda t, y: solve(s, one, t, y)[0], 0.0, y, times[-1], rtol=rtol, atol=1e-14, max_step=GRID)
     states = [y]

@@ -31,17 +31,9 @@ BELOW, STEM = 0.28, 0.04
 
 @dataclass(frozen=True)
 class Leg:
-    """Constants of the flexible leg in its frame.
-
-    ball: from the rod's lower end to the upper ball's centre (3,); ball_shape: its displacement per coordinate (3, n).
-    masses, places, shapes: of all points, the ball's centre of mass last; (points,), (points, 3), (3 points, n).
-    """
+    """Constants of the flexible leg in its frame: the rod, its shapes as (3 points, n), its modal mass (n, n)."""
 
     rod: Rod
-    ball: Array
-    ball_shape: Array
-    masses: Array
-    places: Array
     shapes: Array
     modal_mass: Array
 
@@ -49,16 +41,8 @@ class Leg:
 def leg() -> Leg:
     """Leg 1 of the paper."""
     r = rod()
-    end = np.array([0.0, 0.0, LENGTH])
-    stem, centre = np.array([0.0, 0.0, STEM]), np.array([0.0, 0.0, STEM - sps4.BALL_CENTRE])
-    # a point fixed to the rod's end moves by the end's displacement and rotation
-    ball_shape = r.tip_shape - skew(stem) @ r.tip_turn
-    mass_shape = r.tip_shape - skew(centre) @ r.tip_turn
-    masses = np.append(r.mass, sps4.BALL.mass)
-    shapes = np.concatenate([r.shape, mass_shape[None]])
-    modal_mass = np.einsum("p,pin,pim->nm", masses, shapes, shapes)
-    places = np.vstack([r.place, end + centre])
-    return Leg(r, end + stem, ball_shape, masses, places, shapes.reshape(-1, shapes.shape[2]), modal_mass)
+    modal_mass = np.einsum("p,pin,pim->nm", r.mass, r.shape, r.shape)
+    return Leg(r, r.shape.reshape(-1, r.shape.shape[2]), modal_mass)
 
 
 @dataclass(frozen=True)
@@ -83,13 +67,50 @@ def read(n: int, t: float, side: int, y: Array) -> Now:
     return Now(R, y[6:9], y[9 : 9 + n], y[9 + n :], lengths[0] - BELOW, rates[0], accelerations[0])
 
 
-def ball_motion(leg: Leg, x: Now) -> tuple[Array, Array, Array]:
-    """The ball's centre from B1, its velocity, and the ball's angular velocity, leg axes."""
-    r = leg.ball + leg.ball_shape @ x.q
-    r[2] += x.end
-    velocity = cross(x.omega, r) + leg.ball_shape @ x.q_rate
-    velocity[2] += x.end_rate
-    return r, velocity, x.omega + leg.rod.tip_turn @ x.q_rate
+@dataclass(frozen=True)
+class Carried:
+    """A point of the upper ball in leg axes: place from B1, velocity, speed per modal rate (3, n), and bias.
+
+    bias: its acceleration while angular and modal accelerations are zero.
+    """
+
+    place: Array
+    velocity: Array
+    shape: Array
+    bias: Array
+
+
+@dataclass(frozen=True)
+class Turn:
+    """How the upper ball turns against the leg: rotation, angular velocity, and that per modal rate (3, n)."""
+
+    rotation: Array
+    omega: Array
+    shape: Array
+
+
+def ball_turn(leg: Leg, x: Now) -> Turn:
+    """The rod's end turns by exp(theta), theta = tip_turn q.
+
+    Angular velocity to second order in theta, which is below 1e-2: theta' + theta x theta' / 2.
+    """
+    theta = leg.rod.tip_turn @ x.q
+    shape = leg.rod.tip_turn + 0.5 * skew(theta) @ leg.rod.tip_turn
+    return Turn(exponential(theta), shape @ x.q_rate, shape)
+
+
+def carried(leg: Leg, x: Now, turn: Turn, reach: float) -> Carried:
+    """The point on the ball's axis `reach` [m] above the rod's end."""
+    lever = turn.rotation @ np.array([0.0, 0.0, reach])
+    place = leg.rod.tip_shape @ x.q + lever
+    place[2] += x.end + LENGTH
+    shape = leg.rod.tip_shape - skew(lever) @ turn.shape
+    relative = shape @ x.q_rate
+    relative[2] += x.end_rate
+    bias = cross(x.omega, cross(x.omega, place)) + 2.0 * cross(x.omega, relative)
+    bias += cross(turn.omega, cross(turn.omega, lever))
+    bias[2] += x.end_acceleration
+    return Carried(place, cross(x.omega, place) + relative, shape, bias)
 
 
 def skew_row(vectors: Array) -> Array:
@@ -106,37 +127,39 @@ def equations(leg: Leg, x: Now) -> tuple[Array, Array]:
 
     Leg axes; shapes (3 + n, 3 + n) and (3 + n,).
     """
-    r, n, points = leg.rod, len(x.q), len(leg.masses)
-    places = leg.places + (leg.shapes @ x.q).reshape(points, 3)
+    r, n, points = leg.rod, len(x.q), len(leg.rod.mass)
+    turn = ball_turn(leg, x)
+    ball = carried(leg, x, turn, STEM - sps4.BALL_CENTRE)
+    places = r.place + (leg.shapes @ x.q).reshape(points, 3)
     places[:, 2] += x.end
     relative = (leg.shapes @ x.q_rate).reshape(points, 3)
     relative[:, 2] += x.end_rate
     bias = cross(x.omega, cross(x.omega, places)) + 2.0 * cross(x.omega, relative)
     bias[:, 2] += x.end_acceleration
-    bias *= leg.masses[:, None]
-    weighted = leg.masses[:, None] * places
-    turned = exponential(r.tip_turn @ x.q)
-    J = turned @ np.diag([sps4.BALL.transverse, sps4.BALL.transverse, sps4.BALL.axial]) @ turned.T
+    bias *= r.mass[:, None]
+    weighted = r.mass[:, None] * places
+    J = turn.rotation @ np.diag([sps4.BALL.transverse, sps4.BALL.transverse, sps4.BALL.axial]) @ turn.rotation.T
     lower = np.diag([sps4.LOWER[2], sps4.LOWER[2], sps4.LOWER[3]])
+    weight = sps4.BALL.mass
+    arm = skew(ball.place)
     M = np.empty((3 + n, 3 + n))
-    M[:3, :3] = np.sum(weighted * places) * np.eye(3) - weighted.T @ places + lower + J
+    M[:3, :3] = np.sum(weighted * places) * np.eye(3) - weighted.T @ places + lower + J - weight * arm @ arm
     # side by side, the cross-product matrices of all points: a sum over points is one product
-    M[:3, 3:] = skew_row(weighted) @ leg.shapes + J @ r.tip_turn
+    M[:3, 3:] = skew_row(weighted) @ leg.shapes + J @ turn.shape + weight * arm @ ball.shape
     M[3:, :3] = M[:3, 3:].T
-    M[3:, 3:] = leg.modal_mass + r.tip_turn.T @ J @ r.tip_turn
-    turning = r.tip_turn @ x.q_rate
-    ball_omega = x.omega + turning
-    ball_bias = J @ cross(x.omega, turning) + cross(ball_omega, J @ ball_omega)
+    M[3:, 3:] = leg.modal_mass + turn.shape.T @ J @ turn.shape + weight * ball.shape.T @ ball.shape
+    ball_omega = x.omega + turn.omega
+    spin = J @ cross(x.omega, turn.omega) + cross(ball_omega, J @ ball_omega)
     right = np.empty(3 + n)
-    right[:3] = -cross(places, bias).sum(axis=0) - cross(x.omega, lower @ x.omega) - ball_bias
-    right[3:] = -r.tip_turn.T @ ball_bias - r.stiffness @ x.q - bias.ravel() @ leg.shapes
+    right[:3] = -cross(places, bias).sum(axis=0) - cross(x.omega, lower @ x.omega) - spin - weight * arm @ ball.bias
+    right[3:] = -bias.ravel() @ leg.shapes - turn.shape.T @ spin - weight * ball.bias @ ball.shape - r.stiffness @ x.q
     return M, right
 
 
-def load(leg: Leg, arm: Array, reach: Array, force: Array) -> Array:
-    """What a force on the ball adds to the right-hand side; leg axes, arm from B1, reach from the ball's centre."""
-    modal = leg.ball_shape.T @ force + leg.rod.tip_turn.T @ cross(reach, force)
-    return np.concatenate([cross(arm, force), modal])
+def load(turn: Turn, ball: Carried, reach: Array, force: Array) -> Array:
+    """What a force on the ball adds to the right-hand side; leg axes, `reach` from the ball's centre."""
+    modal = ball.shape.T @ force + turn.shape.T @ cross(reach, force)
+    return np.concatenate([cross(ball.place + reach, force), modal])
 
 
 def state_rate(y: Array, x: Now, second: float, accelerations: Array) -> Array:
@@ -160,29 +183,31 @@ def start(n: int) -> Array:
 def mechanism(s: Setting) -> clearance_run.Mechanism:
     """The mechanism as functions of time and state."""
     one = leg()
-    n = one.ball_shape.shape[1]
+    n = one.shapes.shape[1]
 
     def platform(t: float, side: int, y: Array) -> Motion:
         return platform_motion(s, t, side, y[0], y[1])
 
-    def pressed(x: Now, m: Motion, latched: float | None) -> Touch:
-        r, velocity, omega = ball_motion(one, x)
-        offset, relative = x.R @ r - m.legs[0][0], x.R @ velocity - m.legs[1][0]
-        return press(s.contact, offset, relative, x.R @ omega, m.omega, latched)
+    def pressed(x: Now, turn: Turn, ball: Carried, m: Motion, latched: float | None) -> Touch:
+        offset, relative = x.R @ ball.place - m.legs[0][0], x.R @ ball.velocity - m.legs[1][0]
+        return press(s.contact, offset, relative, x.R @ (x.omega + turn.omega), m.omega, latched)
 
     def touch(t: float, side: int, y: Array, latched: float | None) -> Touch:
-        return pressed(read(n, t, side, y), platform(t, side, y), latched)
+        x = read(n, t, side, y)
+        turn = ball_turn(one, x)
+        return pressed(x, turn, carried(one, x, turn, STEM), platform(t, side, y), latched)
 
     def rhs(side: int, latched: float | None) -> clearance_run.RightHandSide:
         def derivative(t: float, y: Array) -> Array:
             x, m = read(n, t, side, y), platform(t, side, y)
-            now = pressed(x, m, latched)
-            force, reach = x.R.T @ now.force, x.R.T @ now.reach
-            arm = ball_motion(one, x)[0] + reach
+            turn = ball_turn(one, x)
+            ball = carried(one, x, turn, STEM)
+            now = pressed(x, turn, ball, m, latched)
             M, right = equations(one, x)
-            accelerations = np.linalg.solve(M, right + load(one, arm, reach, force))
-            second = socket_acceleration(s, t, side, y[0], y[1], m, sps4.B[0] + x.R @ arm, now.force)
-            return state_rate(y, x, second, accelerations)
+            force, reach = x.R.T @ now.force, x.R.T @ now.reach
+            accelerations = np.linalg.solve(M, right + load(turn, ball, reach, force))
+            point = sps4.B[0] + x.R @ (ball.place + reach)
+            return state_rate(y, x, socket_acceleration(s, t, side, y[0], y[1], m, point, now.force), accelerations)
 
         return derivative
 

@@ -47,12 +47,20 @@ MESH: Schema = {
 #: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
 MODES: Schema = {
     "frequency": _V(("mode",), "Hz", "natural frequency of the kept coordinate in the reduced basis"),
-    "shape": _V(("node", "dof", "mode"), "kg-0.5", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"),
+    "shape": _V(
+        ("node", "dof", "mode"), "kg-0.5", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"
+    ),
     "rigid_frequency": _V(("rigid_mode",), "Hz", "frequencies of the removed rigid-body modes", optional=True),
     "kind": _V(("mode",), "1", "bending, torsion or axial by share of kinetic energy"),
-    "exact_euler_bernoulli": _V(("mode",), "Hz", "exact frequency of the uniform rod, Euler-Bernoulli bending", optional=True),
-    "exact_rayleigh": _V(("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia", optional=True),
-    "exact_timoshenko": _V(("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia and shear", optional=True),
+    "exact_euler_bernoulli": _V(
+        ("mode",), "Hz", "exact frequency of the uniform rod, Euler-Bernoulli bending", optional=True
+    ),
+    "exact_rayleigh": _V(
+        ("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia", optional=True
+    ),
+    "exact_timoshenko": _V(
+        ("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia and shear", optional=True
+    ),
 }
 
 #: stage 3: all that the dynamics needs of a flexible body, in its body frame
@@ -68,12 +76,18 @@ BUNDLE: Schema = {
     "frequency": _V(("mode",), "Hz", "natural frequency of the coordinate"),
     "frame_position": _V(("frame", "axis"), "m", "undeformed origin of the named frame in the body frame"),
     "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, named frame to body frame, undeformed"),
-    "frame_translation_shape": _V(("frame", "axis", "mode"), "kg-0.5", "displacement of the frame per modal coordinate, body axes"),
-    "frame_rotation_shape": _V(("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"),
+    "frame_translation_shape": _V(
+        ("frame", "axis", "mode"), "kg-0.5", "displacement of the frame per modal coordinate, body axes"
+    ),
+    "frame_rotation_shape": _V(
+        ("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"
+    ),
     "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
     "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
     "shape_translation": _V(("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"),
-    "shape_rotation": _V(("node", "axis", "mode"), "kg-0.5 m-1", "node rotation vector per modal coordinate, body axes"),
+    "shape_rotation": _V(
+        ("node", "axis", "mode"), "kg-0.5 m-1", "node rotation vector per modal coordinate, body axes"
+    ),
     "radius": _V(("cell",), "m", "radius of the drawn section"),
 }
 
@@ -86,8 +100,12 @@ RUN: Schema = {
     "acceleration": _V(("time", "body", "axis"), "m s-2", "acceleration of the centre of mass, world axes"),
     "angular_acceleration": _V(("time", "body", "axis"), "rad s-2", "angular acceleration, world axes"),
     "frame_position": _V(("time", "frame", "axis"), "m", "origin of the named frame, world axes"),
-    "joint_force": _V(("time", "joint", "axis"), "N", "force on the joint's second body at its frame's origin, world axes"),
-    "joint_moment": _V(("time", "joint", "axis"), "N m", "moment on the joint's second body at its frame's origin, world axes"),
+    "joint_force": _V(
+        ("time", "joint", "axis"), "N", "force on the joint's second body at its frame's origin, world axes"
+    ),
+    "joint_moment": _V(
+        ("time", "joint", "axis"), "N m", "moment on the joint's second body at its frame's origin, world axes"
+    ),
     "modal_coordinate": _V(("time", "mode"), "kg0.5 m", "modal coordinate", optional=True),
     "modal_velocity": _V(("time", "mode"), "kg0.5 m s-1", "rate of the modal coordinate", optional=True),
     "drive_force": _V(("time", "drive"), "N or N m", "what the drive supplies along its coordinate", optional=True),
@@ -98,19 +116,27 @@ RUN: Schema = {
     "contact_force": _V(("time", "contact", "axis"), "N", "contact force on the ball, world axes", optional=True),
     "contact_normal_force": _V(("time", "contact"), "N", "normal contact force, >= 0", optional=True),
     "contact_friction_power": _V(("time", "contact"), "W", "power of the friction force, <= 0", optional=True),
-    "contact_offset": _V(("time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True),
+    "contact_offset": _V(
+        ("time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True
+    ),
     "kinetic": _V(("time",), "J", "kinetic energy"),
     "potential": _V(("time",), "J", "potential energy of the loads"),
     "elastic": _V(("time",), "J", "energy stored in flexible bodies, springs and contacts"),
     "dissipated": _V(("time",), "J", "energy dissipated since the start"),
     "drive_work": _V(("time",), "J", "work supplied by the drives since the start"),
-    "energy_error": _V(("time",), "J", "kinetic + potential + elastic + dissipated - drive_work, minus its start value"),
+    "energy_error": _V(
+        ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work, minus its start value"
+    ),
     "constraint_error": _V(("time",), "m", "largest violation of a loop closure"),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
     "event_contact": _V(("event",), "1", "index of the contact", optional=True),
     "event_kind": _V(("event",), "1", "closing or opening", optional=True),
-    "event_approach_speed": _V(("event",), "m s-1", "rate of penetration at a closing, minus it at an opening", optional=True),
-    "event_peak_force": _V(("event",), "N", "largest normal force of the contact that this closing begins", optional=True),
+    "event_approach_speed": _V(
+        ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening", optional=True
+    ),
+    "event_peak_force": _V(
+        ("event",), "N", "largest normal force of the contact that this closing begins", optional=True
+    ),
     "event_peak_penetration": _V(("event",), "m", "largest penetration of that contact", optional=True),
     "event_duration": _V(("event",), "s", "duration of that contact", optional=True),
 }
@@ -124,7 +150,9 @@ ENSEMBLE: Schema = {
     "angular_velocity": _V(("member", "time", "body", "axis"), "rad s-1", "angular velocity, world axes"),
     "acceleration": _V(("member", "time", "body", "axis"), "m s-2", "acceleration of the centre of mass, world axes"),
     "contact_normal_force": _V(("member", "time", "contact"), "N", "normal contact force, >= 0"),
-    "contact_offset": _V(("member", "time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes"),
+    "contact_offset": _V(
+        ("member", "time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes"
+    ),
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),

@@ -88,7 +88,9 @@ class Part(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    source: Source | None = Field(default=None, description="where the values come from; 'assumed: why' for an assumption")
+    source: Source | None = Field(
+        default=None, description="where the values come from; 'assumed: why' for an assumption"
+    )
 
 
 class Pose(Part):

@@ -56,7 +56,7 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if "extends" not in table:
         extra = [key for key in EDITS if key in table]
         if extra:
-            raise InputError(f"{path} [{extra[0]}]", "edits another scene, but none is extended", "add extends = \"...\"")
+            raise InputError(f"{path} [{extra[0]}]", "edits another scene, but none is extended", 'add extends = "..."')
         _absolute_meshes(table, path)
         return table
     base = compose(path.parent / str(table["extends"]), (*above, path))
@@ -112,7 +112,9 @@ def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, 
     there = result.get(family, {})
     for name, part in parts.items():
         if name not in there:
-            raise InputError(f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, there))
+            raise InputError(
+                f"{where}.{name}]", f"there is no {family} called '{name}' to {edit}", suggestion(name, there)
+            )
         there[name] = part if edit == "replace" else _merged(there[name], part)
 
 
@@ -142,7 +144,9 @@ def _find(table: dict[str, Any], place: object, where: str) -> tuple[dict[str, A
     for depth, key in enumerate(keys):
         if not isinstance(table, dict) or key not in table:
             known = table if isinstance(table, dict) else {}
-            raise InputError(where, f"there is no '{'.'.join(keys[: depth + 1])}'", suggestion(key, known) if known else None)
+            raise InputError(
+                where, f"there is no '{'.'.join(keys[: depth + 1])}'", suggestion(key, known) if known else None
+            )
         if depth < len(keys) - 1:
             table = table[key]
     return table, keys[-1]

@@ -40,7 +40,9 @@ class RigidBody(Part):
     mass: Annotated[Mass, Positive]
     com: Position = (0.0, 0.0, 0.0)
     inertia: Inertia
-    pose: Pose | None = Field(default=None, description="start pose of the body frame; without it, it follows from a joint")
+    pose: Pose | None = Field(
+        default=None, description="start pose of the body frame; without it, it follows from a joint"
+    )
     velocity: Velocity | None = Field(default=None, description="start velocity of the centre of mass, world axes")
     angular_velocity: AngularVelocity | None = Field(default=None, description="start angular velocity, world axes")
     frames: dict[str, Pose] = {}
@@ -112,7 +114,9 @@ class FrictionLaw(Part):
     @model_validator(mode="after")
     def _ordered(self) -> FrictionLaw:
         if not self.v_static < self.v_dynamic:
-            raise ValueError(f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve")
+            raise ValueError(
+                f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve"
+            )
         return self
 
 
@@ -136,7 +140,9 @@ class ClearanceSpherical(Part):
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceSpherical:
         if self.normal.stiffness is None and (self.socket_material is None or self.ball_material is None):
-            raise ValueError("the contact stiffness is unknown: give socket_material and ball_material, or normal.stiffness")
+            raise ValueError(
+                "the contact stiffness is unknown: give socket_material and ball_material, or normal.stiffness"
+            )
         return self
 
 

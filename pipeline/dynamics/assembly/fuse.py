@@ -8,10 +8,13 @@ entry's file alone and would keep stale callees.
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import importlib.util
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
@@ -49,10 +52,19 @@ def entry(kinds: Kinds, integrator: str) -> ModuleType:
     return module
 
 
+@contextmanager
+def compiling(kinds: Kinds, integrator: str) -> Iterator[None]:
+    """Held while an entry may be compiled: of two processes the second waits for the first's code."""
+    path = _folder() / f"{_digest(_source(kinds, integrator))}.lock"
+    with path.open("w") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
 def is_compiled(kinds: Kinds, integrator: str) -> bool:
     """Whether the machine code of this entry is on disk already."""
     name = f"flexclear_kernels_{_digest(_source(kinds, integrator))}"
-    return any((_folder() / "__pycache__").glob(f"{name}.advance*.nbc"))
+    return any((_folder() / "__pycache__").glob(f"{name}.enter*.nbc"))
 
 
 def _folder() -> Path:
@@ -82,7 +94,9 @@ def _digest(source: str) -> str:
 def _source(kinds: Kinds, integrator: str) -> str:
     lines = [
         f'"""Generated: joints {kinds.joints}, normal laws {kinds.normals}, friction {kinds.frictions}."""',
+        "import numpy as np",
         "from numba import njit",
+        "from pipeline.dynamics.tables import SLOPES, Y",
         "from pipeline.dynamics.assembly import dispatch, equations, kinematics as motion",
         "from pipeline.dynamics.bodies import rigid",
         "from pipeline.dynamics.integrate import explicit, observe as observing, project as projecting",
@@ -161,22 +175,34 @@ observer = observing.compose(
 )
 """
 
+# One function for all three tasks: the right-hand side is then compiled once, not once for each.
 _ENTRIES = '''
 @njit(cache=True, nogil=True)
+def enter(task, h, f, w, n, t, number, outputs, rows, events, pieces, out):
+    """0: evaluate `number` times; 1: advance; 2: observe."""
+    if task == 0:
+        for _ in range(int(number)):
+            rhs(h, f, w, n, t, h[Y], h[SLOPES])
+    elif task == 1:
+        stepper(h, f, w, n, outputs, rows, events)
+    else:
+        observer(h, f, w, n, rows, pieces, number, out)
+
+
+_FLOATS, _TABLE, _INTEGERS = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0), dtype=np.int64)
+
+
+def evaluate(h, f, w, n, t, repeat=1):
+    """Slope of the state in Y at time t, into the first row of SLOPES."""
+    enter(0, h, f, w, n, t, float(repeat), _FLOATS, _TABLE, _TABLE, _INTEGERS, _TABLE)
+
+
 def advance(h, f, w, n, outputs, rows, events):
     """Step to the end of the segment or of the budget."""
-    stepper(h, f, w, n, outputs, rows, events)
+    enter(1, h, f, w, n, 0.0, 0.0, outputs, rows, events, _INTEGERS, _TABLE)
 
 
-@njit(cache=True, nogil=True)
 def observe(h, f, w, n, rows, pieces, tolerance, out):
-    """Evaluate what is recorded."""
-    observer(h, f, w, n, rows, pieces, tolerance, out)
-
-
-@njit(cache=True, nogil=True)
-def evaluate(h, f, w, n, t, y, dy, repeat):
-    """The right-hand side, `repeat` times."""
-    for _ in range(repeat):
-        rhs(h, f, w, n, t, y, dy)
+    """Evaluate what is recorded of every row."""
+    enter(2, h, f, w, n, 0.0, tolerance, _FLOATS, rows, _TABLE, pieces, out)
 '''

@@ -141,7 +141,9 @@ def rigid_inertia(scene: Scene, group: Group, link: Placement) -> tuple[float, n
     return mass, com, inertia
 
 
-def start_places(scene: Scene, groups: list[Group], group_of: Mapping[str, int], frames: Mapping[str, Frame]) -> list[Placement]:
+def start_places(
+    scene: Scene, groups: list[Group], group_of: Mapping[str, int], frames: Mapping[str, Frame]
+) -> list[Placement]:
     """Start pose of every group's host frame in the world.
 
     A group whose bodies give no pose follows from a joint with a group that has one, the two
@@ -165,7 +167,9 @@ def start_places(scene: Scene, groups: list[Group], group_of: Mapping[str, int],
     _propagate(scene, group_of, frames, groups, known)
     missing = [groups[i].host for i in range(len(groups)) if i not in known]
     if missing:
-        raise InputError(f"[body.{missing[0]}.pose]", f"nothing says where {', '.join(missing)} start", "give a pose, or a joint")
+        raise InputError(
+            f"[body.{missing[0]}.pose]", f"nothing says where {', '.join(missing)} start", "give a pose, or a joint"
+        )
     return [known[i] for i in range(len(groups))]
 
 

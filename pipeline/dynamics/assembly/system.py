@@ -104,7 +104,8 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
         link_of.update(dict.fromkeys(groups[branch.group].places, len(links) - 1))
     closures = [(e, *(_site(frames, links, link_of, f) for f in (e.frame_a, e.frame_b))) for e in closing]
     contacts = [
-        (name, joint, *(_site(frames, links, link_of, f) for f in joint.between)) for name, joint in scene.contacts().items()
+        (name, joint, *(_site(frames, links, link_of, f) for f in joint.between))
+        for name, joint in scene.contacts().items()
     ]
     length = _length(links, frames)
     return System(scene, bundles, frames, links, link_of, closures, contacts, origin, length)

@@ -54,7 +54,9 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
         ga, gb = group_of[a.body], group_of[b.body]
         if ga == gb:
             if joint.type != "fixed":
-                raise InputError(f"[joint.{name}]", "its two bodies are rigidly joined already", "remove it, or a fixed joint")
+                raise InputError(
+                    f"[joint.{name}]", "its two bodies are rigidly joined already", "remove it, or a fixed joint"
+                )
             continue
         result.append(Edge(name, joint.type, ga, gb, *joint.between, driven.get(name)))
     return result
@@ -68,9 +70,13 @@ def _driven_joints(scene: Scene) -> dict[str, str]:
             raise InputError(place, f"there is no joint '{drive.joint}'", f"known: {', '.join(scene.joint)}")
         kind = scene.joint[drive.joint].type
         if kind not in ("prismatic", "revolute"):
-            raise InputError(place, f"a {kind} joint has no single coordinate to prescribe", "drive a prismatic or revolute joint")
+            raise InputError(
+                place, f"a {kind} joint has no single coordinate to prescribe", "drive a prismatic or revolute joint"
+            )
         if drive.joint in driven:
-            raise InputError(place, f"joint '{drive.joint}' is driven already by '{driven[drive.joint]}'", "remove one drive")
+            raise InputError(
+                place, f"joint '{drive.joint}' is driven already by '{driven[drive.joint]}'", "remove one drive"
+            )
         driven[drive.joint] = name
     return driven
 
@@ -101,7 +107,9 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
     for edge in left:
         if edge.drive is not None:
             raise InputError(
-                f"[drive.{edge.drive}]", f"joint '{edge.name}' closes a loop whose other joints are all driven", "remove a drive"
+                f"[drive.{edge.drive}]",
+                f"joint '{edge.name}' closes a loop whose other joints are all driven",
+                "remove a drive",
             )
     return branches, left
 

@@ -59,6 +59,7 @@ from pipeline.dynamics.vectors import (
     cross,
     dot,
     dot6,
+    index,
     kernel,
     put,
     scale,
@@ -87,9 +88,9 @@ def invariants(h, f, w, k):
         w[index(P + e)] = f[index(data + 3 * n + e)]
         w[index(V + e)] = 0.0
     first, count = flex(h, k, MOMENT0), flex(h, k, N_MOMENTS)
-    index, values = h[MOMENTS] + 2 * first, h[MOMENT_VALUES] + first
+    where, values = h[MOMENTS] + 2 * first, h[MOMENT_VALUES] + first
     for e in range(count):
-        row, i = h[index(index + 2 * e)], h[index(index + 2 * e + 1)]
+        row, i = h[index(where + 2 * e)], h[index(where + 2 * e + 1)]
         value = f[index(values + e)]
         w[index(P + row)] += value * w[index(x + i)]
         w[index(V + row)] += value * w[index(u + i)]
@@ -121,7 +122,14 @@ def _sums(h, f, w, k):
 @kernel
 def _tensor(w, Q):
     """Inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment stored from Q."""
-    return (w[index(Q + 4)] + w[index(Q + 8)], w[Q] + w[index(Q + 8)], w[Q] + w[index(Q + 4)], -w[index(Q + 1)], -w[index(Q + 2)], -w[index(Q + 5)])
+    return (
+        w[index(Q + 4)] + w[index(Q + 8)],
+        w[Q] + w[index(Q + 8)],
+        w[Q] + w[index(Q + 4)],
+        -w[index(Q + 1)],
+        -w[index(Q + 2)],
+        -w[index(Q + 5)],
+    )
 
 
 @kernel
@@ -193,7 +201,9 @@ def _modes(h, f, w, k, R, p, a, alpha, omega):
     for j in range(n):
         C = (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])
         angular = _spin(w, P, n, j)
-        centrifugal = x * y * (w[index(P + n + j)] + w[index(P + 3 * n + j)]) + x * z * (w[index(P + 2 * n + j)] + w[index(P + 6 * n + j)])
+        centrifugal = x * y * (w[index(P + n + j)] + w[index(P + 3 * n + j)]) + x * z * (
+            w[index(P + 2 * n + j)] + w[index(P + 6 * n + j)]
+        )
         centrifugal += y * z * (w[index(P + 5 * n + j)] + w[index(P + 7 * n + j)])
         centrifugal -= xx * w[index(P + j)] + yy * w[index(P + 4 * n + j)] + zz * w[index(P + 8 * n + j)]
         coriolis = 2.0 * dot(_spin(w, V, n, j), omega)
@@ -265,7 +275,9 @@ def modal_inertia(h, f, w, k):
     R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
     force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for j in range(n):
-        force = add(force, scale(w[index(du + j)], (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])))
+        force = add(
+            force, scale(w[index(du + j)], (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)]))
+        )
         moment = add(moment, scale(w[index(du + j)], _spin(w, P, n, j)))
     force = turn(R, force)
     accumulate(w, wrench(h, i), add(turn(R, moment), cross(p, force)))

@@ -54,8 +54,7 @@ class Engine:
         """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
         packed = self.built.packed
         self.view("Y", len(y))[:] = y
-        places = (packed.offset("Y"), packed.offset("SLOPES"))
-        self.entry.evaluate(packed.h, packed.f, self.w, self.n, t, *places, repeat)
+        self.entry.evaluate(packed.h, packed.f, self.w, self.n, t, repeat)
         if self.n[EVALUATION] != OK:
             joints = ", ".join(e.name for e, _, _ in self.built.system.closures) or "none"
             raise SolverError(
@@ -77,11 +76,14 @@ def prepare(built: Tables, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
     scene = built.system.scene
     integrator = scene.solver.integrator
+    w, n = built.packed.work_space()
+    entry = fuse.entry(built.kinds, integrator)
+    engine = Engine(built, entry, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
     if not fuse.is_compiled(built.kinds, integrator):
         progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
-    entry = fuse.entry(built.kinds, integrator)
-    w, n = built.packed.work_space()
-    return Engine(built, entry, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+        with fuse.compiling(built.kinds, integrator):
+            entry.evaluate(built.packed.h, built.packed.f, w, n, engine.start, 0)
+    return engine
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
@@ -109,7 +111,9 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     row = np.concatenate([[engine.start], np.zeros(2 * contacts), y])
     seen = observe(engine, row[None, :])
     if seen["status"][0, 0] != OK:
-        raise SolverError(f"at t = {engine.start:.6g} s: the loops cannot be closed from the start that the scene gives")
+        raise SolverError(
+            f"at t = {engine.start:.6g} s: the loops cannot be closed from the start that the scene gives"
+        )
     return seen["state"][0].copy()
 
 
@@ -143,4 +147,3 @@ def observe(engine: Engine, rows: np.ndarray) -> dict[str, np.ndarray]:
     engine.entry.observe(packed.h, packed.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
     ends = np.cumsum(list(widths.values()))
     return {name: out[:, end - widths[name] : end] for name, end in zip(widths, ends, strict=True)}
-

@@ -46,7 +46,10 @@ def dataset(built: Tables, trajectory: Trajectory, seen: Seen, start_residual: f
     made = xr.Dataset(variables, coords=coordinates)
     result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual))
     if "event_kind" in result:
-        result["event_kind"].attrs |= {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "opening closing"}
+        result["event_kind"].attrs |= {
+            "flag_values": np.array([0, 1], dtype=np.int8),
+            "flag_meanings": "opening closing",
+        }
     return result
 
 

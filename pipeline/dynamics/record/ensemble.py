@@ -30,7 +30,9 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
     wanted = scene.ensemble or Ensemble()
     if not scene.contacts():
-        raise InputError("[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it")
+        raise InputError(
+            "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
+        )
     engine = engine_of(scene, bundles, progress)
     names = _bodies(engine, wanted)
     start, _ = consistent_start(engine)
@@ -81,7 +83,9 @@ def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
     engine.evaluate(y, engine.start)
     sites = engine.view("SITE_FRAMES", FRAME_SIZE * engine.built.packed.sizes["N_SITES"]).reshape(-1, FRAME_SIZE)
     table = engine.built.packed.table("CONTACTS")
-    return np.concatenate([sites[b, VELOCITY : VELOCITY + 3] - sites[s, VELOCITY : VELOCITY + 3] for s, b in table[:, [SOCKET, BALL]]])
+    return np.concatenate(
+        [sites[b, VELOCITY : VELOCITY + 3] - sites[s, VELOCITY : VELOCITY + 3] for s, b in table[:, [SOCKET, BALL]]]
+    )
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
@@ -136,10 +140,10 @@ def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndar
     peak, count, share = [], [], []
     for c in range(engine.built.packed.sizes["N_CONTACTS"]):
         closing = e[(e[:, state.EVENT_CONTACT] == c) & (e[:, state.EVENT_KIND] == state.CLOSING)]
-        lasting = np.where(np.isnan(closing[:, state.DURATION]), engine.end - closing[:, state.EVENT_TIME], closing[:, state.DURATION])
+        lasting = np.where(
+            np.isnan(closing[:, state.DURATION]), engine.end - closing[:, state.EVENT_TIME], closing[:, state.DURATION]
+        )
         peak.append(closing[:, state.PEAK_FORCE].max(initial=0.0))
         count.append(int((closing[:, state.SPEED] > IMPACT).sum()))
         share.append(lasting.sum() / span)
     return np.array(peak), np.array(count), np.array(share)
-
-
