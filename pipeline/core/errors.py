@@ -25,7 +25,7 @@ class InputError(FlexclearError):
         super().__init__(text if remedy is None else f"{text}\n  hint: {remedy}")
 
 
-class InputErrors(InputError):
+class InputErrors(InputError):  # noqa: N818 - several of them
     """Several input errors, reported together."""
 
     def __init__(self, errors: list[InputError]) -> None:

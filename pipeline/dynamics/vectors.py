@@ -88,37 +88,37 @@ def dot6(a, o, b, p):
 
 @kernel
 def add(a, b):
-    """a + b."""
+    """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @kernel
 def sub(a, b):
-    """a - b."""
+    """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @kernel
 def scale(s, a):
-    """s a."""
+    """S a."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @kernel
 def dot(a, b):
-    """a . b."""
+    """A . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
 def cross(a, b):
-    """a x b."""
+    """A x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @kernel
 def turn(m, v):
-    """m v."""
+    """M v."""
     return (
         m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
         m[3] * v[0] + m[4] * v[1] + m[5] * v[2],
@@ -138,7 +138,7 @@ def turn_back(m, v):
 
 @kernel
 def product(a, b):
-    """a b."""
+    """A b."""
     return (
         a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
         a[0] * b[1] + a[1] * b[4] + a[2] * b[7],

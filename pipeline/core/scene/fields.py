@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
@@ -36,23 +36,39 @@ def _vector(dimension: str) -> Any:
     ]
 
 
-Length = _scalar("length")
-Time = _scalar("time")
-Mass = _scalar("mass")
-Angle = _scalar("angle")
-Speed = _scalar("velocity")
-Pressure = _scalar("pressure")
-Density = _scalar("density")
-Number = _scalar("number")
-Position = _vector("length")
-Velocity = _vector("velocity")
-AngularVelocity = _vector("angular velocity")
-Acceleration = _vector("acceleration")
-Direction = _vector("number")
-RotationVector = _vector("angle")
+if TYPE_CHECKING:
+    Length: TypeAlias = float
+    Time: TypeAlias = float
+    Mass: TypeAlias = float
+    Angle: TypeAlias = float
+    Speed: TypeAlias = float
+    Pressure: TypeAlias = float
+    Density: TypeAlias = float
+    Number: TypeAlias = float
+    Position: TypeAlias = tuple[float, float, float]
+    Velocity: TypeAlias = tuple[float, float, float]
+    AngularVelocity: TypeAlias = tuple[float, float, float]
+    Acceleration: TypeAlias = tuple[float, float, float]
+    Direction: TypeAlias = tuple[float, float, float]
+    RotationVector: TypeAlias = tuple[float, float, float]
+else:
+    Length = _scalar("length")
+    Time = _scalar("time")
+    Mass = _scalar("mass")
+    Angle = _scalar("angle")
+    Speed = _scalar("velocity")
+    Pressure = _scalar("pressure")
+    Density = _scalar("density")
+    Number = _scalar("number")
+    Position = _vector("length")
+    Velocity = _vector("velocity")
+    AngularVelocity = _vector("angular velocity")
+    Acceleration = _vector("acceleration")
+    Direction = _vector("number")
+    RotationVector = _vector("angle")
 
 
-def _inertia(value: Any) -> tuple[tuple[float, float, float], ...]:
+def _inertia(value: Any) -> list[list[float]]:
     """``[Ixx, Iyy, Izz]`` or a full 3x3 matrix, as three rows [kg m^2]."""
     rows = np.array([_components(row) for row in value] if isinstance(value, (list, tuple)) else [])
     if rows.shape == (3, 1):
@@ -64,9 +80,10 @@ def _inertia(value: Any) -> tuple[tuple[float, float, float], ...]:
     moments = np.linalg.eigvalsh(rows)
     if moments[0] < 0.0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise ValueError(
-            f"principal moments {moments.tolist()} kg m^2 belong to no body: each is >= 0 and at most the sum of the others"
+            f"principal moments {moments.tolist()} kg m^2 belong to no body: "
+            "each is >= 0 and at most the sum of the others"
         )
-    return tuple(tuple(float(x) for x in row) for row in rows)  # type: ignore[return-value]
+    return rows.tolist()
 
 
 def _components(row: Any) -> list[float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -62,7 +62,7 @@ class Ensemble(Part):
 class Accuracy(Part):
     """Wanted accuracy per quantity, e.g. ``"platform.position" = "1 um"``."""
 
-    quantities: dict[str, str] = {}
+    quantities: dict[str, str] = Field(default_factory=dict)
 
 
 class Scene(Part):
@@ -71,9 +71,9 @@ class Scene(Part):
     title: str
     description: str = ""
     body: dict[str, Body]
-    joint: dict[str, Joint] = {}
-    drive: dict[str, Drive] = {}
-    load: dict[str, Load] = {}
+    joint: dict[str, Joint] = Field(default_factory=dict)
+    drive: dict[str, Drive] = Field(default_factory=dict)
+    load: dict[str, Load] = Field(default_factory=dict)
     time: TimeSpan
     solver: Solver = Solver()
     output: Output = Output()
@@ -111,16 +111,13 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        found: dict[str, str] = {}
+        found: dict[str, str] = Field(default_factory=dict)
         _collect_sources(self.model_dump(), "", found)
         return found
 
     def assumptions(self) -> dict[str, str]:
         """The sources that say ``assumed: why``."""
         return {k: v for k, v in self.sources().items() if v.startswith("assumed")}
-
-
-FamilyKind = Literal["body", "joint", "drive", "load"]
 
 
 def _collect_sources(node: object, place: str, found: dict[str, str]) -> None:

@@ -168,7 +168,7 @@ def prepare(h, w, n):
 
 @kernel
 def add_spread(h, w, y, weight):
-    """y <- y + weight L^-1 J^T lambda, y in w."""
+    """Y <- y + weight L^-1 J^T lambda, y in w."""
     for c in range(h[N_CLOSURES]):
         count, support = closure(h, c, N_ROWS), h[SUPPORT] + closure(h, c, SUPPORT0)
         S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, ROW0)

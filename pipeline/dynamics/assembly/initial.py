@@ -64,7 +64,7 @@ def given_velocities(built: Tables, frames: Frames, y: np.ndarray) -> np.ndarray
         moved = y.copy()
         moved[nq + k] = 1.0
         columns.append(_twists(built, frames, moved, wanted) - base)
-    for place, (name, body) in enumerate(wanted.items()):
+    for place, body in enumerate(wanted.values()):
         given = (body.angular_velocity, body.velocity)
         for part, value in enumerate(given):
             if value is None:

@@ -86,7 +86,8 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
         b_in_a = a.place.of(b.place.inverse())
         neighbours[a.body].append((b.body, b_in_a))
         neighbours[b.body].append((a.body, b_in_a.inverse()))
-    groups, group_of = [], {}
+    groups: list[Group] = []
+    group_of: dict[str, int] = {}
     for root in [*grounds, *(n for n in scene.body if n not in grounds)]:
         if root in group_of:
             continue

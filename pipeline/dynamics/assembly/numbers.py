@@ -152,7 +152,8 @@ def _contacts(system: System, kinds: Kinds, touching: list[tuple[int, int]]) -> 
 
 
 def _drives(system: System) -> tuple[np.ndarray, np.ndarray]:
-    rows, pieces = [], []
+    rows: list[tuple[int, int]] = []
+    pieces: list[np.ndarray] = []
     for drive in system.scene.drive.values():
         law = lookup("pipeline.dynamics.drives", drive.law.type, where="[drive]")
         table = law(drive.law).copy()

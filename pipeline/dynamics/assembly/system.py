@@ -102,11 +102,12 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
     for branch in branches:
         links.append(_link(scene, groups[branch.group], branch, starts[branch.group], frames, links, link_of, origin))
         link_of.update(dict.fromkeys(groups[branch.group].places, len(links) - 1))
-    closures = [(e, *(_site(frames, links, link_of, f) for f in (e.frame_a, e.frame_b))) for e in closing]
-    contacts = [
-        (name, joint, *(_site(frames, links, link_of, f) for f in joint.between))
-        for name, joint in scene.contacts().items()
-    ]
+
+    def at(frame: str) -> Site:
+        return _site(frames, links, link_of, frame)
+
+    closures = [(e, at(e.frame_a), at(e.frame_b)) for e in closing]
+    contacts = [(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
     length = _length(links, frames)
     return System(scene, bundles, frames, links, link_of, closures, contacts, origin, length)
 

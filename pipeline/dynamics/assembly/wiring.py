@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
@@ -10,7 +12,7 @@ from pipeline.dynamics.assembly.layout import Layout
 from pipeline.dynamics.assembly.tree import joint_class
 
 
-def integers(rows: list[tuple[int, ...]], width: int) -> np.ndarray:
+def integers(rows: Sequence[tuple[int, ...]], width: int) -> np.ndarray:
     """A contiguous integer table, also when it is empty."""
     return np.ascontiguousarray(np.array(rows, dtype=np.int64).reshape(-1, width))
 
@@ -68,7 +70,11 @@ def closures(layout: Layout, site_pairs: list[tuple[str, int, int]]) -> dict[str
     """Tables of the closures, given (joint type, site a, site b) each; ordered for a thin envelope."""
     routes = [_closure_route(layout, a, b) for _, a, b in site_pairs]
     order = _order([{c for c, _, _ in route} for route in routes])
-    closure, rows, support, entries, known = [], [], [], [], []
+    closure: list[tuple[int, ...]] = []
+    rows: list[tuple[int, int, int]] = []
+    support: list[int] = []
+    entries: list[tuple[int, int, int]] = []
+    known: list[tuple[int, int, int, int]] = []
     supports: list[list[int]] = []
     row0 = jacobian0 = 0
     for new, old in enumerate(order):
@@ -118,10 +124,11 @@ def _order(supports: list[set[int]]) -> list[int]:
     return [int(k) for k in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]
 
 
-def _couplings(closure: list[tuple[int, ...]], supports: list[list[int]]) -> dict[str, np.ndarray]:
+def _couplings(closure: Sequence[tuple[int, ...]], supports: list[list[int]]) -> dict[str, np.ndarray]:
     """Pairs of closures with common coordinates, the common slots, and the envelope of J M^-1 J^T."""
-    pairs, common = [], []
-    first = {}
+    pairs: list[tuple[int, ...]] = []
+    common: list[tuple[int, int]] = []
+    first: dict[int, int] = {}
     for b, support_b in enumerate(supports):
         for a in range(b + 1):
             shared = sorted(set(supports[a]) & set(support_b))

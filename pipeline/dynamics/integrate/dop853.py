@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.integrate.dop853_coefficients import A, B, C, D, E3, E5, ERROR_ORDER, EXTENDED, STAGES
+from pipeline.dynamics.integrate.dop853_coefficients import E3, E5, ERROR_ORDER, EXTENDED, STAGES, A, B, C, D
 from pipeline.dynamics.integrate.state import TIME
-from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y, Y_NEW, Y_STAGE
+from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
 
 

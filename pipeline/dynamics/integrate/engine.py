@@ -106,7 +106,7 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """y at the start with the loops closed and their rates zero; SolverError when that fails."""
+    """Y at the start with the loops closed and their rates zero; SolverError when that fails."""
     contacts = engine.built.packed.sizes["N_CONTACTS"]
     row = np.concatenate([[engine.start], np.zeros(2 * contacts), y])
     seen = observe(engine, row[None, :])

@@ -50,9 +50,9 @@ from pipeline.dynamics.tables import (
     RATE,
     SLOPES,
     WATCH,
-    Y,
     Y_NEW,
     Y_STAGE,
+    Y,
     touch,
 )
 from pipeline.dynamics.vectors import kernel

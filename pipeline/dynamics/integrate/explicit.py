@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.integrate.state import (
     BUDGET,
     CAP,
@@ -41,7 +42,6 @@ from pipeline.dynamics.integrate.state import (
     STEPS,
     TIME,
 )
-from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -57,9 +57,9 @@ from pipeline.dynamics.tables import (
     OK,
     RESIDUAL,
     SLOPES,
-    Y,
     Y_NEW,
     Y_STAGE,
+    Y,
 )
 from pipeline.dynamics.vectors import index, kernel
 

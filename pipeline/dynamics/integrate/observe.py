@@ -43,8 +43,8 @@ from pipeline.dynamics.tables import (
     STORED,
     TOUCH,
     TOUCH_SIZE,
-    U,
     WRENCH,
+    U,
     X,
     Y,
     closure,
@@ -55,15 +55,9 @@ from pipeline.dynamics.tables import (
 )
 from pipeline.dynamics.vectors import accumulate, at, dot, kernel
 
-# columns of the observation, in this order; sizes in `widths`
-FIELDS = (
-    "state coordinate speed acceleration link_frame site_frame link_wrench closure_wrench touch drive_force "
-    "energy residual status"
-).split()
-
 
 def widths(sizes: dict[str, int]) -> dict[str, int]:
-    """Number of columns of each field, from the header's sizes by name."""
+    """Number of columns of each observed field, in their order, from the header's sizes by name."""
     drives = sizes["N_DRIVES"]
     return {
         "state": sizes["NY"],

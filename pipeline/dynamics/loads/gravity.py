@@ -9,5 +9,5 @@ from pipeline.core.scene.schema import Scene
 
 def field(scene: Scene) -> np.ndarray:
     """Sum of the scene's gravity fields [m/s^2], shape (3,)."""
-    fields = [np.array(load.acceleration) for load in scene.load.values() if load.type == "gravity"]
+    fields: list[np.ndarray] = [np.array(load.acceleration) for load in scene.load.values() if load.type == "gravity"]
     return np.sum(fields, axis=0) if fields else np.zeros(3)

@@ -73,8 +73,8 @@ def _inside_groups(built: Tables, bodies: Mapping[str, Motion], known: Mapping[s
                 found[name] = (zero, zero)
                 continue
             side, sign = _far_side(built, name, tree, list(link.places))
-            total = [sign * sum(demand[b][k] for b in side) for k in (0, 1)]
-            found[name] = (total[0], total[1])
+            moment, force = (sign * np.sum([demand[b][k] for b in side], axis=0) for k in (0, 1))
+            found[name] = (moment, force)
     return found
 
 

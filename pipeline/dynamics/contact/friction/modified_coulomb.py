@@ -16,7 +16,7 @@ from pipeline.dynamics.vectors import kernel
 
 @kernel
 def coefficient(speed, p):
-    """mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d)."""
+    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d)."""
     if speed >= p[3]:
         return p[1]
     if speed >= p[2]:
