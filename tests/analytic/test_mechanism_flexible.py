@@ -39,28 +39,29 @@ def deviation(scene: str) -> tuple[float, float, float]:
 
 
 def test_ideal_joints_platform_moves_as_in_the_second_derivation() -> None:
-    """A tenth of a per mille of the deviations from ideal, which are 3e-7 m and 0.7 mm/s."""
+    """A millionth of the deviations from ideal, which are 3e-7 m and 0.7 mm/s."""
     known = kept("far_cb")
     found = at(run("sps4/far_cb"), known["time"]).sel(body="platform")
-    assert found.position.values[:, 2] == pytest.approx(known["height"], abs=3e-11)
-    assert found.velocity.values[:, 2] == pytest.approx(known["speed"], abs=7e-8)
+    assert found.position.values[:, 2] == pytest.approx(known["height"], abs=3e-13)
+    assert found.velocity.values[:, 2] == pytest.approx(known["speed"], abs=7e-10)
 
 
 def test_ideal_joints_reaction_at_A1_rings_as_in_the_second_derivation() -> None:
     known = kept("far_cb")
     found = at(run("sps4/far_cb"), known["time"]).joint_force.sel(joint="A1").values
-    assert np.abs(found - known["force"]).max() <= 1e-3 * np.abs(known["force"]).max()
+    assert np.abs(found - known["force"]).max() <= 1e-6 * np.abs(known["force"]).max()
 
 
 def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:
-    """Errors grow a thousandfold in some 12 ms without damping; the first impacts are sharp."""
+    """Errors grow a thousandfold in a few impacts without damping; the first two are sharp."""
     known, found = kept("far_csj_cb"), impacts(run("sps4/far_csj_cb"))
     first = int(np.sum(known["impact_start"] < 0.0095))
     assert first == 2
+    # in flight the modes ring at up to 27 kHz, which the default tolerance follows to some 1e-7 m/s
     assert found["start"][:first] == pytest.approx(known["impact_start"][:first], abs=1e-8)
-    assert found["approach"][:first] == pytest.approx(known["impact_approach"][:first], rel=1e-4)
-    assert found["separation"][:first] == pytest.approx(known["impact_separation"][:first], rel=1e-3)
-    assert found["peak_force"][:first] == pytest.approx(known["impact_peak_force"][:first], rel=1e-3)
+    assert found["approach"][:first] == pytest.approx(known["impact_approach"][:first], abs=1e-6)
+    assert found["separation"][:first] == pytest.approx(known["impact_separation"][:first], abs=5e-6)
+    assert found["peak_force"][:first] == pytest.approx(known["impact_peak_force"][:first], rel=1e-4)
 
 
 def test_the_rods_compliance_softens_the_first_impact() -> None:

@@ -15,3 +15,11 @@ def results_root() -> Path:
     if named:
         return Path(named).resolve()
     return (CHECKOUT if (CHECKOUT / "pyproject.toml").is_file() else Path.cwd()) / "results"
+
+
+def kernel_root() -> Path:
+    """The folder of compiled kernels: FLEXCLEAR_KERNELS, or ``cache/kernels`` of the results.
+
+    Their names say all that they depend on, so that several result folders may share one.
+    """
+    return Path(os.environ.get("FLEXCLEAR_KERNELS") or results_root() / "cache" / "kernels").resolve()

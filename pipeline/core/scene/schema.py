@@ -111,7 +111,7 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        found: dict[str, str] = Field(default_factory=dict)
+        found: dict[str, str] = {}
         _collect_sources(self.model_dump(), "", found)
         return found
 

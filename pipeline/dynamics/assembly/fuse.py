@@ -21,9 +21,9 @@ from types import ModuleType
 import llvmlite
 import numba
 
-from pipeline.core.artifacts.paths import results_root
+from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.registry import module_of
-from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.fingerprint import Sources, parse
 from pipeline.dynamics.assembly.numbers import Kinds
 
 SOURCES = Sources(Path(__file__).resolve().parents[3])
@@ -69,7 +69,7 @@ def is_compiled(kinds: Kinds, integrator: str) -> bool:
 
 
 def _folder() -> Path:
-    folder = results_root() / "cache" / "kernels"
+    folder = kernel_root()
     folder.mkdir(parents=True, exist_ok=True)
     return folder
 
@@ -84,12 +84,29 @@ def _digest(source: str) -> str:
     """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
     digest = hashlib.sha256(source.encode())
     digest.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
-    roots = {line.split()[1] for line in source.splitlines() if line.startswith("from pipeline")}
-    reached = SOURCES.closure(roots)
-    for name in sorted(reached):
-        if name.startswith("pipeline.dynamics"):
-            digest.update(reached[name].digest.encode())
+    roots = set(parse(source.encode(), "entry", package=False).own)
+    for name, source_digest in sorted(_reached(roots).items()):
+        digest.update(f"{name} {source_digest}".encode())
     return digest.hexdigest()[:20]
+
+
+def _reached(roots: set[str]) -> dict[str, str]:
+    """Digests of this tower's modules that the entry imports, directly or not.
+
+    Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
+    """
+    found: dict[str, str] = {}
+    waiting = sorted(roots)
+    while waiting:
+        name = waiting.pop()
+        module = SOURCES.module(name)
+        package = (SOURCES.root / Path(*name.split("."))).is_dir()
+        if module is None or name in found or not name.startswith("pipeline.dynamics"):
+            continue
+        if not package:
+            found[name] = module.digest
+            waiting.extend(module.own)
+    return found
 
 
 def _source(kinds: Kinds, integrator: str) -> str:
