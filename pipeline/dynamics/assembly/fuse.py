@@ -23,7 +23,7 @@ import numba
 
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.registry import module_of
-from pipeline.core.workflow.fingerprint import Sources, parse
+from pipeline.core.workflow.fingerprint import Sources, imported
 from pipeline.dynamics.assembly.numbers import Kinds
 
 SOURCES = Sources(Path(__file__).resolve().parents[3])
@@ -84,7 +84,7 @@ def _digest(source: str) -> str:
     """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
     digest = hashlib.sha256(source.encode())
     digest.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
-    roots = set(parse(source.encode(), "entry", package=False).own)
+    roots = imported(source.encode(), "entry", package=False)[0]
     for name, source_digest in sorted(_reached(roots).items()):
         digest.update(f"{name} {source_digest}".encode())
     return digest.hexdigest()[:20]
