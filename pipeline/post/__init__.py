@@ -1,5 +1,20 @@
 """From datasets to maps, tables, pictures and the report. Reads artifacts, imports no other tower."""
 
-from pipeline.post.series import derive
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = ["derive"]
+
+
+def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
+    """Series and tables of a run, and of its ensemble (`pipeline.post.series.derive`).
+
+    Imported when it is called: a command that only asks what is fresh needs no xarray.
+    """
+    from pipeline.post.series import derive as series
+
+    return series(run, ensemble)

@@ -69,4 +69,5 @@ def test_lossless_swing_keeps_its_energy() -> None:
     dataset = run(SWING)
     # of the little energy in the swing itself, after some hundred openings and closings
     assert np.abs(dataset.energy_error).max() <= 1e-7 * np.abs(dataset.potential).max()
-    assert np.abs(dataset.dissipated).max() == 0.0
+    # nothing but rounding of the two equal forces whose difference dissipates
+    assert np.abs(dataset.dissipated).max() <= 1e-13 * np.abs(dataset.potential).max()

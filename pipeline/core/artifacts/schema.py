@@ -164,17 +164,18 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
 
     Every mandatory variable must be there with its dimensions; nothing undeclared may be.
     """
-    missing = [n for n, v in schema.items() if not v.optional and n not in dataset]
+    missing = [n for n, v in schema.items() if not v.optional and n not in dataset.variables]
     unknown = [str(n) for n in dataset.data_vars if n not in schema]
     if missing or unknown:
         raise ValueError(f"artifact lacks {missing} and has undeclared {unknown}")
     result = dataset.copy()
-    for name in dataset.data_vars:
-        variable = schema[str(name)]
-        if dataset[name].dims != variable.dims:
-            raise ValueError(f"{name} has dimensions {dataset[name].dims}, not {variable.dims}")
-        may_be_open = str(name).startswith("event_")  # an event that the run's end cuts short has no duration
-        if dataset[name].dtype.kind == "f" and not may_be_open and not np.isfinite(dataset[name].values).all():
+    # a variable that is called like its dimension (`cell`) is a coordinate to xarray
+    for name in (n for n in schema if n in dataset.variables):
+        variable, values = schema[name], dataset[name]
+        if values.dims != variable.dims:
+            raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
+        may_be_open = name.startswith("event_")  # an event that the run's end cuts short has no duration
+        if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}
     for dim in ("axis", "axis2"):

@@ -15,6 +15,7 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
+SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
 EDITS = ("extends", "replace", "set", "remove")
 
 
@@ -154,6 +155,8 @@ def _find(table: dict[str, Any], place: object, where: str) -> tuple[dict[str, A
 
 def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
     parent, _, key = place.rpartition(".")
+    if parent in SETTINGS:
+        table.setdefault(parent, {})
     if parent:
         owner, last = _find(table, parent, where)
         table = owner[last]

@@ -90,8 +90,7 @@ def invariants(h, f, w, k):
     first, count = flex(h, k, MOMENT0), flex(h, k, N_MOMENTS)
     where, values = h[MOMENTS] + 2 * first, h[MOMENT_VALUES] + first
     for e in range(count):
-        row, i = h[index(where + 2 * e)], h[index(where + 2 * e + 1)]
-        value = f[index(values + e)]
+        row, i, value = h[index(where + 2 * e)], h[index(where + 2 * e + 1)], f[index(values + e)]
         w[index(P + row)] += value * w[index(x + i)]
         w[index(V + row)] += value * w[index(u + i)]
 
@@ -166,9 +165,8 @@ def inertia(h, f, w, k):
     D = at9(w, Q + _RATE)
     twice = add(scale(D[0] + D[4] + D[8], omega), scale(-1.0, turn_back(D, omega)))
     moment = add(moment, scale(2.0, twice))
-    force, moment = turn(R, force), turn(R, moment)
-    o = wrench(h, i)
-    put(w, o, add(moment, cross(p, force)))
+    o, force = wrench(h, i), turn(R, force)
+    put(w, o, add(turn(R, moment), cross(p, force)))
     put(w, o + 3, force)
     _modes(h, f, w, k, R, p, a, alpha, omega)
     _stiffness(h, f, w, k)
@@ -180,11 +178,8 @@ def _spatial(w, o, mass, p, c, J):
     w[index(o)] = mass
     put(w, o + 1, add(scale(mass, p), c))
     square = mass * dot(p, p) + 2.0 * dot(p, c)
-    for a in range(3):
-        w[index(o + 4 + a)] = square
-    w[index(o + 4)] += J[0] - mass * p[0] * p[0] - 2.0 * p[0] * c[0]
-    w[index(o + 5)] += J[1] - mass * p[1] * p[1] - 2.0 * p[1] * c[1]
-    w[index(o + 6)] += J[2] - mass * p[2] * p[2] - 2.0 * p[2] * c[2]
+    for k in range(3):
+        w[index(o + 4 + k)] = J[k] + square - mass * p[k] * p[k] - 2.0 * p[k] * c[k]
     w[index(o + 7)] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
     w[index(o + 8)] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
     w[index(o + 9)] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
@@ -239,14 +234,12 @@ def _stiffness(h, f, w, k):
     n, x, u, data = _places(h, k)
     K = data + 12 * n + n * n
     bias, rate = h[MODAL_BIAS] + flex(h, k, FLEX_C0), h[POSITION_RATE] + flex(h, k, FLEX_Q0)
-    loss = 0.0
     for j in range(n):
         speed = w[index(u + j)]
         damping = f[index(K + n + j)] * speed
         w[index(bias + j)] += f[index(K + j)] * w[index(x + j)] + damping
         w[index(rate + j)] = speed
-        loss += damping * speed
-    w[h[LEDGER_RATE] + MODAL_LOSS] += loss
+        w[h[LEDGER_RATE] + MODAL_LOSS] += damping * speed
 
 
 @kernel

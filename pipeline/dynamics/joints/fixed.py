@@ -28,8 +28,3 @@ class Fixed:
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """No coordinates, shape (0,)."""
         return np.zeros(0)
-
-    @staticmethod
-    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """No speeds."""
-        return np.zeros(0)

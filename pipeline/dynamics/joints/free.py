@@ -42,8 +42,3 @@ class Free:
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Quaternion and position, shape (7,)."""
         return np.concatenate([matrix_to_quaternion(R), p])
-
-    @staticmethod
-    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Joint speeds of a relative twist, components in the first frame."""
-        return np.concatenate([omega, v])

@@ -33,8 +33,3 @@ class Prismatic:
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Displacement along z [m], shape (1,)."""
         return np.array([p[2]])
-
-    @staticmethod
-    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Joint speed of a relative twist, components in the first frame."""
-        return v[2:]

@@ -33,8 +33,3 @@ class Revolute:
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Angle about z [rad] in (-pi, pi], shape (1,)."""
         return np.array([np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])])
-
-    @staticmethod
-    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Joint speed of a relative twist, components in the first frame."""
-        return omega[2:]

@@ -39,8 +39,3 @@ class Spherical:
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Quaternion of R_FG, shape (4,); the offset p is the closure's business."""
         return matrix_to_quaternion(R)
-
-    @staticmethod
-    def speeds(omega: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Joint speeds of a relative twist, components in the first frame."""
-        return omega
