@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.core.algebra import rotation_vector_to_quaternion, skew
@@ -98,7 +98,9 @@ def columns(name: str, record: np.ndarray) -> np.ndarray:
     return record[J_COLUMNS : J_COLUMNS + 6 * n].reshape(n, 6).T
 
 
-seeds = given(seed=st.integers(0, 2**32 - 1))
+def seeds(test: Any) -> Any:
+    """Some random coordinates: the kernels have no branches, so that few examples show all."""
+    return settings(max_examples=20)(given(seed=st.integers(0, 2**32 - 1))(test))
 
 
 @every_joint
@@ -251,7 +253,7 @@ def test_value_and_rate_do_not_jump_between_pieces(law: Any) -> None:
 
 
 @every_law
-def test_pieces_start_in_order_and_no_piece_hides_a_jump(law: Any) -> None:
+def test_pieces_start_in_order(law: Any) -> None:
     table = pieces(law)
     assert table.shape[1] == 7
     assert np.all(np.diff(table[:, 0]) > 0.0)

@@ -135,7 +135,7 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
     context = multiprocessing.get_context("spawn")
     with context.Manager() as server:
         reports = server.Queue()
-        pool = ProcessPoolExecutor(width, mp_context=context, initializer=_leave_interrupts_to_parent)
+        pool = ProcessPoolExecutor(width, mp_context=context, initializer=_follow_parent)
         running: dict[Future[Record | Failure], _Running] = {}
         try:
             while plan.waiting or running:
@@ -204,11 +204,22 @@ def _relay(reports: Any, monitor: Monitor) -> None:
         monitor.update(*reports.get())
 
 
-def _leave_interrupts_to_parent() -> None:
-    """Ctrl-C reaches the whole group; the parent alone decides what it means, and ends the workers."""
+def _follow_parent() -> None:
+    """In a worker: Ctrl-C is left to the parent, which ends its workers; where it is gone, they end too."""
+    import os
     import signal
+    import threading
+    import time
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def _kill(pool: ProcessPoolExecutor) -> None:

@@ -1,0 +1,241 @@
+"""An effect that a scene does not have is not there: not imported, not compiled, not a key of the machine code."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.core.scene.load import compose, load_scene
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly import fuse
+from pipeline.dynamics.assembly.numbers import Kinds, tabulate
+from pipeline.dynamics.assembly.system import build
+from tests.analytic.mechanism_runs import bundles
+
+CONTACT = ("pipeline.dynamics.contact", "pipeline.dynamics.joints.clearance_spherical", "pipeline.dynamics.integrate.events")
+FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
+INTEGRATOR = "dop853"
+CSJ, IDEAL = "sps4/csj", "sps4/ideal"
+
+#: runs a scene for a moment, then says which modules of the project it took
+RUN = """
+import sys
+from pipeline import dynamics
+from pipeline.core.scene.load import load_scene
+dynamics.simulate(load_scene(sys.argv[1], {"time.end": "0.2 ms"}), {}, lambda share, text: None)
+print(*[name for name in sys.modules if name.startswith("pipeline.")])
+"""
+
+
+def path_of(root: Path, scene: str) -> Path:
+    return root / "scenes" / f"{scene}.toml"
+
+
+def imported_by_a_run(root: Path, scene: str) -> set[str]:
+    command = [sys.executable, "-c", RUN, str(path_of(root, scene))]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def below(names: set[str], families: tuple[str, ...]) -> set[str]:
+    return {n for n in names if any(n == f or n.startswith(f + ".") for f in families)}
+
+
+def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: Path) -> None:
+    names = imported_by_a_run(root, IDEAL)
+    assert "pipeline.dynamics.joints.spherical" in names
+    assert below(names, (*CONTACT, *FLEXIBLE)) == set()
+
+
+def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
+    """Also shows that the test above would notice."""
+    names = imported_by_a_run(root, CSJ)
+    laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
+    normal = {"pipeline.dynamics.contact.normal.lankarani_nikravesh", "pipeline.dynamics.contact.normal.hertz"}
+    # Lankarani and Nikravesh's law is written with Hertz's power
+    assert laws == normal | {"pipeline.dynamics.contact.friction.modified_coulomb"}
+    assert below(names, FLEXIBLE) == set()
+
+
+# What is compiled ---------------------------------------------------------------------------------------------------
+
+
+def kinds_of(scene: Scene) -> Kinds:
+    return tabulate(build(scene, bundles(scene))).kinds
+
+
+@cache
+def kinds(path: Path) -> Kinds:
+    return kinds_of(load_scene(path))
+
+
+def reached(source: str) -> set[str]:
+    """Modules of this tower that an entry's machine code depends on."""
+    return set(fuse._reached(fuse.imported(source.encode(), "entry", package=False)[0]))
+
+
+#: effect -> word that its generated source must have, modules it must reach
+EFFECTS = {
+    "contact": ("clearance_spherical", "pipeline.dynamics.joints.clearance_spherical"),
+    "normal law": ("lankarani_nikravesh", "pipeline.dynamics.contact.normal.lankarani_nikravesh"),
+    "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
+    "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
+    "closures": ("import closures", "pipeline.dynamics.assembly.closures"),
+}
+LN, COULOMB = ("lankarani-nikravesh",), ("modified-coulomb",)
+CASES = {
+    "tree": (Kinds(("spherical",), (), (), False, False), set()),
+    "ideal": (Kinds(("prismatic", "spherical"), (), (), False, True), {"closures"}),
+    "smooth clearance": (Kinds(("free",), LN, (), False, False), {"contact", "normal law"}),
+    "clearance": (
+        Kinds(("prismatic", "spherical"), LN, COULOMB, False, True),
+        {"contact", "normal law", "friction", "closures"},
+    ),
+    "flexible": (Kinds(("fixed",), (), (), True, False), {"flexible bodies"}),
+    "everything": (Kinds(("fixed", "spherical"), LN, COULOMB, True, True), set(EFFECTS)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str) -> None:
+    found, present = CASES[case]
+    source = fuse._source(found, INTEGRATOR)
+    modules = reached(source)
+    for effect, (word, module) in EFFECTS.items():
+        assert (word in source) == (effect in present), effect
+        assert (module in modules) == (effect in present), effect
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
+    """An edit of a part that a scene does not use leaves its machine code alone."""
+    found, present = CASES[case]
+    modules = reached(fuse._source(found, INTEGRATOR))
+    wanted = {fuse.module_of(fuse.PACKAGES["joint"], n) for n in found.joints}
+    if "contact" in present:
+        wanted.add("pipeline.dynamics.joints.clearance_spherical")
+    assert below(modules, ("pipeline.dynamics.joints",)) == wanted
+    if "contact" not in present:
+        assert below(modules, CONTACT) == set()
+    if "flexible bodies" not in present:
+        assert below(modules, FLEXIBLE) == set()
+
+
+def test_frictionless_clearance_reaches_no_friction_law() -> None:
+    modules = reached(fuse._source(CASES["smooth clearance"][0], INTEGRATOR))
+    assert below(modules, ("pipeline.dynamics.contact.friction",)) == set()
+
+
+# What the machine code is keyed by ----------------------------------------------------------------------------------
+
+
+def digest(scene: Scene) -> str:
+    return fuse._digest(fuse._source(kinds_of(scene), scene.solver.integrator))
+
+
+#: one number of every kind that a scene has
+NUMBERS: dict[str, object] = {
+    "joint.A1.clearance": "0.2 mm",
+    "joint.A1.ball_radius": "15 mm",
+    "joint.A1.socket_material.youngs_modulus": "70 GPa",
+    "joint.A1.normal.restitution": 0.5,
+    "joint.A1.normal.exponent": 2.0,
+    "joint.A1.friction.static": 0.0,
+    "joint.A1.friction.v_static": "0.1 mm/s",
+    "joint.A1.floor": "1 mm/s",
+    "body.platform.mass": "1 kg",
+    "body.platform.inertia": ["2000 kg mm^2", "2000 kg mm^2", "3000 kg mm^2"],
+    "body.ball_A1.com": [0.0, 0.0, 0.0],
+    "body.platform.frames.A1.position": ["90 mm", "50 mm", 0.0],
+    "body.rod1.frames.bottom.position": [0.0, 0.0, "-60 mm"],
+    "body.platform.pose.position": [0.0, 0.0, "360 mm"],
+    "drive.P1.law.change": ["30 mm", "-30 mm"],
+    "drive.P2.law": {"type": "constant", "value": 0.0},
+    "drive.P3.law": {"type": "step", "start": [0.0], "end": [0.1], "change": ["1 mm"]},
+    "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
+    "time.end": "1 s",
+    "output": {"interval": "1 ms"},
+    "solver": {"rtol": 1e-8},
+}
+
+
+@pytest.mark.parametrize("place", NUMBERS)
+def test_no_number_of_a_scene_is_compiled_in(root: Path, place: str) -> None:
+    changed = load_scene(path_of(root, CSJ), {place: NUMBERS[place]})
+    assert changed != load_scene(path_of(root, CSJ))
+    assert digest(changed) == digest(load_scene(path_of(root, CSJ)))
+
+
+def with_part(table: dict[str, Any], name: str, part: str) -> bool:
+    return re.search(rf"{part}$", name) is not None
+
+
+def without_leg(table: dict[str, Any], k: int) -> dict[str, Any]:
+    """The table without the bodies, joints and drive of leg k; its socket stays on the platform."""
+    bodies = {f"{part}{k}" for part in ("cylinder", "rod", "ball_A", "ball_B")}
+    joints = {n for n, j in table["joint"].items() if any(f.partition(".")[0] in bodies for f in j["between"])}
+    result = dict(table)
+    result["body"] = {n: b for n, b in table["body"].items() if n not in bodies}
+    result["joint"] = {n: j for n, j in table["joint"].items() if n not in joints}
+    result["drive"] = {n: d for n, d in table["drive"].items() if d["joint"] not in joints}
+    return result
+
+
+def test_the_number_of_bodies_and_legs_is_not_compiled_in(root: Path) -> None:
+    table = compose(path_of(root, CSJ))
+    known = digest(Scene.model_validate(table))
+    for k in (4, 3):
+        fewer = without_leg(table, k)
+        assert len(fewer["body"]) == len(table["body"]) - 4
+        assert digest(Scene.model_validate(fewer)) == known
+        table = fewer
+
+
+def test_a_second_clearance_joint_of_the_same_kind_is_not_compiled_in(root: Path) -> None:
+    table = compose(path_of(root, CSJ))
+    known = digest(Scene.model_validate(table))
+    table["joint"]["A3"] = {**table["joint"]["A1"], "between": table["joint"]["A3"]["between"], "source": None}
+    assert digest(Scene.model_validate(table)) == known
+
+
+def test_the_order_in_which_parts_are_written_is_not_compiled_in(root: Path) -> None:
+    table = compose(path_of(root, CSJ))
+    turned = {**table, **{f: dict(reversed(table[f].items())) for f in ("body", "joint", "drive")}}
+    assert digest(Scene.model_validate(turned)) == digest(Scene.model_validate(table))
+
+
+def test_another_set_of_laws_is_other_machine_code(root: Path) -> None:
+    def clearance(change: dict[str, Any]) -> str:
+        table = compose(path_of(root, CSJ))
+        table["joint"]["A1"] = {k: v for k, v in {**table["joint"]["A1"], **change}.items() if v is not None}
+        return digest(Scene.model_validate(table))
+
+    found = [clearance({}), clearance({"friction": None}), clearance({"normal": {"law": "hertz"}})]
+    found.append(digest(load_scene(path_of(root, IDEAL))))
+    found.append(digest(load_scene(path_of(root, CSJ), {"solver": {"integrator": _other_integrator()}})))
+    assert len(set(found)) == len(found)
+
+
+def _other_integrator() -> str:
+    from pipeline.dynamics import integrate
+
+    return next(n for n in integrate.NAMES if n != INTEGRATOR)
+
+
+def test_a_flexible_rod_makes_another_kind_of_mechanism(root: Path) -> None:
+    rigid, flexible = (kinds(path_of(root, name)) for name in (CSJ, "sps4/far_csj_cb"))
+    assert not rigid.flexible
+    assert flexible.flexible
+    assert (rigid.normals, rigid.frictions, rigid.closures) == (flexible.normals, flexible.frictions, flexible.closures)
+
+
+def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(root: Path) -> None:
+    free, clamped = (kinds(path_of(root, f"sps4/far_csj_{name}")) for name in ("free", "cb"))
+    # the same joints in the tree and the same laws, so the same code
+    assert free == clamped
