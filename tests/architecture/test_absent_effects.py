@@ -18,7 +18,11 @@ from pipeline.dynamics.assembly.numbers import Kinds, tabulate
 from pipeline.dynamics.assembly.system import build
 from tests.analytic.mechanism_runs import bundles
 
-CONTACT = ("pipeline.dynamics.contact", "pipeline.dynamics.joints.clearance_spherical", "pipeline.dynamics.integrate.events")
+CONTACT = (
+    "pipeline.dynamics.contact",
+    "pipeline.dynamics.joints.clearance_spherical",
+    "pipeline.dynamics.integrate.events",
+)
 FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
 INTEGRATOR = "dop853"
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
@@ -172,10 +176,6 @@ def test_no_number_of_a_scene_is_compiled_in(root: Path, place: str) -> None:
     assert digest(changed) == digest(load_scene(path_of(root, CSJ)))
 
 
-def with_part(table: dict[str, Any], name: str, part: str) -> bool:
-    return re.search(rf"{part}$", name) is not None
-
-
 def without_leg(table: dict[str, Any], k: int) -> dict[str, Any]:
     """The table without the bodies, joints and drive of leg k; its socket stays on the platform."""
     bodies = {f"{part}{k}" for part in ("cylinder", "rod", "ball_A", "ball_B")}
@@ -218,14 +218,7 @@ def test_another_set_of_laws_is_other_machine_code(root: Path) -> None:
 
     found = [clearance({}), clearance({"friction": None}), clearance({"normal": {"law": "hertz"}})]
     found.append(digest(load_scene(path_of(root, IDEAL))))
-    found.append(digest(load_scene(path_of(root, CSJ), {"solver": {"integrator": _other_integrator()}})))
     assert len(set(found)) == len(found)
-
-
-def _other_integrator() -> str:
-    from pipeline.dynamics import integrate
-
-    return next(n for n in integrate.NAMES if n != INTEGRATOR)
 
 
 def test_a_flexible_rod_makes_another_kind_of_mechanism(root: Path) -> None:
