@@ -159,7 +159,7 @@ def test_coordinates_and_speeds_invert_the_motion(name: str, seed: int) -> None:
 def test_rotations_are_rotations(name: str, seed: int) -> None:
     record, _ = move(name, *coordinates(name, seed))
     R = rotation(record)
-    assert R.T @ R == pytest.approx(np.eye(3), abs=1e-14)  # rounding
+    assert np.allclose(R.T @ R, np.eye(3), rtol=0.0, atol=1e-14)  # rounding
     assert np.linalg.det(R) == pytest.approx(1.0, abs=1e-14)
 
 
