@@ -59,9 +59,12 @@ def kernel(laws: Laws) -> Any:
 
 
 class Touch:
-    """A contact at random motions of socket and ball, `depth` [m] deep, applied by the kernel."""
+    """A contact at random motions of socket and ball, `depth` [m] deep, applied by the kernel.
 
-    def __init__(self, laws: Laws, seed: int, depth: float, slip: float) -> None:
+    together: both move as one rigid body does.
+    """
+
+    def __init__(self, laws: Laws, seed: int, depth: float, slip: float, together: bool = False) -> None:
         random = np.random.default_rng(seed)
         packed = tables_of(laws).packed
         w, n = packed.work_space()
@@ -72,6 +75,10 @@ class Touch:
         self.centre["ball"] = self.centre["socket"] + (CLEARANCE + depth) * self.axis
         self.velocity = {name: slip * random.uniform(-1.0, 1.0, 3) for name in self.centre}
         self.omega = {name: slip * random.uniform(-10.0, 10.0, 3) for name in self.centre}
+        if together:
+            self.omega["ball"] = self.omega["socket"]
+            arm = self.centre["ball"] - self.centre["socket"]
+            self.velocity["ball"] = self.velocity["socket"] + np.cross(self.omega["socket"], arm)
         sites = packed.table("CONTACTS")[0, [tables.SOCKET, tables.BALL]]
         self.links = {name: int(packed.table("SITES")[s, 0]) for name, s in zip(self.centre, sites, strict=True)}
         for name, site in zip(self.centre, sites, strict=True):
@@ -137,7 +144,10 @@ def test_the_ball_is_pushed_back_into_the_socket(laws: Laws, seed: int, depth: f
 def test_rubbing_and_damping_only_take_energy(laws: Laws, seed: int, depth: float, slip: float) -> None:
     touch = Touch(laws, seed, depth, slip)
     assert touch.touch[tables.FRICTION_POWER] <= 0.0
-    assert np.all(touch.losses >= 0.0)
+    # a lossless law is subtracted from itself, in rounding where the compiler fuses the product
+    rounding = 1e-15 * touch.touch[tables.NORMAL_FORCE] * abs(touch.touch[tables.RATE])
+    assert touch.losses[0] >= -rounding
+    assert touch.losses[1] >= 0.0
     if laws[1] is None:
         assert touch.losses[1] == 0.0
     elif touch.touch[tables.NORMAL_FORCE] > 0.0:
@@ -163,19 +173,7 @@ def test_the_ledger_books_what_the_forces_do(laws: Laws, seed: int, depth: float
 @settings(max_examples=20)
 def test_rolling_is_no_sliding(laws: Laws, seed: int) -> None:
     """A ball and a socket that turn as one rigid body do not rub, wherever they turn about."""
-    touch = _as_one_body(laws, seed)
+    touch = Touch(laws, seed, 1e-5, 1.0, together=True)
     assert touch.touch[tables.RATE] == pytest.approx(0.0, abs=1e-12)  # rounding of speeds of some m/s
     # a sliding speed of rounding, 1e-15 m/s, times slope 1.5 mu_s / v_s = 1e3 s/m, force 1e4 N, and speed
     assert -touch.touch[tables.FRICTION_POWER] <= 1e-18
-
-
-def _as_one_body(laws: Laws, seed: int) -> Touch:
-    class Rigid(Touch):
-        pass
-
-    random = np.random.default_rng(seed)
-    return _with_motion(laws, seed, random.uniform(-5.0, 5.0, 3), random.uniform(-1.0, 1.0, 3))
-
-
-def _with_motion(laws: Laws, seed: int, omega: np.ndarray, velocity: np.ndarray) -> Touch:
-    raise NotImplementedError
