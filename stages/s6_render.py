@@ -22,6 +22,6 @@ def gl_state() -> str:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Pictures by file name; inputs are ``run`` and ``bundle/<body>``."""
-    from pipeline.post import render
+    from pipeline.post.render.pictures import pictures
 
-    return dict(render.pictures(inputs["run"], bundles(inputs), progress=progress))
+    return dict(pictures(inputs["run"], bundles(inputs), progress=progress))

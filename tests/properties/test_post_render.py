@@ -7,9 +7,10 @@ import pytest
 import xarray as xr
 
 from pipeline.post import derive
-from pipeline.post.render import gl, pictures
+from pipeline.post.render import gl
 from pipeline.post.render.mechanism import mechanism, rod_surface
 from pipeline.post.render.panel import panel
+from pipeline.post.render.pictures import pictures
 from pipeline.post.render.solids import equivalent, mesh
 from pipeline.post.rod_shape import centre_line, scale_to, surface
 from tests.paper import synthetic

@@ -1,5 +1,5 @@
-"""Pictures of shapes and motion with pyvista; the only package that imports it."""
+"""Pictures of shapes and motion with pyvista; the only package that imports it.
 
-from pipeline.post.render.pictures import pictures
-
-__all__ = ["pictures"]
+`pictures.pictures` makes them; nothing is imported here, because asking `gl` what this machine
+can draw must stay quick.
+"""
