@@ -232,3 +232,25 @@ def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(roo
     free, clamped = (kinds(path_of(root, f"sps4/far_csj_{name}")) for name in ("free", "cb"))
     # the same joints in the tree and the same laws, so the same code
     assert free == clamped
+
+
+#: runs scenes one after the other in one process
+BOTH = """
+import sys
+from pipeline import dynamics
+from pipeline.core.scene.load import load_scene
+for path in sys.argv[1:]:
+    done = dynamics.simulate(load_scene(path, {"time.end": "0.2 ms"}), {}, lambda share, text: None)
+    assert abs(done.energy_error).max() < 1e-9, path
+"""
+
+
+@pytest.mark.parametrize("order", [(IDEAL, "checks/free_body"), ("checks/free_body", IDEAL)], ids=" then ".join)
+def test_two_topologies_from_the_disk_cache_keep_their_own_code(root: Path, order: tuple[str, str]) -> None:
+    """Numba names symbols by a counter of each process; the loader takes the first of two that are named alike."""
+    paths = [str(path_of(root, name)) for name in order]
+    for scenes in ([paths[0]], [paths[1]], paths):  # each compiled by a process of its own, if at all
+        done = subprocess.run(
+            [sys.executable, "-c", BOTH, *scenes], cwd=root, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr[-500:]

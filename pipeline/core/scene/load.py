@@ -15,6 +15,18 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
+TYPES = (
+    "ground",
+    "rigid",
+    "flexible",
+    "spherical",
+    "revolute",
+    "prismatic",
+    "fixed",
+    "clearance-spherical",
+    "step",
+    "constant",
+)
 SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
 EDITS = ("extends", "replace", "set", "remove")
 
@@ -175,7 +187,8 @@ def _absolute_meshes(table: dict[str, Any], path: Path) -> None:
 
 
 def _input_error(path: Path, error: Any) -> InputError:
-    place = ".".join(str(key) for key in error["loc"] if key not in ("ground", "rigid", "flexible"))
+    # pydantic puts the type by which it chose a part's model into the place; the file has no such key
+    place = ".".join(str(key) for k, key in enumerate(error["loc"]) if k < 2 or key not in TYPES)
     message = error["msg"].removeprefix("Value error, ")
     if error["type"] == "extra_forbidden":
         message = "unknown key"
