@@ -12,7 +12,8 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from pipeline.core.algebra import quaternion_to_matrix
-from tests.analytic.mechanism_runs import impacts, run
+from pipeline.core.scene.load import load_scene
+from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"
 
@@ -104,16 +105,22 @@ def test_clearance_energy_ledger_closes(scene: str) -> None:
 
 @pytest.mark.slow
 def test_free_modes_converge_to_craig_bampton() -> None:
-    """Free-free modes gain the tip's compliance slowly: 0 with none axial, most of it with the whole basis."""
-    _, place, _ = deviation("sps4/far_cb")
+    """Free-free modes gain the tip's compliance slowly: 0 with none axial, all of it with the whole basis.
+
+    Displacements that are linear in one body frame differ from those that are linear in another by
+    what both leave out, the foreshortening u^2 / L of the rod; nearer than that they need not come.
+    """
+    overrides: Overrides = (("body.rod1.modes.count", 72), ("time.end", "10 ms"))
+    exact = run("sps4/far_cb", overrides)
     errors = []
     for count in (7, 14, 72):
         dataset = run("sps4/far_free", (("body.rod1.modes.count", count), ("time.end", "10 ms")))
-        exact = run("sps4/far_cb", (("body.rod1.modes.count", 72), ("time.end", "10 ms")))
         error = dataset.position.sel(body="platform").values - exact.position.sel(body="platform").values
         errors.append(np.abs(error).max())
+    bundle = bundles(load_scene(TREE / "scenes/sps4/far_cb.toml", override=dict(overrides)))["rod1"]
+    tip = exact.modal_coordinate.values @ bundle.frame_translation_shape.sel(frame="top").values.T
     assert errors[0] > errors[1] > errors[2]
-    assert errors[2] <= 1e-2 * place
+    assert errors[2] <= np.square(tip).sum(axis=1).max() / 0.24  # Table 2
 
 
 def rigid_swing(time: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import importlib.util
+import itertools
 import os
 import sys
 from collections.abc import Iterator
@@ -20,12 +21,15 @@ from types import ModuleType
 
 import llvmlite
 import numba
+from numba.core.bytecode import FunctionIdentity
 
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.registry import module_of
 from pipeline.core.workflow.fingerprint import Sources, imported
 from pipeline.dynamics.assembly.numbers import Kinds
 
+#: how compiled functions are named (see `compiling`); part of the digest
+NAMING = "counters by entry"
 SOURCES = Sources(Path(__file__).resolve().parents[3])
 PACKAGES = {
     "joint": "pipeline.dynamics.joints",
@@ -55,10 +59,16 @@ def entry(kinds: Kinds, integrator: str) -> ModuleType:
 
 @contextmanager
 def compiling(kinds: Kinds, integrator: str) -> Iterator[None]:
-    """Held while an entry may be compiled: of two processes the second waits for the first's code."""
-    path = _folder() / f"{_digest(_source(kinds, integrator))}.lock"
-    with path.open("w") as file:
+    """Held while an entry may be compiled: of two processes the second waits for the first's code.
+
+    Numba names the code of a function by its qualified name and a counter of the process. Entries
+    that two processes compiled would share names for different code, and a third process that
+    loads both would mix them up (numba issue 10486); so each entry counts from its own number.
+    """
+    digest = _digest(_source(kinds, integrator))
+    with (_folder() / f"{digest}.lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
+        FunctionIdentity._unique_ids = itertools.count(int(digest[:12], 16) << 16)
         yield
 
 
@@ -83,7 +93,7 @@ def _write(path: Path, source: str) -> None:
 def _digest(source: str) -> str:
     """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
     digest = hashlib.sha256(source.encode())
-    digest.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
+    digest.update(f"{NAMING} {numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
     roots = imported(source.encode(), "entry", package=False)[0]
     for name, source_digest in sorted(_reached(roots).items()):
         digest.update(f"{name} {source_digest}".encode())

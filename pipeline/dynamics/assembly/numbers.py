@@ -169,7 +169,7 @@ def _drives(system: System) -> tuple[np.ndarray, np.ndarray]:
 def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and the floor below which a group is resolved absolutely.
 
-    A vector is one group, so that turning the scene changes no step.  Floors: the mechanism's
+    A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
     """
     L = layout.system.length
