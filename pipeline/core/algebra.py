@@ -32,20 +32,22 @@ def quaternion_to_matrix(q: np.ndarray) -> np.ndarray:
 
 
 def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion of one rotation matrix, w >= 0, shape (4,). Stable for every angle."""
+    """Unit quaternion of a rotation matrix, w >= 0, shape (..., 4). Stable for every angle."""
     R = np.asarray(R, dtype=float)
-    # squared components times four; the largest is safe to divide by (Shepperd 1978)
-    squares = 1.0 + np.array([R.trace(), *(2.0 * np.diag(R) - R.trace())])
-    i = int(np.argmax(squares))
-    q = np.empty(4)
-    cross = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    if i == 0:
-        q[0], q[1:] = squares[0], cross
-    else:
-        q[0], q[1:] = cross[i - 1], R[:, i - 1] + R[i - 1, :]
-        q[i] = squares[i]
-    q /= np.linalg.norm(q)
-    return q if q[0] >= 0.0 else -q
+    trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
+    # four times the squared components; a row per component that may be divided by: the largest (Shepperd 1978)
+    squares = 1.0 + np.concatenate([trace, 2.0 * np.diagonal(R, axis1=-2, axis2=-1) - trace], axis=-1)
+    rows = np.empty((*R.shape[:-2], 4, 4))
+    rows[..., 0, 0] = squares[..., 0]
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        rows[..., 0, k + 1] = rows[..., k + 1, 0] = R[..., j, i] - R[..., i, j]
+        rows[..., k + 1, 1:] = R[..., :, k] + R[..., k, :]
+        rows[..., k + 1, k + 1] = squares[..., k + 1]
+    best = np.argmax(squares, axis=-1)[..., None, None]
+    q = np.take_along_axis(rows, best, axis=-2)[..., 0, :]
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] >= 0.0, q, -q)
 
 
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.tables import ACCELERATION, ALPHA, AXES, FRAME_SIZE, OMEGA, ORIGIN, VELOCITY
@@ -105,21 +106,6 @@ def frame_positions(built: Tables, seen: dict[str, np.ndarray], links: list[Moti
 
 def quaternions(R: np.ndarray) -> np.ndarray:
     """Unit quaternions of rotation matrices (time, 3, 3), without jumps of sign; w >= 0 at first."""
-    trace = np.trace(R, axis1=1, axis2=2)
-    diagonal = np.diagonal(R, axis1=1, axis2=2)
-    squares = 1.0 + np.concatenate([trace[:, None], 2.0 * diagonal - trace[:, None]], axis=1)
-    best = np.argmax(squares, axis=1)
-    skew = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    q = np.empty((len(R), 4))
-    for b in range(4):
-        rows = np.flatnonzero(best == b)
-        if b == 0:
-            q[rows, 0], q[rows, 1:] = squares[rows, 0], skew[rows]
-        else:
-            q[rows, 0] = skew[rows, b - 1]
-            q[rows, 1:] = R[rows, :, b - 1] + R[rows, b - 1, :]
-            q[rows, b] = squares[rows, b]
-    q /= np.linalg.norm(q, axis=1, keepdims=True)
+    q = matrix_to_quaternion(R)
     flips = np.where(np.sum(q[1:] * q[:-1], axis=1) < 0.0, -1.0, 1.0)
-    first = 1.0 if q[0, 0] >= 0.0 else -1.0
-    return q * np.concatenate([[first], first * np.cumprod(flips)])[:, None]
+    return q * np.concatenate([[1.0], np.cumprod(flips)])[:, None]
