@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.scene.parts import FlexibleBody
+from pipeline.core.errors import InputError
+from pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
 from pipeline.dynamics.assembly.layout import Layout
+from pipeline.dynamics.assembly.system import System
 from pipeline.dynamics.assembly.wiring import integers
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
@@ -25,7 +27,7 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         bundle = layout.system.bundles[str(link.flexible)]
         n = layout.modes[i]
         moments, where = _moments(bundle)
-        chunk = _data(bundle, body.damping or 0.0)
+        chunk = _data(bundle, _damping(str(link.flexible), body, bundle))
         moves = int(_inboard_moves(layout, i, bundle))
         flex.append((i, n, layout.flex_q0[i], layout.flex_c0[i], data0, moment0, len(moments), moves))
         flex_real.append(
@@ -52,19 +54,48 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     return wiring, numbers
 
 
-def _data(bundle: xr.Dataset, damping: float) -> np.ndarray:
+def bow(system: System, body: str, frame: str | None = None) -> np.ndarray | None:
+    """Shortening of a bent body per pair of modes at a frame [1/(kg m)], or its first moment [1/m]; shape (mode, mode).
+
+    None where the scene does not ask for it.
+    """
+    part = system.scene.body[body]
+    if not isinstance(part, FlexibleBody) or part.stiffening is None:
+        return None
+    bundle = system.bundles[body]
+    if frame is None:
+        return bundle["shortening_first_moment"].values
+    return bundle["frame_shortening"].sel(frame=frame).values
+
+
+def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:
+    """Damping 2 zeta omega of every mode [1/s]; InputError when ratios and modes differ in number."""
+    square = np.diag(bundle["modal_stiffness"].values)
+    given = body.damping
+    if isinstance(given, Rayleigh):
+        return given.alpha + given.beta * square
+    if isinstance(given, RatioPerMode) and len(given.ratios) != len(square):
+        raise InputError(
+            f"[body.{name}.damping.ratios]",
+            f"{len(given.ratios)} damping ratios are given for {len(square)} modes",
+            "give one ratio per mode",
+        )
+    ratios = given.ratios if isinstance(given, RatioPerMode) else given or 0.0
+    return 2.0 * np.asarray(ratios) * np.sqrt(square)
+
+
+def _data(bundle: xr.Dataset, damping: np.ndarray) -> np.ndarray:
     """C1 (3n), E (9n), modal mass (n n), stiffness omega^2 (n), damping 2 zeta omega (n).
 
     The coordinates of a bundle are mass-normalised eigenmodes of its reduced matrices.
     """
     stiffness = np.diag(bundle["modal_stiffness"].values)
-    omega = np.sqrt(stiffness)
     chunks = [
         bundle["modal_first_moment"].values,
         bundle["position_mode_moment"].values,
         bundle["modal_mass"].values,
         stiffness,
-        2.0 * damping * omega,
+        damping,
     ]
     return np.concatenate([c.ravel() for c in chunks])
 
