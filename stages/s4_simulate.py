@@ -28,6 +28,7 @@ KERNELS = (
     "integrate.project",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
+STIFFENING_KERNELS = ("bodies.shortening",)
 CONTACT_KERNELS = ("integrate.events",)
 
 
@@ -50,6 +51,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
     found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
     found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
     kernels = KERNELS + (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
+    if any(body.stiffening is not None for body in scene.flexible().values()):
+        kernels += STIFFENING_KERNELS
     found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"

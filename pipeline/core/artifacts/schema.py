@@ -176,13 +176,11 @@ ENSEMBLE: Schema = {
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
 }
 
-_STILL = (
-    "position quaternion frame_position joint_force joint_moment modal_coordinate drive_force drive_position "
-    "contact_gap contact_penetration contact_force contact_normal_force contact_offset potential elastic"
-).split()
+_STILL = """position quaternion frame_position joint_force joint_moment modal_coordinate drive_force drive_position
+contact_gap contact_penetration contact_force contact_normal_force contact_offset potential elastic"""
 #: static equilibrium, or steady motion: what a run says at one instant
 EQUILIBRIUM: Schema = {
-    name: _V(RUN[name].dims[1:], RUN[name].units, RUN[name].long_name, RUN[name].optional) for name in _STILL
+    name: _V(RUN[name].dims[1:], RUN[name].units, RUN[name].long_name, RUN[name].optional) for name in _STILL.split()
 }
 
 #: natural vibrations about it; shapes per unit of a coordinate with unit modal mass, parts real and imaginary

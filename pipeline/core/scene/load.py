@@ -24,6 +24,7 @@ TYPES = (
     "prismatic",
     "fixed",
     "clearance-spherical",
+    "spin-up",
     "step",
     "constant",
 )

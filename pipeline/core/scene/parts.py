@@ -202,7 +202,16 @@ class Step(Part):
         return self
 
 
-DriveLaw = Annotated[Constant | Step, Field(discriminator="type")]
+class SpinUp(Part):
+    """From rest to a constant speed [m/s or rad/s] within `duration`, acceleration and jerk continuous."""
+
+    type: Literal["spin-up"]
+    start: Time = 0.0
+    duration: Annotated[Time, Positive]
+    speed: Number
+
+
+DriveLaw = Annotated[Constant | SpinUp | Step, Field(discriminator="type")]
 
 
 class Drive(Part):

@@ -31,6 +31,7 @@ class Kinds:
     frictions: tuple[str, ...]
     flexible: bool
     closures: bool
+    stiffening: bool = False
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ def _kinds(system: System) -> Kinds:
         frictions=tuple(sorted({c.friction.law for c in contacts if c.friction is not None})),
         flexible=any(link.flexible for link in system.links),
         closures=bool(system.closures),
+        stiffening=any(b.stiffening is not None for b in system.scene.flexible().values()),
     )
 
 

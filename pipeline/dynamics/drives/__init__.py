@@ -5,4 +5,4 @@ then), in order; the first starts at -inf's stand-in and holds before the first 
 """
 
 KIND = "drive law"
-NAMES = {"constant": "constant:pieces", "step": "step:pieces"}
+NAMES = {"constant": "constant:pieces", "spin-up": "spin_up:pieces", "step": "step:pieces"}

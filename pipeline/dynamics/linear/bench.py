@@ -173,7 +173,10 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     engine.evaluate(state(bench, q, v), bench.time)
     sizes, nv = engine.built.packed.sizes, engine.built.layout.nv
     return Balance(
-        engine.view("BIAS", nv).copy(), _mass(engine), _jacobian(engine), engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"]).copy()
+        engine.view("BIAS", nv).copy(),
+        _mass(engine),
+        _jacobian(engine),
+        engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"]).copy(),
     )
 
 
@@ -197,5 +200,3 @@ def _jacobian(engine: Engine) -> np.ndarray:
         block = engine.view("JACOBIAN", c[JACOBIAN0] + rows * len(slots))[c[JACOBIAN0] :]
         J[c[ROW0] : c[ROW0] + rows, slots] = block.reshape(len(slots), rows).T
     return J
-
-

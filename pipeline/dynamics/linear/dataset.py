@@ -58,21 +58,29 @@ def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.
     data: dict[str, Any] = {
         "frequency": ("vibration", np.abs(value.imag) / (2.0 * np.pi)),
         "undamped_frequency": ("vibration", size / (2.0 * np.pi)),
-        "decay_rate": ("vibration", -value.real),
-        "damping_ratio": ("vibration", np.where(size > 0.0, -value.real / np.where(size > 0.0, size, 1.0), 0.0)),
+        "decay_rate": ("vibration", 0.0 - value.real),
+        "damping_ratio": ("vibration", np.where(size > 0.0, (0.0 - value.real) / np.where(size > 0.0, size, 1.0), 0.0)),
         "dominant": ("vibration", np.array([name for name, _ in owner], dtype=str)),
         "dominant_share": ("vibration", np.array([share for _, share in owner])),
-        "energy_share": (("vibration", "owner"), np.array([[p[o] for o in owners] for p in parts]).reshape(len(parts), -1)),
+        "energy_share": (
+            ("vibration", "owner"),
+            np.array([[p[o] for o in owners] for p in parts]).reshape(len(parts), -1),
+        ),
         "frame_translation": (("vibration", "part", "frame", "axis"), _split(translation)),
         "frame_rotation": (("vibration", "part", "frame", "axis"), _split(rotation)),
     }
     layout = bench.engine.built.layout
     if layout.modes:
-        modal = np.concatenate([np.arange(layout.flex_c0[i], layout.flex_c0[i] + n) for i, n in sorted(layout.modes.items())])
+        modal = np.concatenate(
+            [np.arange(layout.flex_c0[i], layout.flex_c0[i] + n) for i, n in sorted(layout.modes.items())]
+        )
         data["modal_shape"] = (("vibration", "part", "mode"), _split(w[modal].T))
     made = still.assign({n: xr.Variable(*v) for n, v in data.items()})
     made = made.assign_coords(
-        vibration=np.arange(1, len(value) + 1), part=list(PARTS), owner=owners, frame=list(bench.engine.built.system.frames)
+        vibration=np.arange(1, len(value) + 1),
+        part=list(PARTS),
+        owner=owners,
+        frame=list(bench.engine.built.system.frames),
     )
     return conform(made, LINEAR, **still.attrs, motions_without_stiffness=small.free)
 

@@ -33,7 +33,7 @@ class Rounding:
 
 
 def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Rounding) -> tuple[np.ndarray, float]:
-    """d force / d s at s = 0, and the estimate of its error in the Euclidean norm.
+    """Derivative d force / d s at s = 0, and the estimate of its error in the Euclidean norm.
 
     force(s): shape (n,); it may raise SolverError where it does not exist, which steps inward.
     widest: the largest step tried.  Raises SolverError when `force` exists nowhere near.

@@ -110,5 +110,3 @@ def magnitude(motions: np.ndarray, at: Tangent) -> float:
 
 def _stacked(found: list[tuple[np.ndarray, float]], n: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array([c for c, _ in found]).T.reshape(n, n), np.array([e for _, e in found])
-
-
