@@ -189,9 +189,8 @@ LINEAR: Schema = EQUILIBRIUM | {
     "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
     "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
     "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
-    "dominant": _V(("vibration",), "1", "joint or flexible body with most of the kinetic energy"),
-    "dominant_share": _V(("vibration",), "1", "its share of the kinetic energy"),
-    "energy_share": _V(("vibration", "owner"), "1", "share of the kinetic energy by joint or flexible body"),
+    "dominant": _V(("vibration",), "1", "body with the largest share of the kinetic energy"),
+    "energy_share": _V(("vibration", "moving_body"), "1", "share of the body in the kinetic energy"),
     "frame_translation": _V(
         ("vibration", "part", "frame", "axis"), "kg-0.5", "displacement of the named frame, world axes"
     ),

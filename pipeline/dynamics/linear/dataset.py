@@ -11,8 +11,8 @@ from pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
 from pipeline.dynamics.integrate import state as slots
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.linear.bench import NO_IMPACT, Bench, seen, state
-from pipeline.dynamics.linear.names import leading, shares
 from pipeline.dynamics.linear.settle import Settled
+from pipeline.dynamics.linear.shares import by_body
 from pipeline.dynamics.linear.vibrations import Vibrations
 from pipeline.dynamics.record.dataset import attributes, dataset
 from pipeline.dynamics.record.frames import frame_velocities
@@ -48,24 +48,19 @@ def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.
     """The equilibrium with its natural vibrations (schema LINEAR)."""
     still = equilibrium(bench, found, moving)
     value, w = small.value, small.shape
-    translation, rotation = _frames(bench, found, w)
+    translation, rotation, energy = _motions(bench, found, w)
     phase = _phase(translation, rotation, w)
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
-    size = np.abs(value)
-    owner = [leading(bench, column, found.at.mass) for column in w.T]
-    parts = [shares(bench, column, found.at.mass) for column in w.T]
-    owners = list(parts[0]) if parts else []
+    size, parts = np.abs(value), list(energy)
+    share = np.stack([energy[name] for name in parts], axis=1)
+    most = share.argmax(axis=1)
     data: dict[str, Any] = {
         "frequency": ("vibration", np.abs(value.imag) / (2.0 * np.pi)),
         "undamped_frequency": ("vibration", size / (2.0 * np.pi)),
         "decay_rate": ("vibration", 0.0 - value.real),
         "damping_ratio": ("vibration", np.where(size > 0.0, (0.0 - value.real) / np.where(size > 0.0, size, 1.0), 0.0)),
-        "dominant": ("vibration", np.array([name for name, _ in owner], dtype=str)),
-        "dominant_share": ("vibration", np.array([share for _, share in owner])),
-        "energy_share": (
-            ("vibration", "owner"),
-            np.array([[p[o] for o in owners] for p in parts]).reshape(len(parts), -1),
-        ),
+        "dominant": ("vibration", np.array(parts, dtype=str)[most]),
+        "energy_share": (("vibration", "moving_body"), share),
         "frame_translation": (("vibration", "part", "frame", "axis"), _split(translation)),
         "frame_rotation": (("vibration", "part", "frame", "axis"), _split(rotation)),
     }
@@ -79,26 +74,31 @@ def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.
     made = made.assign_coords(
         vibration=np.arange(1, len(value) + 1),
         part=list(PARTS),
-        owner=owners,
+        moving_body=parts,
         frame=list(bench.engine.built.system.frames),
     )
     return conform(made, LINEAR, **still.attrs, motions_without_stiffness=small.free)
 
 
-def _frames(bench: Bench, found: Settled, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Motion of every named frame in each vibration, world axes, complex; translations and rotations (n, frame, 3)."""
-    built = bench.engine.built
+def _motions(bench: Bench, found: Settled, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+    """Motion of every named frame in each vibration, and the share of every body in its kinetic energy.
+
+    Translations and rotations: world axes, complex, shape (n, frame, 3).
+    """
+    built, n = bench.engine.built, w.shape[1]
     speeds = np.concatenate([np.zeros((1, len(w))), w.real.T, w.imag.T])
     rows = seen(bench, np.array([state(bench, found.at.q, v) for v in speeds]))
-    motions = frame_velocities(built, rows, link_motions(built, rows["link_frame"]))
-    n = w.shape[1]
+    links = link_motions(built, rows["link_frame"])
+    velocities = frame_velocities(built, rows, links)
 
     def part(which: int) -> np.ndarray:
-        every = np.array([m[which] for m in motions.values()]).reshape(len(motions), len(speeds), 3)
+        every = np.array([m[which] for m in velocities.values()]).reshape(len(velocities), len(speeds), 3)
         moved = np.swapaxes(every - every[:, :1], 0, 1)[1:]
         return moved[:n] + 1j * moved[n:]
 
-    return part(0), part(1)
+    energy = {name: values[:n] + values[n:] for name, values in by_body(built, rows, links).items()}
+    whole = np.sum(list(energy.values()), axis=0)
+    return part(0), part(1), {name: values / whole for name, values in energy.items()}
 
 
 def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.ndarray:

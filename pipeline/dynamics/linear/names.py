@@ -22,21 +22,10 @@ def owners(bench: Bench) -> list[str]:
     return found
 
 
-def shares(bench: Bench, motion: np.ndarray, mass: np.ndarray) -> dict[str, float]:
-    """Share of a motion's kinetic energy per owner; the shares add up to one, and coupling may make one negative.
-
-    motion: speeds, shape (nv,), real or complex.
-    """
-    energy = np.real(np.conj(motion) * (mass @ motion))
-    total = float(energy.sum())
+def leading(bench: Bench, motion: np.ndarray, mass: np.ndarray) -> str:
+    """The owner of most of the kinetic energy of a motion; motion: speeds, shape (nv,)."""
+    energy = motion * (mass @ motion)
     found: dict[str, float] = {}
     for name, value in zip(owners(bench), energy, strict=True):
-        found[name] = found.get(name, 0.0) + (float(value) / total if total else 0.0)
-    return found
-
-
-def leading(bench: Bench, motion: np.ndarray, mass: np.ndarray) -> tuple[str, float]:
-    """The owner with the largest share of a motion, and that share."""
-    found = shares(bench, motion, mass)
-    name = max(found, key=lambda n: found[n])
-    return name, found[name]
+        found[name] = found.get(name, 0.0) + float(value)
+    return max(found, key=lambda n: found[n])

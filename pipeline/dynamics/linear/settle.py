@@ -58,7 +58,7 @@ def settle(bench: Bench, q: np.ndarray) -> Settled:
         if float(np.max(np.abs(at.Z @ step) / scales(bench))) <= SHORT:
             return Settled(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
-    loose, _ = leading(bench, at.Z @ at.unbalanced, at.mass)
+    loose = leading(bench, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
         f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
         f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"

@@ -24,7 +24,7 @@ NOTHING_BESIDE = 1e-13
 NEGLIGIBLE = 1e-9
 #: a motion without stiffness is scaled by this share of the highest frequency
 LEAST_SCALE = 1e-6
-#: an eigenvalue with this share of imaginary part is real: it decays, or grows, without vibrating
+#: an eigenvalue with this share of imaginary part is real, it decays or grows without vibrating; likewise imaginary
 REAL = 1e-12
 
 
@@ -87,8 +87,10 @@ def _solve(K: np.ndarray, D: np.ndarray, error: np.ndarray) -> tuple[np.ndarray,
     # displacements, not speeds: a creeping motion has none
     shape = vectors[: len(K)] / scale[:, None]
     real = np.abs(value.imag) <= REAL * np.abs(value)
+    lasting = np.abs(value.real) <= REAL * np.abs(value)
+    value = np.where(real, value.real, np.where(lasting, 1j * value.imag, value))
     kept = (value.imag > 0.0) | real
-    value, shape = np.where(real, value.real, value)[kept], shape[:, kept]
+    value, shape = value[kept], shape[:, kept]
     value[np.abs(value) <= REAL * np.abs(value).max(initial=0.0)] = 0.0
     return value, shape / np.linalg.norm(shape, axis=0)
 

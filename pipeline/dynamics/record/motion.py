@@ -86,8 +86,8 @@ def body_motions(built: Tables, seen: dict[str, np.ndarray], links: list[Motion]
         elif i and system.links[i].flexible == name:
             bundle, state = system.bundles[name], modal(built, i, seen)
             C, mass = bundle["modal_first_moment"].values, float(bundle["mass"])
-            place, rate, second = shift(C, bow(system, name), state.q, state.u, state.du)
-            found[name] = links[i].moving((bundle["first_moment"].values + place) / mass, rate / mass, second / mass)
+            arm, rate, second = shift(C, bow(system, name), state.q, state.u, state.du)
+            found[name] = links[i].moving((bundle["first_moment"].values + arm) / mass, rate / mass, second / mass)
     return found
 
 
