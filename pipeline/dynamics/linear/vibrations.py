@@ -47,55 +47,82 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
         return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0)
     motions = at.Z
     for _ in range(2):
-        K, _ = stiffness(bench, at, motions)
-        motions = motions @ np.linalg.eigh(0.5 * (K + K.T))[1]
+        K, error = stiffness(bench, at, motions)
+        motions = motions @ _principal(_symmetric(K, error), _limp(K, error))[1]
     K, error = stiffness(bench, at, motions)
     D, rate_error = damping(bench, at, motions)
-    diagonal = np.abs(np.diag(K))
-    limp = diagonal <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * diagonal.max())
-    least = NOTHING_BESIDE * max(float(np.abs(D).max()), float(np.sqrt(diagonal.max())))
+    limp = _limp(K, error)
+    least = NOTHING_BESIDE * max(float(np.abs(D).max()), float(np.sqrt(np.abs(np.diag(K)).max())))
     D[np.abs(D) <= np.maximum(NOTHING * rate_error[None, :], least)] = 0.0
-    loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
     K[:, limp], K[limp, :] = 0.0, 0.0
-    kept = ~loose
-    value, shape = _solve(K[np.ix_(kept, kept)], D[np.ix_(kept, kept)], error[kept])
-    full = np.zeros((len(K), value.size), dtype=complex)
-    full[kept] = shape
-    full = np.hstack([np.eye(len(K), dtype=complex)[:, loose], full])
-    value = np.concatenate([np.zeros(int(loose.sum()), dtype=complex), value])
-    order = np.lexsort((np.abs(value), np.abs(value.imag), np.arange(len(value)) >= loose.sum()))
-    return Vibrations(value[order], motions @ full[:, order], int(limp.sum()))
+    if _is_symmetric(K, error) and not np.any(D):
+        k, axes = _principal(_symmetric(K, error), limp)
+        # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
+        value, shape = np.sqrt(-k.astype(complex)), axes.astype(complex)
+    else:
+        value, shape = _damped(K, D, limp)
+    order = np.lexsort((np.abs(value), np.abs(value.imag)))
+    return Vibrations(value[order], motions @ shape[:, order], int(limp.sum()))
 
 
-def _solve(K: np.ndarray, D: np.ndarray, error: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair.
+def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Which motions have no stiffness as far as the differences can tell."""
+    own = np.abs(np.diag(K))
+    return own <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * own.max())
 
-    error: of each column of K.
-    """
+
+def _scale(K: np.ndarray) -> np.ndarray:
     own = np.sqrt(np.abs(np.diag(K)))
-    scale = np.maximum(own, LEAST_SCALE * own.max(initial=1e-300))
-    doubt = NOTHING * (error[:, None] + error[None, :]) + NEGLIGIBLE * np.outer(scale, scale)
-    if np.all(np.abs(K - K.T) <= doubt):
-        # of the two values of an entry the column with the smaller error has the better one
-        K = np.where(error[:, None] < error[None, :], K.T, K)
-        K = np.triu(K) + np.triu(K, 1).T
-        if not np.any(D):
-            return _undamped(K)
+    return np.maximum(own, LEAST_SCALE * own.max() or 1.0)
+
+
+def _is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
+    """Whether K is symmetric within the errors of its columns: then the forces have a potential."""
+    doubt = NOTHING * (error[:, None] + error[None, :]) + NEGLIGIBLE * np.outer(_scale(K), _scale(K))
+    return bool(np.all(np.abs(K - K.T) <= doubt))
+
+
+def _symmetric(K: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Of the two values of an entry that of the column with the smaller error."""
+    better = np.where(error[:, None] < error[None, :], K.T, K)
+    return np.triu(better) + np.triu(better, 1).T
+
+
+def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and axes of a symmetric stiffness; limp motions have the eigenvalue 0.
+
+    A positive definite one goes by the singular values of its Cholesky factor, the frequencies themselves: rounding
+    is then relative to the highest frequency, not to its square.
+    """
+    firm = ~limp
+    inner = K[np.ix_(firm, firm)]
+    try:
+        axes, omega, _ = np.linalg.svd(np.linalg.cholesky(inner))
+        inner_k = omega**2
+    except np.linalg.LinAlgError:
+        inner_k, axes = np.linalg.eigh(inner)
+    k, full = np.zeros(len(K)), np.eye(len(K))
+    k[firm] = inner_k
+    full[np.ix_(firm, firm)] = axes
+    return k, full
+
+
+def _damped(K: np.ndarray, D: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair."""
+    loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
+    kept = np.ix_(~loose, ~loose)
+    K, D, scale = K[kept], D[kept], _scale(K)[~loose]
     # coordinates z and z'/scale change at comparable rates
     A = np.block([[np.zeros_like(K), np.diag(scale)], [-K / scale[None, :], -D]])
     value, vectors = np.linalg.eig(A)
     # displacements, not speeds: a creeping motion has none
-    shape = vectors[: len(K)] / scale[:, None]
+    inner = vectors[: len(K)] / scale[:, None]
     real = np.abs(value.imag) <= REAL * np.abs(value)
     lasting = np.abs(value.real) <= REAL * np.abs(value)
     value = np.where(real, value.real, np.where(lasting, 1j * value.imag, value))
-    kept = (value.imag > 0.0) | real
-    value, shape = value[kept], shape[:, kept]
     value[np.abs(value) <= REAL * np.abs(value).max(initial=0.0)] = 0.0
-    return value, shape / np.linalg.norm(shape, axis=0)
-
-
-def _undamped(K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Real vibrations; a falling motion (negative stiffness) has lambda = +sqrt(-k)."""
-    k, axes = np.linalg.eigh(K)
-    return np.sqrt(-k.astype(complex)), axes.astype(complex)
+    once = (value.imag > 0.0) | real
+    shape = np.zeros((len(loose), int(once.sum())), dtype=complex)
+    shape[~loose] = inner[:, once] / np.linalg.norm(inner[:, once], axis=0)
+    still = np.eye(len(loose), dtype=complex)[:, loose]
+    return np.concatenate([np.zeros(int(loose.sum()), dtype=complex), value[once]]), np.hstack([still, shape])
