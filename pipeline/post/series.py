@@ -7,10 +7,12 @@ import json
 import numpy as np
 import xarray as xr
 
+from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.schema import conform
+from pipeline.core.quantities import IMPACT
 from pipeline.post.horizon import SHARE, Variables, ensemble_statistics, horizon
-from pipeline.post.impacts import THRESHOLD, impacts
-from pipeline.post.rotations import angle_about_y, rotation_between
+from pipeline.post.impacts import impacts
+from pipeline.post.rotations import angle_about_y
 from pipeline.post.schema import POST
 
 
@@ -34,7 +36,7 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     data["horizon"] = ((), np.array(end))
     attributes = {
         "scene": str(run.attrs.get("scene", "")),
-        "impact_threshold": f"{THRESHOLD:g} m/s",
+        "impact_threshold": f"{IMPACT:g} m/s",
         "horizon_criterion": f"velocities of the ensemble's members differ by {SHARE:g} of the largest velocity",
     }
     result = conform(xr.Dataset(data, coords=coords), POST, **attributes)

@@ -196,4 +196,4 @@ def _input_error(path: Path, error: Any) -> InputError:
         message = "is missing"
     value = error.get("input")
     shown = f" (got {value!r})" if isinstance(value, (str, int, float)) and error["type"] != "missing" else ""
-    return InputError(f"{path} [{place}]", f"{message}{shown}")
+    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}")

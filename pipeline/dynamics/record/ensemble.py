@@ -13,6 +13,7 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import ENSEMBLE, conform
 from pipeline.core.errors import InputError
+from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, project
@@ -21,9 +22,6 @@ from pipeline.dynamics.record.dataset import attributes
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run import engine_of, observed
 from pipeline.dynamics.tables import BALL, FRAME_SIZE, NORMAL_FORCE, SOCKET, TOUCH_OFFSET, TOUCH_SIZE, VELOCITY
-
-#: approach speed above which a closing counts as an impact [m/s]
-IMPACT = 1e-4
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
