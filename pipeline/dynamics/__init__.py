@@ -26,8 +26,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     from pipeline.dynamics.run import integrate
 
     def once(edited: Scene) -> xr.Dataset:
-        done = integrate(edited, bundles, progress)
-        return dataset(done.engine.built, done.trajectory, done.observed, done.start_residual)
+        return dataset(integrate(edited, bundles, progress))
 
     if scene.accuracy is None or not scene.accuracy.quantities:
         return once(scene)
