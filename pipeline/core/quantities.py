@@ -150,3 +150,34 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
         return float(rotation_between(values[:1], values).max())
     start = values[:1] if quantity.kind == "position" else 0.0
     return float(np.linalg.norm(values - start, axis=1).max())
+
+
+def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
+    """The part of a run that `error` and `scale` need for these quantities."""
+    found: dict[str, xr.DataArray] = {}
+    for owner in ("body", "joint", "drive"):
+        mine = [q for q in chosen if KINDS[q.kind].owner == owner]
+        names = sorted({q.owner for q in mine})
+        found |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
+    if any(KINDS[q.kind].owner == "contact" for q in chosen):
+        found |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
+        found |= {name: run[name] for name in ("contact_impulse",) if name in run}
+    if "horizon" in run:
+        found["horizon"] = run["horizon"]
+    kept = xr.Dataset(found)
+    return kept.assign_coords(contact=run["contact"]) if "contact" in run.coords else kept
+
+
+def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:
+    """What is asked of a scene that names nothing: motion of the body with most joints, a reaction, the contacts.
+
+    joints: the bodies that each joint connects, in the scene's order; contacts: those with clearance.
+    """
+    bodies = [body for pair in joints.values() for body in pair]
+    if not bodies:
+        return []
+    central = max(dict.fromkeys(bodies), key=bodies.count)
+    chosen = [Quantity(central, kind) for kind in ("position", "orientation", "velocity")]
+    ideal = [name for name, pair in joints.items() if central in pair and name not in contacts]
+    chosen += [Quantity(name, "force") for name in ideal[:1]]
+    return chosen + [Quantity(name, kind) for name in contacts for kind in ("peak_force", "impulse", "impact_times")]

@@ -19,6 +19,7 @@ import xarray as xr
 from pipeline.core import quantities
 from pipeline.core.errors import InputError
 from pipeline.core.quantities import Quantity
+from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 
 Progress = Callable[[float | None, str], None]
@@ -57,10 +58,7 @@ class Search:
     def run(self, rtol: float) -> xr.Dataset:
         """The run at a tolerance, made once."""
         if rtol not in self.runs:
-            solver = self.scene.solver.model_copy(update={"rtol": rtol})
-            edited = self.scene.model_copy(update={"solver": solver})
-            edited._name, edited._path = self.scene._name, self.scene._path
-            self.runs[rtol] = self.once(edited)
+            self.runs[rtol] = self.once(edited(self.scene, {"solver.rtol": rtol}))
         return self.runs[rtol]
 
     def attempt(self, rtol: float) -> Attempt:

@@ -149,6 +149,30 @@ class Scene(Part):
             "contact": tuple(self.contacts()),
         }
 
+    def wanted(self) -> list[quantities.Quantity]:
+        """The quantities that `[accuracy]` names; without it the usual ones."""
+        if self.accuracy is not None and self.accuracy.quantities:
+            return [quantities.parse(name, self.owners()) for name in self.accuracy.quantities]
+        moving = {name for name, body in self.body.items() if not isinstance(body, Ground)}
+        joints = {
+            name: [frame.partition(".")[0] for frame in joint.between if frame.partition(".")[0] in moving]
+            for name, joint in self.joint.items()
+            if joint.type != "fixed"
+        }
+        hosts = self._hosts()
+        return quantities.usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+
+    def _hosts(self) -> dict[str, str]:
+        """For every moving body the body that it is fixed to, or itself."""
+        moving = [name for name, body in self.body.items() if not isinstance(body, Ground)]
+        host = {name: name for name in moving}
+        for joint in self.joint.values():
+            a, b = (frame.partition(".")[0] for frame in joint.between)
+            if joint.type == "fixed" and a in host and b in host:
+                old, new = host[b], host[a]
+                host = {name: new if at == old else at for name, at in host.items()}
+        return host
+
     _name: str = PrivateAttr(default="scene")
     _path: Path | None = PrivateAttr(default=None)
 
