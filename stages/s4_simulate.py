@@ -23,12 +23,16 @@ KERNELS = (
     "assembly.equations",
     "assembly.kinematics",
     "bodies.rigid",
-    "integrate.explicit",
+    "integrate.displace",
     "integrate.observe",
     "integrate.project",
+    "integrate.stepper",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
 CONTACT_KERNELS = ("integrate.events",)
+#: of scenes with contacts that are noticed at step ends, and of fixed or chosen steps
+UNLOCATED_KERNELS = ("integrate.step_ends",)
+FIXED_KERNELS, ADAPTIVE_KERNELS = ("integrate.fixed",), ("integrate.adaptive",)
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
@@ -49,7 +53,9 @@ def modules(scene: Scene) -> tuple[str, ...]:
     joints = f"{DYNAMICS}.joints"
     found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
     found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
-    kernels = KERNELS + (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
+    kernels: tuple[str, ...] = KERNELS + (ADAPTIVE_KERNELS if scene.solver.step is None else FIXED_KERNELS)
+    kernels += (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
+    kernels += UNLOCATED_KERNELS if scene.contacts() and scene.solver.events != "located" else ()
     found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"

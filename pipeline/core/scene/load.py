@@ -204,7 +204,8 @@ def _absolute_meshes(table: dict[str, Any], path: Path) -> None:
 
 def _input_error(path: Path, error: Any) -> InputError:
     # pydantic puts the type by which it chose a part's model into the place; the file has no such key
-    place = ".".join(str(key) for k, key in enumerate(error["loc"]) if k < 2 or key not in TYPES)
+    keys = [key for key in error["loc"] if not str(key).startswith("<")]
+    place = ".".join(str(key) for k, key in enumerate(keys) if k < 2 or key not in TYPES)
     message = error["msg"].removeprefix("Value error, ")
     if error["type"] == "extra_forbidden":
         message = "unknown key"

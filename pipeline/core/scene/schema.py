@@ -19,6 +19,7 @@ from pipeline.core.scene.parts import (
     Load,
     RigidBody,
 )
+from pipeline.core.scene.solver import ExplicitPair, Solver
 from pipeline.core.units import quantity
 
 
@@ -33,14 +34,6 @@ class TimeSpan(Part):
         if not self.end > self.start:
             raise ValueError(f"time.end = {self.end} s must lie after time.start = {self.start} s")
         return self
-
-
-class Solver(Part):
-    """Integrator and its tolerance; `evaluations` caps the right-hand sides of one run."""
-
-    integrator: str = "dop853"
-    rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
-    evaluations: Annotated[int, Field(gt=0)] = 50_000_000
 
 
 class Output(Part):
@@ -125,7 +118,7 @@ class Scene(Part):
     drive: dict[str, Drive] = Field(default_factory=dict)
     load: dict[str, Load] = Field(default_factory=dict)
     time: TimeSpan
-    solver: Solver = Solver()
+    solver: Solver = ExplicitPair()
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None

@@ -16,6 +16,7 @@ from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.packing import Packed, pack
 from pipeline.dynamics.assembly.system import Link, System
 from pipeline.dynamics.assembly.tree import joint_class
+from pipeline.dynamics.integrate.method import Method
 
 NORMAL = "pipeline.dynamics.contact.normal"
 INTEGRATORS = "pipeline.dynamics.integrate"
@@ -41,6 +42,7 @@ class Tables:
     layout: Layout
     kinds: Kinds
     packed: Packed
+    method: Method
     closure_order: np.ndarray
 
 
@@ -83,11 +85,10 @@ def tabulate(system: System) -> Tables:
             "GRAVITY": _gravity(system),
             "FLOORS": floors,
         },
-        method.slopes,
-        method.dense,
+        method,
         layout.columns,
     )
-    return Tables(system, layout, kinds, packed, order)
+    return Tables(system, layout, kinds, packed, method, order)
 
 
 def _kinds(system: System) -> Kinds:

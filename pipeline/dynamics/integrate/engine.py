@@ -12,6 +12,7 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.dynamics.assembly import fuse, initial
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import observe as observing
+from pipeline.dynamics.integrate.method import scheme_of
 from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, OK, TOUCH_SIZE
 
 Progress = Callable[[float | None, str], None]
@@ -75,13 +76,13 @@ def pieces_at(built: Tables, inside: float) -> np.ndarray:
 def prepare(built: Tables, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
     scene = built.system.scene
-    integrator = scene.solver.integrator
+    scheme = scheme_of(scene.solver)
     w, n = built.packed.work_space()
-    entry = fuse.entry(built.kinds, integrator)
+    entry = fuse.entry(built.kinds, scheme)
     engine = Engine(built, entry, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
-    if not fuse.is_compiled(built.kinds, integrator):
+    if not fuse.is_compiled(built.kinds, scheme):
         progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
-        with fuse.compiling(built.kinds, integrator):
+        with fuse.compiling(built.kinds, scheme):
             entry.evaluate(built.packed.h, built.packed.f, w, n, engine.start, 0)
     return engine
 
