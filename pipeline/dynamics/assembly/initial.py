@@ -8,10 +8,12 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.parts import Ground
+from pipeline.dynamics.assembly.chain import path_positions
+from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.assembly.tree import joint_class
-from pipeline.dynamics.tables import AXES, CONTACT_LOSS, OMEGA, ROW0, VELOCITY
+from pipeline.dynamics.assembly.tree import PATH
+from pipeline.dynamics.tables import AXES, OMEGA, ROW0, VELOCITY
 
 Frames = Callable[[np.ndarray], np.ndarray]  #: state -> frames of all links, (links, FRAME_SIZE)
 
@@ -27,12 +29,35 @@ def start_state(built: Tables) -> np.ndarray:
         declared = joint_class(link.kind)
         if layout.driven(i) >= 0 or not declared.POSITIONS:
             continue
-        assert link.inboard is not None
+        coordinates = _coordinates(built, i)
+        q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
+    return np.concatenate([q, v, np.zeros(built.packed.sizes["N_LEDGER"])])
+
+
+def _coordinates(built: Tables, i: int) -> np.ndarray:
+    """Positions of a link's joint, or of its part of it, from the poses of the two frames."""
+    system = built.system
+    link = system.links[i]
+    edge, stage = link.branch.edge, link.stage
+    assert link.inboard is not None
+    if edge is None or stage is None or edge.kind == link.kind:
         F = system.links[link.inboard.link].start.of(link.inboard.place)
         relative = F.inverse().of(_inboard_frame(built, i))
-        coordinates = declared.coordinates(relative.R, relative.p)
-        q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
-    return np.concatenate([q, v, np.zeros(CONTACT_LOSS + 2 * len(system.contacts))])
+        found: np.ndarray = joint_class(link.kind).coordinates(relative.R, relative.p)
+        return found
+    G = _world(built, edge.frame_b)
+    if edge.kind == PATH:
+        whole = path_positions(edge, G.R, G.p + system.origin)
+    else:
+        relative = _world(built, edge.frame_a).inverse().of(G)
+        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
+    return stage.sign * whole[list(stage.positions)]
+
+
+def _world(built: Tables, frame: str) -> Placement:
+    """Start pose of a named frame, from the kernels' origin."""
+    site = built.system.site(frame)
+    return built.system.links[site.link].start.of(site.place)
 
 
 def _inboard_frame(built: Tables, i: int) -> Placement:

@@ -34,16 +34,16 @@ class Engine:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Start, drive breaks in between, end."""
+        """Start, breaks of drives and loads in between, end."""
         starts, found = self.built.packed.table("PIECES")[:, 0], set()
-        for first, count in self.built.packed.table("DRIVES"):
+        for first, count in self.built.packed.table("LAWS"):
             found |= {float(t) for t in starts[first + 1 : first + count] if self.start < t < self.end}
         return np.array([self.start, *sorted(found), self.end])
 
     def select_pieces(self, inside: float) -> None:
-        """Put the pieces of the drive laws in force that hold at `inside`, which is no break."""
+        """Put the pieces of the laws in force that hold at `inside`, which is no break."""
         first = self.n[ACTIVE]
-        self.n[first : first + self.built.layout.known] = pieces_at(self.built, inside)
+        self.n[first : first + self.built.packed.sizes["N_LAWS"]] = pieces_at(self.built, inside)
 
     def view(self, name: str, length: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
@@ -65,9 +65,9 @@ class Engine:
 
 
 def pieces_at(built: Tables, inside: float) -> np.ndarray:
-    """Piece of every drive law that holds at a time which is no break."""
+    """Piece of every law that holds at a time which is no break."""
     starts, found = built.packed.table("PIECES")[:, 0], []
-    for first, count in built.packed.table("DRIVES"):
+    for first, count in built.packed.table("LAWS"):
         found.append(first + max(int(np.searchsorted(starts[first : first + count], inside, side="right")) - 1, 0))
     return np.array(found, dtype=np.int64)
 
@@ -140,7 +140,7 @@ def observe(engine: Engine, rows: np.ndarray) -> dict[str, np.ndarray]:
     sides = np.clip(np.searchsorted(segments, rows[:, 0], side="left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
     per_segment = {x: pieces_at(built, x) for x in set(middles.tolist())}
-    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(len(rows), built.layout.known)
+    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(len(rows), packed.sizes["N_LAWS"])
     widths = observing.widths(packed.sizes)
     out = np.zeros((len(rows), sum(widths.values())))
     tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * built.system.length

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.engine import Engine, Progress
+from pipeline.dynamics.tables import MODE
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -69,7 +70,7 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     control[state.TIME], control[state.SPAN] = engine.start, engine.end - engine.start
     control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length
     n[state.STATUS : state.INTEGERS] = 0
-    n[state.INTEGERS + built.layout.known :] = 0
+    n[n[MODE] :] = 0
     n[state.CAP] = scene.solver.evaluations
     engine.view("Y", len(y))[:] = y
     engine.view("LATCHED", contacts)[:] = 0.0
