@@ -12,6 +12,7 @@ from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
@@ -33,8 +34,13 @@ def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
 
 def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
-    """Build, start, integrate and observe a scene."""
-    engine = engine_of(scene, bundles, progress)
+    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands."""
+    given: dict[str, Pieces] = {}
+    if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
+        from pipeline.dynamics.inverse import actuated
+
+        scene, given = actuated(scene, bundles, progress)
+    engine = prepare(tabulate(build(scene, bundles), given), progress)
     start, residual = consistent_start(engine)
     trajectory = step(engine, start, progress)
     return Run(engine, trajectory, observed(engine, trajectory), residual)

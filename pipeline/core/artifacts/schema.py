@@ -114,6 +114,9 @@ RUN: Schema = {
         ("time", "coordinate"), "m or rad", "joint coordinate of the second frame against the first", optional=True
     ),
     "joint_velocity": _V(("time", "coordinate"), "m s-1 or rad s-1", "rate of the joint coordinate", optional=True),
+    "joint_acceleration": _V(
+        ("time", "coordinate"), "m s-2 or rad s-2", "second rate of the joint coordinate", optional=True
+    ),
     "load_force": _V(
         ("time", "load", "axis"), "N", "force of the load on its frame, or its second one, world axes", optional=True
     ),

@@ -7,9 +7,11 @@ from collections.abc import Callable
 import numpy as np
 
 from pipeline.core.errors import InputError
+from pipeline.core.scene.loads import SpringDamper
 from pipeline.core.scene.parts import Ground
 from pipeline.dynamics.assembly.chain import path_positions
 from pipeline.dynamics.assembly.driving import joint_class
+from pipeline.dynamics.assembly.loading import order
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.tree import PATH
@@ -17,6 +19,8 @@ from pipeline.dynamics.tables import AXES, OMEGA, ROW0, VELOCITY
 
 Frames = Callable[[np.ndarray], np.ndarray]  #: state -> frames of all links, (links, FRAME_SIZE)
 
+#: a spring shorter than this share of the mechanism's size has no direction
+SHORTEST = 1e-9
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
 
@@ -141,3 +145,25 @@ def check_residual(built: Tables, residuals: np.ndarray) -> float:
             "correct the poses of the bodies, or the frames",
         )
     return residual
+
+
+def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
+    """Y with the angles that loads follow; `loads`: what each does at y, shape (loads, LOAD_SIZE).
+
+    Raises InputError for a spring or damper of no length, which has no direction.
+    """
+    from pipeline.dynamics.loads.fields import TURNS, VALUE
+
+    y, scene = y.copy(), built.system.scene
+    for name, row, now in zip(order(scene), built.packed.table("LOADS"), loads, strict=True):
+        load = scene.load[name]
+        if row[TURNS] >= 0:
+            y[len(y) - built.packed.sizes["N_TURNS"] + row[TURNS]] = now[VALUE]
+        if isinstance(load, SpringDamper) and now[VALUE] <= SHORTEST * built.system.length:
+            if load.damping > 0.0 or load.free_length:
+                raise InputError(
+                    f"[load.{name}.between]",
+                    "its two ends start in one place, so that it pulls in no direction",
+                    "move an end; only a spring of no free length and no damping may start so",
+                )
+    return y

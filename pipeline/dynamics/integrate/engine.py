@@ -12,7 +12,7 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.dynamics.assembly import fuse, initial
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import observe as observing
-from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, OK, TOUCH_SIZE
+from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, LOAD_SIZE, OK, TOUCH_SIZE
 
 Progress = Callable[[float | None, str], None]
 
@@ -101,8 +101,17 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
         return engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
 
     y = project(engine, initial.given_velocities(built, frames, y))
+    if built.kinds.loads:
+        y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, residual
+
+
+def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Y with the angles that loads follow as they are at the start; InputError for a spring without direction."""
+    engine.evaluate(y, engine.start)
+    loads = engine.view("LOAD", LOAD_SIZE * engine.built.packed.sizes["N_LOADS"]).reshape(-1, LOAD_SIZE)
+    return initial.start_loads(engine.built, y, loads.copy())
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -130,14 +139,15 @@ def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
             )
 
 
-def observe(engine: Engine, rows: np.ndarray) -> dict[str, np.ndarray]:
+def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> dict[str, np.ndarray]:
     """What is recorded of rows (time, modes, impact rates, state), whose states are projected first.
 
+    On a break the laws hold as before it, or as after it.
     Fields and widths: `pipeline.dynamics.integrate.observe`; shape (rows, width) each.
     """
     built = engine.built
     packed, segments = built.packed, engine.breaks
-    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="left"), 1, len(segments) - 1)
+    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
     per_segment = {x: pieces_at(built, x) for x in set(middles.tolist())}
     pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(len(rows), packed.sizes["N_LAWS"])

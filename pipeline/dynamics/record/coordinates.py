@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.tree import PATH
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import AXES, FRAME_SIZE, OMEGA, ORIGIN, SITE_A, SITE_B, VELOCITY
+from pipeline.dynamics.tables import (
+    ACCELERATION,
+    ALPHA,
+    AXES,
+    FRAME_SIZE,
+    OMEGA,
+    ORIGIN,
+    SITE_A,
+    SITE_B,
+    VELOCITY,
+)
 
-Series = tuple[np.ndarray, np.ndarray]  #: coordinate and rate, shape (time,) each
+Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
 
 
 def joint_coordinates(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Series]:
@@ -25,14 +36,20 @@ def joint_coordinates(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, S
             continue
         q, c = built.layout.q0[i], built.layout.c0[i]
         for k, place in enumerate(stage.positions):
-            series = stage.sign * seen["coordinate"][:, q + k], stage.sign * seen["speed"][:, c + k]
-            found[_label(edge.name, declared, place)] = series
+            places = (("coordinate", q + k), ("speed", c + k), ("acceleration", c + k))
+            position, rate, second = (stage.sign * seen[name][:, o] for name, o in places)
+            found[_label(edge.name, declared, place)] = position, rate, second
     for row, k in enumerate(built.closure_order):
         edge = built.system.closures[k][0]
         declared = joint_class(edge.kind).COORDINATES
         for place, coordinate in enumerate(declared):
             found[_label(edge.name, declared, place)] = _measured(built, seen, row, coordinate)
     return {name: found[name] for name in _in_order(built, found)}
+
+
+def label(scene: Scene, joint: str, k: int) -> str:
+    """Name of coordinate k of a joint in records."""
+    return _label(joint, joint_class(scene.joint[joint].type).COORDINATES, k)
 
 
 def _label(joint: str, declared: tuple[Coordinate, ...], k: int) -> str:
@@ -57,10 +74,20 @@ def _measured(built: Tables, seen: dict[str, np.ndarray], row: int, coordinate: 
     F, G = (x[:, AXES : AXES + 9].reshape(-1, 3, 3) for x in (a, b))
     along = (G if coordinate.side else F)[:, :, coordinate.axis]
     omega = a[:, OMEGA : OMEGA + 3]
+    turning = b[:, OMEGA : OMEGA + 3] - omega
     if coordinate.turning:
         R = np.einsum("tki,tkj->tij", F, G)
-        angle = np.unwrap(np.arctan2(R[:, *coordinate.sine], R[:, *coordinate.cosine]))
-        return angle, np.einsum("ti,ti->t", along, b[:, OMEGA : OMEGA + 3] - omega)
-    r = b[:, ORIGIN : ORIGIN + 3] - a[:, ORIGIN : ORIGIN + 3]
-    slide = b[:, VELOCITY : VELOCITY + 3] - a[:, VELOCITY : VELOCITY + 3] - np.cross(omega, r)
-    return np.einsum("ti,ti->t", along, r), np.einsum("ti,ti->t", along, slide)
+        (i, j), (k, l) = coordinate.sine, coordinate.cosine
+        angle = np.unwrap(np.arctan2(R[:, i, j], R[:, k, l]))
+        swing = np.cross((b if coordinate.side else a)[:, OMEGA : OMEGA + 3], along)
+        second = b[:, ALPHA : ALPHA + 3] - a[:, ALPHA : ALPHA + 3]
+        return angle, _dot(along, turning), _dot(along, second) + _dot(swing, turning)
+    r, v, acceleration = (b[:, o : o + 3] - a[:, o : o + 3] for o in (ORIGIN, VELOCITY, ACCELERATION))
+    slide = v - np.cross(omega, r)
+    second = acceleration - np.cross(a[:, ALPHA : ALPHA + 3], r) - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
+    return _dot(along, r), _dot(along, slide), _dot(along, second)
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    product: np.ndarray = np.einsum("ti,ti->t", a, b)
+    return product

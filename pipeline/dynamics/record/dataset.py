@@ -33,9 +33,14 @@ Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
-def dataset(built: Tables, trajectory: Trajectory, seen: Seen, start_residual: float) -> xr.Dataset:
-    """All that DESIGN promises of a run; `seen` holds the observed rows of the trajectory."""
-    scene = built.system.scene
+def dataset(
+    built: Tables, trajectory: Trajectory, seen: Seen, start_residual: float, scene: Scene | None = None
+) -> xr.Dataset:
+    """All that a run holds; `seen` are the observed rows of the trajectory.
+
+    scene: what the user asked for, where the run was made from another scene.
+    """
+    scene = built.system.scene if scene is None else scene
     variables: Variables = {}
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
@@ -139,7 +144,7 @@ def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordina
     found = joint_coordinates(built, seen)
     if found:
         coordinates["coordinate"] = list(found)
-        for k, name in enumerate(("joint_position", "joint_velocity")):
+        for k, name in enumerate(("joint_position", "joint_velocity", "joint_acceleration")):
             variables[name] = (("time", "coordinate"), np.stack([series[k] for series in found.values()], axis=1))
 
 
