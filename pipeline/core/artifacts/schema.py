@@ -131,6 +131,23 @@ RUN: Schema = {
     "modal_velocity": _V(("time", "mode"), "kg0.5 m s-1", "rate of the modal coordinate", optional=True),
     "drive_force": _V(("time", "drive"), "N or N m", "what the drive supplies along its coordinate", optional=True),
     "drive_position": _V(("time", "drive"), "m or rad", "prescribed coordinate", optional=True),
+    "joint_position": _V(
+        ("time", "coordinate"), "m or rad", "joint coordinate of the second frame against the first", optional=True
+    ),
+    "joint_velocity": _V(("time", "coordinate"), "m s-1 or rad s-1", "rate of the joint coordinate", optional=True),
+    "joint_acceleration": _V(
+        ("time", "coordinate"), "m s-2 or rad s-2", "second rate of the joint coordinate", optional=True
+    ),
+    "load_force": _V(
+        ("time", "load", "axis"), "N", "force of the load on its frame, or its second one, world axes", optional=True
+    ),
+    "load_moment": _V(
+        ("time", "load", "axis"), "N m", "moment of the load there, about that frame's origin, world axes", optional=True
+    ),
+    "load_length": _V(
+        ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
+    ),
+    "load_power": _V(("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
@@ -145,8 +162,9 @@ RUN: Schema = {
     "elastic": _V(("time",), "J", "energy stored in flexible bodies, springs and contacts"),
     "dissipated": _V(("time",), "J", "energy dissipated since the start"),
     "drive_work": _V(("time",), "J", "work supplied by the drives since the start"),
+    "load_work": _V(("time",), "J", "work of forces and torques since the start", optional=True),
     "energy_error": _V(
-        ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work, minus its start value"
+        ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work - load_work, minus its start value"
     ),
     "constraint_error": _V(("time",), "m", "largest violation of a loop closure"),
     "horizon": _V((), "s", "time up to which pointwise values mean something", optional=True),

@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     Mass: TypeAlias = float
     Angle: TypeAlias = float
     Speed: TypeAlias = float
+    Rate: TypeAlias = float
+    Stiffness: TypeAlias = float
+    Damping: TypeAlias = float
     Pressure: TypeAlias = float
     Density: TypeAlias = float
     Number: TypeAlias = float
@@ -59,6 +62,9 @@ else:
     Mass = _scalar("mass")
     Angle = _scalar("angle")
     Speed = _scalar("velocity")
+    Rate = _scalar("angular velocity")
+    Stiffness = _scalar("stiffness")
+    Damping = _scalar("damping")
     Pressure = _scalar("pressure")
     Density = _scalar("density")
     Number = _scalar("number")
@@ -99,6 +105,8 @@ Inertia = Annotated[
     BeforeValidator(_inertia),
     WithJsonSchema({"type": "array", "description": "[Ixx, Iyy, Izz] or 3x3, about the centre of mass, body axes"}),
 ]
+
+FrameName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*\.[A-Za-z_]\w*$", description="body.FRAME")]
 
 #: where values come from: one text for the whole part, or one per key; "assumed: why" for assumptions
 Source = str | dict[str, str]

@@ -8,15 +8,15 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, model_validator
 
 from pipeline.core import quantities
+from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, Time
+from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.parts import (
     Body,
     ClearanceSpherical,
-    Drive,
     FlexibleBody,
     Ground,
     Joint,
-    Load,
     RigidBody,
 )
 from pipeline.core.scene.solver import ExplicitPair, Solver
@@ -194,6 +194,10 @@ class Scene(Part):
     def contacts(self) -> dict[str, ClearanceSpherical]:
         """Clearance joints by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, ClearanceSpherical)}
+
+    def forces(self) -> dict[str, Any]:
+        """Loads other than gravity, which is a field, by name."""
+        return {n: load for n, load in self.load.items() if not isinstance(load, Gravity)}
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
