@@ -17,6 +17,8 @@ from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, LOAD_S
 
 Progress = Callable[[float | None, str], None]
 
+#: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
+SHORTEST_SEGMENT = 1e-12
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14
 
@@ -35,11 +37,16 @@ class Engine:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads in between, end."""
+        """Start, breaks of drives and loads in between, end; breaks that only rounding sets apart are one."""
         starts, found = self.built.packed.table("PIECES")[:, 0], set()
         for first, count in self.built.packed.table("LAWS"):
-            found |= {float(t) for t in starts[first + 1 : first + count] if self.start < t < self.end}
-        return np.array([self.start, *sorted(found), self.end])
+            found |= {float(t) for t in starts[first + 1 : first + count]}
+        shortest = SHORTEST_SEGMENT * (self.end - self.start)
+        times = [self.start]
+        for t in sorted(found):
+            if t - times[-1] > shortest and self.end - t > shortest:
+                times.append(t)
+        return np.array([*times, self.end])
 
     def select_pieces(self, inside: float) -> None:
         """Put the pieces of the laws in force that hold at `inside`, which is no break."""
