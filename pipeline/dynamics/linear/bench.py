@@ -14,8 +14,9 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly import initial
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
-from pipeline.dynamics.integrate.engine import Engine, Progress, observe, pieces_at, prepare
-from pipeline.dynamics.tables import JACOBIAN0, MODE, N_ROWS, N_SUPPORT, OK, ROW0, SUPPORT0
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate.engine import Engine, Progress, observe, prepare
+from pipeline.dynamics.tables import JACOBIAN0, MODE, N_ROWS, N_SUPPORT, OK, PIECE_SIZE, ROW0, SUPPORT0
 
 #: impact rate that a contact is given: at rest the hysteresis of an impact long past has no say
 NO_IMPACT = 1e300
@@ -27,11 +28,16 @@ SHORTEST = 1e-4
 
 @dataclass(frozen=True)
 class Bench:
-    """An engine with its drives held. drives: position and speed of each, in the tree's sense; shape (known, 2)."""
+    """An engine with its drives held. drives: position and speed of each, in the tree's sense; shape (known, 2).
 
+    turns: angles that loads follow beyond half a turn [rad]; the one part that changes, with the pose.
+    """
+
+    scene: Scene
     engine: Engine
     time: float
     drives: np.ndarray
+    turns: np.ndarray
 
     @property
     def contacts(self) -> int:
@@ -67,9 +73,14 @@ def hold(
     moving: whether the drives keep the speed they have at that time.
     Raises InputError for unknown drives, SolverError when the loops cannot be closed there.
     """
-    built = tabulate(build(scene, bundles))
-    built = replace(built, packed=replace(built.packed, f=built.packed.f.copy()))
-    engine = prepare(built, progress)
+    driven, given = scene, dict[str, Pieces]()
+    if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
+        from pipeline.dynamics.inverse import actuated
+
+        driven, given = actuated(scene, bundles, progress)
+    built = tabulate(build(driven, bundles), given)
+    packed = replace(built.packed, h=built.packed.h.copy(), f=built.packed.f.copy())
+    engine = prepare(replace(built, packed=packed), progress)
     at = engine.start if time is None else time
     first, last = drive_state(engine, engine.start), drive_state(engine, at)
     if not moving:
@@ -79,14 +90,14 @@ def hold(
             raise InputError(f"drive '{name}'", "there is no such drive", suggestion(name, built.system.drives))
         k = built.system.drives.index(name)
         last[k, 0] = sense(engine)[k] * value
-    engine.n[engine.n[MODE] : engine.n[MODE] + built.packed.sizes["N_CONTACTS"]] = 1
-    engine.view("LATCHED", built.packed.sizes["N_CONTACTS"])[:] = NO_IMPACT
+    engine.n[engine.n[MODE] : engine.n[MODE] + packed.sizes["N_CONTACTS"]] = 1
+    engine.view("LATCHED", packed.sizes["N_CONTACTS"])[:] = NO_IMPACT
     first[:, 1] = 0.0
-    bench = Bench(engine, at, first)
+    bench = Bench(scene, engine, at, first, np.zeros(packed.sizes["N_TURNS"]))
     set_drives(bench, first)
     state = initial.start_state(built)
     engine.evaluate(state, at)
-    initial.check_residual(built, engine.view("RESIDUAL", built.packed.sizes["N_CLOSURE_ROWS"]))
+    initial.check_residual(built, engine.view("RESIDUAL", packed.sizes["N_CLOSURE_ROWS"]))
     q = carry(bench, closed(bench, state[: built.layout.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
@@ -95,24 +106,27 @@ def hold(
 def sense(engine: Engine) -> np.ndarray:
     """+1 per drive, -1 where the tree meets its joint from the second frame."""
     system = engine.built.system
-    reverse = {b.edge.name: b.reverse for b in (link.branch for link in system.links) if b.edge is not None}
-    return np.array([-1.0 if reverse[system.scene.drive[n].joint] else 1.0 for n in system.drives])
+    sign_of = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}
+    return np.array([sign_of[name] for name in system.drives])
 
 
 def drive_state(engine: Engine, time: float) -> np.ndarray:
     """Position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
-    pieces = engine.built.packed.table("PIECES")[pieces_at(engine.built, time)]
-    s = time - pieces[:, 0]
-    position = sum(pieces[:, 1 + k] * s**k for k in range(6))
-    speed = sum(k * pieces[:, 1 + k] * s ** (k - 1) for k in range(1, 6))
-    return np.stack([position, speed], axis=1) if len(pieces) else np.zeros((0, 2))
+    engine.select_pieces(time)
+    # the laws say so on their way to any evaluation; the pose does not matter
+    engine.evaluate(initial.start_state(engine.built), time)
+    nq, nv, known = engine.built.layout.nq, engine.built.layout.nv, engine.built.layout.known
+    return np.stack([engine.view("X", nq + known)[nq:], engine.view("U", nv + known)[nv:]], axis=1)
 
 
 def set_drives(bench: Bench, drives: np.ndarray) -> None:
     """Replace every drive's law by the straight one through a position, with a speed, at the bench's time."""
     packed = bench.engine.built.packed
-    for (first, count), (position, speed) in zip(packed.table("DRIVES"), drives, strict=True):
-        packed.table("PIECES")[first : first + count] = [bench.time, position, speed, 0.0, 0.0, 0.0, 0.0]
+    for (first, count), (position, speed) in zip(packed.table("LAWS"), drives, strict=False):
+        straight = np.zeros(PIECE_SIZE)
+        straight[:3] = bench.time, position, speed
+        packed.table("PIECES")[first : first + count] = straight
+        packed.table("PIECE_HARMONICS")[first : first + count, 1] = 0
     bench.engine.select_pieces(bench.time)
 
 
@@ -143,6 +157,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
     y[:nq] = q
     if v is not None:
         y[nq : nq + nv] = v
+    y[len(y) - len(bench.turns) :] = bench.turns
     return y
 
 
@@ -150,14 +165,19 @@ def seen(bench: Bench, states: np.ndarray) -> dict[str, np.ndarray]:
     """What the engine records of states, loops closed first; contacts act as they stand."""
     count, contacts = len(states), bench.contacts
     ahead = [np.full((count, 1), bench.time), np.ones((count, contacts)), np.full((count, contacts), NO_IMPACT)]
-    return observe(bench.engine, np.hstack([*ahead, states]))
+    return observe(bench.engine, np.hstack([*ahead, states]), after=True)
 
 
 def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
-    """Positions with the loops closed; SolverError when that fails."""
+    """Positions with the loops closed, loads following their angles; SolverError when that fails."""
     found = seen(bench, state(bench, q)[None, :])
     if found["status"][0, 0] != OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
+    if len(bench.turns):
+        from pipeline.dynamics.loads.fields import TURNS, VALUE
+
+        turn = bench.engine.built.packed.table("LOADS")[:, TURNS]
+        bench.turns[turn[turn >= 0]] = found["load"][0].reshape(len(turn), -1)[turn >= 0, VALUE]
     return found["state"][0, : len(q)].copy()
 
 

@@ -17,6 +17,7 @@ from pipeline.dynamics.linear.vibrations import Vibrations
 from pipeline.dynamics.record.dataset import attributes, dataset
 from pipeline.dynamics.record.frames import frame_velocities
 from pipeline.dynamics.record.motion import link_motions
+from pipeline.dynamics.run import Run
 
 PARTS = ("real", "imaginary")
 
@@ -27,14 +28,14 @@ def equilibrium(bench: Bench, found: Settled, moving: bool) -> xr.Dataset:
     contacts = bench.contacts
     ahead = [np.full((1, 1), bench.time), np.ones((1, contacts)), np.full((1, contacts), NO_IMPACT)]
     once = Trajectory(np.hstack([*ahead, rows["state"]]), np.zeros((0, slots.EVENT_SIZE)), {}, 0.0)
-    still = dataset(bench.engine.built, once, rows, 0.0).isel(time=0, drop=True)
+    still = dataset(Run(bench.scene, bench.engine, once, rows, 0.0, None)).isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]
     result = still[kept].assign_coords({n: still[n].variable for n in names})
     return conform(
         result,
         EQUILIBRIUM,
-        **attributes(bench.engine.built.system.scene),
+        **attributes(bench.scene),
         time=bench.time,
         drives="moving" if moving else "held",
         residual=found.residual,
