@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import xarray as xr
 
+from pipeline import dynamics
 from pipeline.core.errors import SolverError
+from pipeline.core.scene.load import load_scene
 from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import run
+from tests.analytic.mechanism_runs import TREE, bundles
 from tests.reference.turning_beams import SPIN_UP, WRIGHT
 
 #: sqrt(E I / (rho A)) / L^2 of meshes/checks/slender_beam.toml [rad/s]
@@ -72,18 +76,26 @@ def tip(found: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return along - LENGTH, across
 
 
-SCENES = {
-    "6 rad/s with stiffening": ("checks/spinup_beam_stiffened", ()),
-    "2 rad/s with stiffening": ("checks/spinup_beam", (("body.beam.stiffening", ()),)),
-    "2 rad/s linear FFR": ("checks/spinup_beam", ()),
+SCENES: dict[str, tuple[str, dict[str, object]]] = {
+    "6 rad/s with stiffening": ("checks/spinup_beam_stiffened", {}),
+    "2 rad/s with stiffening": ("checks/spinup_beam", {"body.beam.stiffening": {}}),
+    "2 rad/s linear FFR": ("checks/spinup_beam", {}),
 }
+
+
+@cache
+def spun(case: str) -> xr.Dataset:
+    """The run of a case."""
+    name, overrides = SCENES[case]
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", overrides)
+    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
 
 
 @pytest.mark.parametrize("case", SCENES)
 def test_a_beam_spun_up_lags_and_recovers_as_assumed_modes_say(case: str) -> None:
     """The deflection is wanted to 1 % of its largest; two modal bases of one theory agree to 1e-4."""
     known = np.array(SPIN_UP[case])
-    found = run(*SCENES[case])
+    found = spun(case)
     rows = [int(np.argmin(np.abs(found.time.values - t))) for t in known[:, 0]]
     along, across = tip(found)
     largest = np.abs(known[:, 1]).max()
@@ -98,7 +110,7 @@ def test_the_spun_beam_ends_stretched_by_its_centrifugal_force(case: str) -> Non
     """Steady stretch tan(k L)/k - L with k^2 = rho A omega^2 / (E A): the mean about which it vibrates."""
     speed = float(case.split()[0])
     k = np.sqrt(1.2 / 2.8e7) * speed
-    found = run(*SCENES[case])
+    found = spun(case)
     along, across = tip(found)
     late = found.time.values >= 15.0
     # the residual bending vibration b shortens it: by 1.2 b^2 / (2 L) in the first mode, if that is modelled
@@ -109,7 +121,7 @@ def test_the_spun_beam_ends_stretched_by_its_centrifugal_force(case: str) -> Non
 
 @pytest.mark.parametrize("case", SCENES)
 def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
-    found = run(*SCENES[case])
+    found = spun(case)
     # some 8000 steps of tolerance 1e-10 add up; a shortening that were not Lagrangian would show at 1e-4
     assert np.abs(found.energy_error).max() < 1e-11 * found.kinetic.max()
     assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-9)

@@ -92,6 +92,7 @@ EFFECTS = {
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
     "closures": ("import closures", "pipeline.dynamics.assembly.closures"),
+    "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
 }
 LN, COULOMB = ("lankarani-nikravesh",), ("modified-coulomb",)
 CASES = {
@@ -103,7 +104,8 @@ CASES = {
         {"contact", "normal law", "friction", "closures"},
     ),
     "flexible": (Kinds(("fixed",), (), (), True, False), {"flexible bodies"}),
-    "everything": (Kinds(("fixed", "spherical"), LN, COULOMB, True, True), set(EFFECTS)),
+    "stiffened": (Kinds(("fixed",), (), (), True, False, stiffening=True), {"flexible bodies", "stiffening"}),
+    "everything": (Kinds(("fixed", "spherical"), LN, COULOMB, True, True, stiffening=True), set(EFFECTS)),
 }
 
 

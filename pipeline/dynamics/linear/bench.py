@@ -87,7 +87,9 @@ def hold(
         last[:, 1] = 0.0
     for name, value in (drives or {}).items():
         if name not in built.system.drives:
-            raise InputError(f"drive '{name}'", "there is no such drive", suggestion(name, built.system.drives))
+            known = built.system.drives
+            remedy = suggestion(name, known) if known else "the scene has no drives"
+            raise InputError(f"drive '{name}'", "there is no such drive", remedy)
         k = built.system.drives.index(name)
         last[k, 0] = sense(engine)[k] * value
     engine.n[engine.n[MODE] : engine.n[MODE] + packed.sizes["N_CONTACTS"]] = 1
