@@ -18,12 +18,16 @@ EVENT_ROWS = 4096
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`."""
+    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`.
+
+    drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
+    """
 
     rows: np.ndarray
     events: np.ndarray
     counters: dict[str, int]
     drift: float
+    rate_drift: float
 
     @property
     def time(self) -> np.ndarray:
@@ -58,7 +62,7 @@ def integrate(engine: Engine, y: np.ndarray, progress: Progress) -> Trajectory:
         engine.select_pieces(0.5 * (a + b))
         control[state.END], run.n[state.FRESH] = b, 1
         _segment(engine, run, progress)
-    return _collect(run, float(control[state.DRIFT]))
+    return _collect(run, float(control[state.DRIFT]), float(control[state.RATE_DRIFT]))
 
 
 def _begin(engine: Engine, y: np.ndarray) -> _Run:
@@ -120,7 +124,7 @@ def _refusal(engine: Engine, run: _Run) -> str:
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
 
 
-def _collect(run: _Run, drift: float) -> Trajectory:
+def _collect(run: _Run, drift: float, rate_drift: float) -> Trajectory:
     n = run.n
     rows = run.rows[: n[state.N_RECORDED]]
     keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
@@ -132,4 +136,4 @@ def _collect(run: _Run, drift: float) -> Trajectory:
         "projection_evaluations": int(n[state.PROJECTION_EVALUATIONS]),
         "jacobians": int(n[state.JACOBIANS]),
     }
-    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift)
+    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift, rate_drift)

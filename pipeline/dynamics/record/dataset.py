@@ -71,6 +71,7 @@ def _report(trajectory: Trajectory, start_residual: float) -> dict[str, float | 
     return {
         **trajectory.counters,
         "largest_drift_before_projection": trajectory.drift,
+        "largest_rate_drift_before_projection": trajectory.rate_drift,
         "closure_residual_of_given_start": start_residual,
     }
 
