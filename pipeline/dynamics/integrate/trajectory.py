@@ -115,7 +115,8 @@ def _refusal(engine: Engine, run: _Run) -> str:
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than an explicit method can follow (loops closed at joints {joints})",
         state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero",
+        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
+        + (f", or the fixed step of {control[state.FIXED]:.2g} s is too long for it" if control[state.FIXED] else ""),
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
