@@ -16,7 +16,7 @@ CASES: dict[str, tuple[int, int, tuple[int, ...], float]] = {
     "rk4": (4, 4, (80, 160, 320), NO_PROJECTION),
     "adams-bashforth-moulton": (4, 4, (320, 640, 1280), NO_PROJECTION),
     "generalized-alpha": (2, 2, (200, 400, 800), 1e-6),
-    "radau": (5, 4, (40, 80, 160), 1e-11),
+    "radau": (5, 4, (20, 40, 80), 1e-11),
 }
 MECHANISMS = ["double pendulum", pytest.param("spatial four-bar", marks=pytest.mark.slow)]
 

@@ -16,6 +16,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -36,6 +37,7 @@ PACKAGES = {
     "joint": "pipeline.dynamics.joints",
     "normal": "pipeline.dynamics.contact.normal",
     "friction": "pipeline.dynamics.contact.friction",
+    "load": "pipeline.dynamics.loads",
     "integrator": "pipeline.dynamics.integrate",
 }
 
@@ -91,6 +93,7 @@ def _write(path: Path, source: str) -> None:
     os.replace(temporary, path)
 
 
+@cache
 def _digest(source: str) -> str:
     """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
     digest = hashlib.sha256(source.encode())
@@ -123,10 +126,11 @@ def _reached(roots: set[str]) -> dict[str, str]:
 def _source(kinds: Kinds, scheme: Scheme) -> str:
     lines = [
         f'"""Generated: joints {kinds.joints}, normal laws {kinds.normals}, friction {kinds.frictions}."""',
+        *([f"# loads {kinds.loads}"] if kinds.loads else []),
         "import numpy as np",
         "from numba import njit",
         "from pipeline.dynamics.tables import SLOPES, Y",
-        "from pipeline.dynamics.assembly import dispatch, equations, kinematics as motion",
+        "from pipeline.dynamics.assembly import dispatch, equations, known, kinematics as motion",
         "from pipeline.dynamics.bodies import rigid",
         "from pipeline.dynamics.integrate import displace as displacing, observe as observing, project as projecting",
         f"from pipeline.dynamics.integrate import stepper, {_stepping(scheme)} as stepping",
@@ -136,6 +140,8 @@ def _source(kinds: Kinds, scheme: Scheme) -> str:
     lines.append(f"joint_motion = dispatch.joints({_names('joint', 'motion', kinds.joints)})")
     lines += _flexible_lines(kinds.flexible)
     lines += _contact_lines(kinds, scheme)
+    lines += _law_lines(kinds.harmonics)
+    lines += _load_lines(kinds)
     lines += _closure_lines(kinds.closures)
     lines += [_BODY, _ENTRIES]
     return "\n".join(lines) + "\n"
@@ -190,6 +196,26 @@ def _contact_lines(kinds: Kinds, scheme: Scheme) -> list[str]:
     ]
 
 
+def _law_lines(harmonics: bool) -> list[str]:
+    if not harmonics:
+        return ["known_motion = known.compose(known.no_harmonics)"]
+    return [
+        "from pipeline.dynamics.drives.oscillation import oscillate",
+        "known_motion = known.compose(oscillate)",
+    ]
+
+
+def _load_lines(kinds: Kinds) -> list[str]:
+    if not kinds.loads:
+        return []
+    return [
+        "from pipeline.dynamics.loads import composing",
+        *_imports("load", kinds.loads, ("apply",)),
+        f"loads = composing.compose({_names('load', 'apply', kinds.loads)})",
+        "contacts = equations.both(contacts, loads)",
+    ]
+
+
 def _closure_lines(present: bool) -> list[str]:
     if not present:
         return ["close, known_forces, correction = equations.no_closures, equations.no_known_forces, None"]
@@ -201,7 +227,7 @@ def _closure_lines(present: bool) -> list[str]:
 
 _BODY = """kinematics = motion.compose(joint_motion, port, inboard)
 rhs = equations.compose(
-    kinematics, rigid.inertia, flexible_inertia, port_load, modal, contacts, close, known_forces
+    known_motion, kinematics, rigid.inertia, flexible_inertia, port_load, modal, contacts, close, known_forces
 )
 project = projecting.compose(rhs, joint_motion, correction) if correction else projecting.none
 displace = displacing.compose(joint_motion)

@@ -40,7 +40,7 @@ class Packed:
         axes = self.offset("LINK_FRAMES") + tables.AXES
         w[axes : axes + 9] = np.eye(3).ravel()
         n[tables.ACTIVE] = state.INTEGERS
-        n[tables.MODE] = state.INTEGERS + self.sizes["N_DRIVES"]
+        n[tables.MODE] = state.INTEGERS + self.sizes["N_LAWS"]
         return w, n
 
 
@@ -77,7 +77,7 @@ def pack(
     for name, length in _work_lengths(all_sizes, wiring, method, columns).items():
         h[tables.place(name)] = start
         start += length
-    integers = state.INTEGERS + all_sizes["N_DRIVES"] + all_sizes["N_CONTACTS"]
+    integers = state.INTEGERS + all_sizes["N_LAWS"] + all_sizes["N_CONTACTS"]
     return Packed(np.concatenate(chunks), np.concatenate(reals), all_sizes, start, integers)
 
 
@@ -91,7 +91,8 @@ def _sizes(sizes: Mapping[str, int], wiring: Mapping[str, np.ndarray]) -> dict[s
         "N_CLOSURES": count["CLOSURES"],
         "N_CLOSURE_ROWS": count["CLOSURE_ROWS"],
         "N_CONTACTS": count["CONTACTS"],
-        "N_DRIVES": count["DRIVES"],
+        "N_LAWS": count["LAWS"],
+        "N_LOADS": count["LOADS"],
         "NV": count["ENVELOPE"],
         "NY": count["GROUPS"],
         "N_PAIRS": count["PAIRS"],
@@ -146,6 +147,9 @@ def _work_lengths(
         "SCHUR": s["SCHUR_SIZE"],
         "MULTIPLIER": rows,
         "TOUCH": tables.TOUCH_SIZE * contacts,
+        "LAW": tables.LAW_SIZE * s["N_LAWS"],
+        "LOAD": tables.LOAD_SIZE * s["N_LOADS"],
+        "TURN": s["N_TURNS"],
         "DRIVE_FORCE": known,
         "LEDGER_RATE": s["N_LEDGER"],
         "POSITION_RATE": positions,

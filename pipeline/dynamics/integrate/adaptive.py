@@ -53,7 +53,7 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         set_magnitudes(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
         step = 1e-6 * w[index(c + SPAN)]
-        if size > 0.0 and steepness > 0.0:
+        if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
             step = min(0.01 * size / steepness, 0.01 * w[index(c + SPAN)])
         step = min(step, w[index(c + END)] - w[index(c + TIME)])
         for k in range(h[NY]):

@@ -1,4 +1,4 @@
-"""Newton iterations of the generalized-alpha method, for the accelerations at the end of a step.
+"""Newton iterations of the generalized-alpha method, for the rates at the end of a step.
 
 First a simplified iteration with the Jacobian that is there, then with a new one; with fixed steps at last a damped
 one with a new Jacobian at every iterate, where friction saturates within the step.
@@ -13,7 +13,7 @@ import numpy as np
 from pipeline.dynamics.integrate.alpha_system import (
     A_STEP,
     BY_POSITION,
-    BY_SPEED,
+    BY_STATE,
     CORRECTION,
     LU_STEP,
     NEW,
@@ -25,9 +25,12 @@ from pipeline.dynamics.integrate.alpha_system import (
     VALID,
     before,
     constants,
+    diagonal,
     factorise,
     matrix,
     positions,
+    rates,
+    reach,
     solve,
     vector,
 )
@@ -63,71 +66,76 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
 
     @kernel
     def column(h, f, w, n, t, slope, k, nudge, target):
-        """Column k of a Jacobian of the accelerations, from the nudged state in Y_STAGE."""
-        nv, nq, near = h[NV], h[NQ], h[SLOPES] + h[NY] * ESTIMATE
+        """Column k of a Jacobian of the rates, from the nudged state in Y_STAGE."""
+        m, nq, near = rates(h), h[NQ], h[SLOPES] + h[NY] * ESTIMATE
         evaluate(h, f, w, n, t, h[Y_STAGE], near)
         n[EVALUATIONS] += 1
-        for i in range(nv):
-            w[index(target + nv * i + k)] = (w[index(near + nq + i)] - w[index(slope + nq + i)]) / nudge
+        for i in range(m):
+            w[index(target + m * i + k)] = (w[index(near + nq + i)] - w[index(slope + nq + i)]) / nudge
         return n[EVALUATION] == OK
 
     @kernel
     def jacobian(h, f, w, n, t, y, slope):
-        """Change of the accelerations with speeds and with displacements, at the state in y."""
+        """Change of the rates with speeds and what follows them, and with displacements, at the state in y."""
         nv, nq, shift = h[NV], h[NQ], vector(h, SHIFT)
         for c in range(h[NY]):
             w[index(h[Y_STAGE] + c)] = w[index(y + c)]
-        for k in range(nv):
-            size, speed = f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])], w[index(y + nq + k)]
-            nudged = speed + NUDGE * (size + abs(speed))
+        for k in range(rates(h)):
+            size, value = f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])], w[index(y + nq + k)]
+            nudged = value + NUDGE * (size + abs(value))
             w[index(h[Y_STAGE] + nq + k)] = nudged
-            if not column(h, f, w, n, t, slope, k, nudged - speed, matrix(h, BY_SPEED)):
+            if not column(h, f, w, n, t, slope, k, nudged - value, matrix(h, BY_STATE)):
                 return False
-            w[index(h[Y_STAGE] + nq + k)] = speed
+            w[index(h[Y_STAGE] + nq + k)] = value
+        for k in range(nv):
+            nudge = NUDGE * f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])]
             for j in range(nv):
-                w[index(shift + j)] = NUDGE * size if j == k else 0.0
+                w[index(shift + j)] = nudge if j == k else 0.0
             displace(h, w, y, shift, h[Y_STAGE], positions(h))
-            if not column(h, f, w, n, t, slope, k, NUDGE * size, matrix(h, BY_POSITION)):
+            if not column(h, f, w, n, t, slope, k, nudge, matrix(h, BY_POSITION)):
                 return False
-            for c in range(nq):
-                w[index(h[Y_STAGE] + c)] = w[index(y + c)]
         n[JACOBIANS] += 1
         w[index(h[MEMORY] + VALID)], w[index(h[MEMORY] + LU_STEP)] = 1.0, 0.0
         return True
 
     @kernel
     def place(h, w, step, out):
-        """Positions and speeds at the end of the step for the accelerations in NEW."""
+        """State at the end of the step for the rates in NEW."""
         _, _, beta, gamma = constants(h, w)
-        nq, old, new, shift = h[NQ], vector(h, SCALED), vector(h, NEW), vector(h, SHIFT)
-        for k in range(h[NV]):
+        nq, nv, old, new, shift = h[NQ], h[NV], vector(h, SCALED), vector(h, NEW), vector(h, SHIFT)
+        for k in range(nv):
             a, b, u = w[index(old + k)], w[index(new + k)], w[index(h[Y] + nq + k)]
             w[index(shift + k)] = step * (u + step * ((0.5 - beta) * a + beta * b))
             w[index(out + nq + k)] = u + step * ((1.0 - gamma) * a + gamma * b)
+        for k in range(nv, rates(h)):
+            w[index(out + nq + k)] = w[index(h[Y] + nq + k)] + step * w[index(new + k)]
         displace(h, w, h[Y], shift, out, positions(h))
 
     @kernel
     def misfit(h, f, w, n, step):
-        """What the accelerations in NEW leave of the method's equation, into RESIDUAL; False without a slope."""
+        """What the rates in NEW leave of the method's equations, into RESIDUAL; False without a slope."""
         alpha_m, alpha_f, _, _ = constants(h, w)
-        nq, old, slope = h[NQ], vector(h, SCALED), h[SLOPES] + h[NY] * ITERATE
+        nq, old, start_slope, slope = h[NQ], vector(h, SCALED), h[SLOPES], h[SLOPES] + h[NY] * ITERATE
         place(h, w, step, h[Y_NEW])
         evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope)
         n[EVALUATIONS] += 1
-        for i in range(h[NV]):
-            known = alpha_f * w[index(h[SLOPES] + nq + i)] - alpha_m * w[index(old + i)]
-            found = (1.0 - alpha_f) * w[index(slope + nq + i)] - (1.0 - alpha_m) * w[index(vector(h, NEW) + i)]
-            w[index(vector(h, RESIDUAL) + i)] = found + known
+        for i in range(rates(h)):
+            first, last = w[index(start_slope + nq + i)], w[index(slope + nq + i)]
+            if i < h[NV]:
+                wanted = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * w[index(old + i)]
+            else:
+                wanted = 0.5 * (first + last)
+            w[index(vector(h, RESIDUAL) + i)] = wanted - diagonal(h, w, i) * w[index(vector(h, NEW) + i)]
         return n[EVALUATION] == OK
 
     @kernel
     def size_of(h, w, step, a):
-        """What accelerations from place a make of the speeds, in units of the tolerance."""
-        total, gamma = 0.0, constants(h, w)[3]
-        for i in range(h[NV]):
+        """What rates from place a make of the state, in units of the tolerance."""
+        total, m = 0.0, rates(h)
+        for i in range(m):
             scale = w[index(h[MAGNITUDE] + h[index(h[GROUPS] + h[NQ] + i)])]
-            total += (gamma * step * w[index(a + i)] / scale) ** 2
-        return np.sqrt(total / max(h[NV], 1))
+            total += (reach(h, w, step, i) * w[index(a + i)] / scale) ** 2
+        return np.sqrt(total / m)
 
     @kernel
     def iterate(h, f, w, n, step):
@@ -137,7 +145,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
             if not misfit(h, f, w, n, step):
                 return 0
             solve(h, w, residual)
-            for i in range(h[NV]):
+            for i in range(rates(h)):
                 w[index(vector(h, NEW) + i)] += w[index(residual + i)]
             norm = size_of(h, w, step, residual)
             verdict = converged(k, norm, last_norm, w[index(h[CONTROL] + RTOL)])
@@ -152,7 +160,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
         correction, new, residual = vector(h, CORRECTION), vector(h, NEW), vector(h, RESIDUAL)
         share, there = 1.0, 0.0
         for _ in range(MOST_HALVINGS):
-            for i in range(h[NV]):
+            for i in range(rates(h)):
                 w[index(new + i)] += (share - there) * w[index(correction + i)]
             if misfit(h, f, w, n, step):
                 left = size_of(h, w, step, residual)
@@ -173,7 +181,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
         for _ in range(MOST_CORRECTIONS):
             if not jacobian(h, f, w, n, t, h[Y_NEW], h[SLOPES] + h[NY] * ITERATE) or not factorise(h, w, step):
                 return False
-            for i in range(h[NV]):
+            for i in range(rates(h)):
                 w[index(correction + i)] = w[index(residual + i)]
             solve(h, w, correction)
             norm = size_of(h, w, step, correction)
@@ -186,7 +194,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
 
     @kernel
     def start(h, w, step):
-        """Accelerations at the start for a step of this length, and a first guess of those at its end."""
+        """Rates at the start for a step of this length, and a first guess of those at its end."""
         o, nq = h[MEMORY], h[NQ]
         share, on = step / w[index(o + A_STEP)], step / w[index(o + STEP_BEFORE)]
         for k in range(h[NV]):
@@ -194,10 +202,12 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
             a = now + share * (w[index(vector(h, OLD) + k)] - now)
             w[index(vector(h, SCALED) + k)] = a
             w[index(vector(h, NEW) + k)] = a + on * (now - w[index(before(h) + nq + k)])
+        for k in range(h[NV], rates(h)):
+            w[index(vector(h, NEW) + k)] = w[index(h[SLOPES] + nq + k)]
 
     @kernel
     def converge(h, f, w, n, step):
-        """Accelerations at the end of the step into NEW; False when no iteration converges.
+        """Rates at the end of the step into NEW; False when no iteration converges.
 
         With chosen steps a shorter one is the better remedy, with fixed steps it is patience.
         """

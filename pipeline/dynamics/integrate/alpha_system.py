@@ -1,7 +1,9 @@
 """Memory, coefficients and Newton's matrix of the generalized-alpha method.
 
-The matrix is that of the accelerations at the end of a step: (1 - alpha_m) - (1 - alpha_f) (gamma h du'/du + beta h^2
-du'/dq), of the size of the speeds. Source: Chung & Hulbert (1993), *J. Appl. Mech.* 60, 371-375, eqs. 17, 20 and 25.
+Its unknowns are the *rates*: the accelerations of the speeds u, then the rates of the first-order variables z that
+follow them in the state (ledger, friction's own states). The matrix has rows (1 - alpha_m) - (1 - alpha_f) D for the
+accelerations and 1 - D / 2 for z, with D = gamma h d/du + beta h^2 d/dq for columns of u, and h d/dz for those of z.
+Source: Chung & Hulbert (1993), *J. Appl. Mech.* 60, 371-375, eqs. 17, 20 and 25.
 """
 
 from __future__ import annotations
@@ -12,22 +14,28 @@ from pipeline.dynamics.tables import CONTROL, MEMORY, NQ, NV, NY
 from pipeline.dynamics.vectors import index, kernel
 
 # memory: step of the stored accelerations, step of the factors, whether the Jacobian holds, step before;
-# then accelerations (old, new, old for this step's length), displacement, residual, correction, pivots,
+# then rates (old, new, old for this step's length), displacement, residual, correction, pivots,
 # scratch for positions, slope before, and three matrices: by speeds, by positions, Newton's
 A_STEP, LU_STEP, VALID, STEP_BEFORE, VECTORS = range(5)
 OLD, NEW, SCALED, SHIFT, RESIDUAL, CORRECTION, PIVOTS, N_VECTORS = range(8)
-BY_SPEED, BY_POSITION, NEWTON = range(3)
+BY_STATE, BY_POSITION, NEWTON = range(3)
 
 
 def memory(nq: int, nv: int, ny: int) -> int:
     """Floats kept between steps."""
-    return VECTORS + N_VECTORS * nv + nq + ny + 3 * nv * nv
+    return VECTORS + N_VECTORS * (ny - nq) + nq + ny + 3 * (ny - nq) ** 2
+
+
+@kernel
+def rates(h):
+    """Number of unknowns."""
+    return h[NY] - h[NQ]
 
 
 @kernel
 def vector(h, k):
     """Where w holds one of the vectors."""
-    return h[MEMORY] + VECTORS + h[NV] * k
+    return h[MEMORY] + VECTORS + rates(h) * k
 
 
 @kernel
@@ -45,7 +53,7 @@ def before(h):
 @kernel
 def matrix(h, k):
     """Where w holds a matrix."""
-    return before(h) + h[NY] + h[NV] * h[NV] * k
+    return before(h) + h[NY] + rates(h) * rates(h) * k
 
 
 @kernel
@@ -58,20 +66,36 @@ def constants(h, w):
 
 
 @kernel
+def diagonal(h, w, i):
+    """Weight of unknown i itself in its equation."""
+    return 1.0 - constants(h, w)[0] if i < h[NV] else 1.0
+
+
+@kernel
+def reach(h, w, step, i):
+    """Change of speed or variable i at the end of the step with its rate there."""
+    return constants(h, w)[3] * step if i < h[NV] else step
+
+
+@kernel
 def factorise(h, w, step):
     """Newton's matrix for a step, factorised; False when it is singular."""
-    alpha_m, alpha_f, beta, gamma = constants(h, w)
-    nv, S, by_speed, by_position = h[NV], matrix(h, NEWTON), matrix(h, BY_SPEED), matrix(h, BY_POSITION)
-    for k in range(nv * nv):
-        rate = gamma * step * w[index(by_speed + k)] + beta * step * step * w[index(by_position + k)]
-        w[index(S + k)] = -(1.0 - alpha_f) * rate
-    for k in range(nv):
-        w[index(S + (nv + 1) * k)] += 1.0 - alpha_m
+    _, alpha_f, beta, _ = constants(h, w)
+    m, nv = rates(h), h[NV]
+    S, by_state, by_position = matrix(h, NEWTON), matrix(h, BY_STATE), matrix(h, BY_POSITION)
+    for i in range(m):
+        weight = 1.0 - alpha_f if i < nv else 0.5
+        for k in range(m):
+            change = reach(h, w, step, k) * w[index(by_state + m * i + k)]
+            if k < nv:
+                change += beta * step * step * w[index(by_position + m * i + k)]
+            w[index(S + m * i + k)] = -weight * change
+        w[index(S + (m + 1) * i)] += diagonal(h, w, i)
     w[index(h[MEMORY] + LU_STEP)] = step
-    return lu.factor(w, S, vector(h, PIVOTS), nv)
+    return lu.factor(w, S, vector(h, PIVOTS), m)
 
 
 @kernel
 def solve(h, w, b):
     """Solve Newton's system in place for the right-hand side from place b."""
-    lu.solve(w, matrix(h, NEWTON), vector(h, PIVOTS), h[NV], b)
+    lu.solve(w, matrix(h, NEWTON), vector(h, PIVOTS), rates(h), b)

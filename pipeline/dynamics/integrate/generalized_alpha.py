@@ -4,12 +4,12 @@ r"""Generalized-alpha: implicit structural integrator of second order that damps
           q_{n+1} = q_n \circ (h u_n + h^2[(\tfrac12-\beta)a_n + \beta a_{n+1}]),\quad
           u_{n+1} = u_n + h[(1-\gamma)a_n + \gamma a_{n+1}]
 
-with u' from the equations of motion, closures included: index reduction, so that no multiplier is an unknown and
-Newton's matrix has the size of the speeds; drift is left to the projection of every integrator. Rotations are composed
-(`displace`), not added. a belongs to the time t_n + (alpha_m - alpha_f) h, so it is started there and rescaled when
-the step changes. The ledger is integrated by trapezia. The error estimate compares the step with the integral of the
-parabola through the last three slopes; its speeds are passed through Newton's matrix, as otherwise damped modes would
-dictate the step.
+with u' from the equations of motion, closures included: index reduction, so that no multiplier is an unknown; drift
+is left to the projection of every integrator. Rotations are composed (`displace`), not added. a belongs to the time
+t_n + (alpha_m - alpha_f) h, so it is started there and rescaled when the step changes. First-order variables (ledger,
+friction's own states) follow the trapezoidal rule, coupled. The error estimate compares the step with the integral of
+the parabola through the last three slopes; its speeds are passed through Newton's matrix, as otherwise damped modes
+would dictate the step.
 
 Source: Chung & Hulbert (1993), *J. Appl. Mech.* 60, 371-375 (coefficients, eqs. 17, 20, 25); Arnold & Bruels (2007),
 *Multibody Syst. Dyn.* 18, 185-202 (constrained systems); Bruels, Cardona & Arnold (2012), *Mech. Mach. Theory* 48,
@@ -33,7 +33,9 @@ from pipeline.dynamics.integrate.alpha_system import (
     VALID,
     before,
     constants,
+    diagonal,
     memory,
+    rates,
     solve,
     vector,
 )
@@ -75,7 +77,6 @@ def keep(h, f, w, n, step):
 @kernel
 def error(h, f, w, n, step):
     """Norm of the local error, 1 at the tolerance."""
-    alpha_m = constants(h, w)[0]
     size, first, earlier = h[NY], h[SLOPES], before(h)
     est, length = first + size * ESTIMATE, w[index(h[MEMORY] + STEP_BEFORE)]
     for c in range(size):
@@ -83,8 +84,8 @@ def error(h, f, w, n, step):
         bend = ((f1 - f0) / step - (f0 - w[index(earlier + c)]) / length) / (step + length)
         integral = 0.5 * step * (f0 + f1) - step**3 / 6.0 * bend
         w[index(est + c)] = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)] - integral
-    for k in range(h[NV]):
-        w[index(est + h[NQ] + k)] *= 1.0 - alpha_m
+    for k in range(rates(h)):
+        w[index(est + h[NQ] + k)] *= diagonal(h, w, k)
     solve(h, w, est + h[NQ])
     total = 0.0
     for c in range(size):
@@ -117,21 +118,12 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
         n[EVALUATION] = OK
 
     @kernel
-    def finish(h, w, step):
-        """State Y_NEW for the accelerations found; the ledger by trapezia."""
-        size = h[NY]
-        place(h, w, step, h[Y_NEW])
-        for c in range(h[NQ] + h[NV], size):
-            rate = w[index(h[SLOPES] + c)] + w[index(h[SLOPES] + size * ITERATE + c)]
-            w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + 0.5 * step * rate
-
-    @kernel
     def attempt(h, f, w, n, step):
         """State Y_NEW after a step from Y; False when no iteration converges."""
         set_magnitudes(h, f, w, h[Y])
         if not converge(h, f, w, n, step):
             return False
-        finish(h, w, step)
+        place(h, w, step, h[Y_NEW])
         return True
 
     return begin, attempt, error, hermite.make_extend(LAST), keep

@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.engine import Engine, Progress
+from pipeline.dynamics.tables import MODE
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -50,7 +51,8 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     """Regular output times and all breaks, increasing; times nearer than rounding are one."""
     span = breaks[-1] - breaks[0]
     regular = breaks[0] + interval * np.arange(int(np.floor(span / interval * (1 + 1e-12))) + 1)
-    apart = np.min(np.abs(regular[:, None] - breaks[None, :]), axis=1) > 1e-9 * interval
+    after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
+    apart = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
     return np.union1d(regular[apart], breaks)
 
 
@@ -74,7 +76,7 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length
     control[state.FIXED], control[state.PARAMETER] = scene.solver.step or 0.0, built.method.parameter(scene.solver)
     n[state.STATUS : state.INTEGERS] = 0
-    n[state.INTEGERS + built.layout.known :] = 0
+    n[n[MODE] :] = 0
     n[state.CAP] = scene.solver.evaluations
     engine.view("Y", len(y))[:] = y
     engine.view("LATCHED", contacts)[:] = 0.0
