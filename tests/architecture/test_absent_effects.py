@@ -168,7 +168,7 @@ NUMBERS: dict[str, object] = {
     "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
     "time.end": "1 s",
     "output": {"interval": "1 ms"},
-    "solver": {"rtol": 1e-8},
+    "solver": {"rtol": 1e-8, "evaluations": 1000},
 }
 
 

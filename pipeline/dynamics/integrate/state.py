@@ -11,8 +11,9 @@ from pipeline.dynamics.tables import MODE
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
-# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, N_CONTROLS = range(12)
+# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter,
+# largest rate of a closure before projection
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, N_CONTROLS = range(13)
 # integers
 (
     STATUS,

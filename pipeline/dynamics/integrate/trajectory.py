@@ -19,12 +19,16 @@ EVENT_ROWS = 4096
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`."""
+    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`.
+
+    drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
+    """
 
     rows: np.ndarray
     events: np.ndarray
     counters: dict[str, int]
     drift: float
+    rate_drift: float
 
     @property
     def time(self) -> np.ndarray:
@@ -60,7 +64,7 @@ def integrate(engine: Engine, y: np.ndarray, progress: Progress) -> Trajectory:
         engine.select_pieces(0.5 * (a + b))
         control[state.END], run.n[state.FRESH] = b, 1
         _segment(engine, run, progress)
-    return _collect(run, float(control[state.DRIFT]))
+    return _collect(run, float(control[state.DRIFT]), float(control[state.RATE_DRIFT]))
 
 
 def _begin(engine: Engine, y: np.ndarray) -> _Run:
@@ -113,7 +117,8 @@ def _refusal(engine: Engine, run: _Run) -> str:
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than an explicit method can follow (loops closed at joints {joints})",
         state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero",
+        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
+        + (f", or the fixed step of {control[state.FIXED]:.2g} s is too long for it" if control[state.FIXED] else ""),
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
@@ -122,7 +127,7 @@ def _refusal(engine: Engine, run: _Run) -> str:
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
 
 
-def _collect(run: _Run, drift: float) -> Trajectory:
+def _collect(run: _Run, drift: float, rate_drift: float) -> Trajectory:
     n = run.n
     rows = run.rows[: n[state.N_RECORDED]]
     keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
@@ -134,4 +139,4 @@ def _collect(run: _Run, drift: float) -> Trajectory:
         "projection_evaluations": int(n[state.PROJECTION_EVALUATIONS]),
         "jacobians": int(n[state.JACOBIANS]),
     }
-    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift)
+    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift, rate_drift)

@@ -81,6 +81,7 @@ def _report(run: Run) -> dict[str, float | int]:
     found: dict[str, float | int] = {
         **run.trajectory.counters,
         "largest_drift_before_projection": run.trajectory.drift,
+        "largest_rate_drift_before_projection": run.trajectory.rate_drift,
         "closure_residual_of_given_start": run.start_residual,
     }
     return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}

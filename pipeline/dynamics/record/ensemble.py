@@ -68,7 +68,9 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     regular = output_times(engine.breaks, scene.output.interval)
     rows = np.searchsorted(trajectory.time, regular)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = Trajectory(trajectory.rows[rows], trajectory.events, trajectory.counters, trajectory.drift)
+    kept = Trajectory(
+        trajectory.rows[rows], trajectory.events, trajectory.counters, trajectory.drift, trajectory.rate_drift
+    )
     seen = observed(engine, kept)
     motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
     chosen = [motions[n] for n in names]
