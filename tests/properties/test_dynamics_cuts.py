@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline.dynamics.assembly import tree
-from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, scene, simulate
+from tests.properties.mechanisms import GRAVITY, body, frame, joint, scene, simulate
 
 #: joints that may close the two loops; the tree takes the others
 CUTS = (("U", "P"), ("Y", "R"), ("S", "T"))

@@ -159,11 +159,11 @@ def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
         load = scene.load[name]
         if row[TURNS] >= 0:
             y[len(y) - built.packed.sizes["N_TURNS"] + row[TURNS]] = now[VALUE]
-        if isinstance(load, SpringDamper) and now[VALUE] <= SHORTEST * built.system.length:
-            if load.damping > 0.0 or load.free_length:
-                raise InputError(
-                    f"[load.{name}.between]",
-                    "its two ends start in one place, so that it pulls in no direction",
-                    "move an end; only a spring of no free length and no damping may start so",
-                )
+        has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
+        if has_direction and now[VALUE] <= SHORTEST * built.system.length:
+            raise InputError(
+                f"[load.{name}.between]",
+                "its two ends start in one place, so that it pulls in no direction",
+                "move an end; only a spring of no free length and no damping may start so",
+            )
     return y

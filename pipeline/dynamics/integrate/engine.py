@@ -150,7 +150,9 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> dict[st
     sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
     per_segment = {x: pieces_at(built, x) for x in set(middles.tolist())}
-    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(len(rows), packed.sizes["N_LAWS"])
+    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(
+        len(rows), packed.sizes["N_LAWS"]
+    )
     widths = observing.widths(packed.sizes)
     out = np.zeros((len(rows), sum(widths.values())))
     tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * built.system.length
