@@ -76,8 +76,8 @@ NUMBERS = {
 WORK = (
     "X U DU LINK_FRAMES SITE_FRAMES JOINT OWN INERTIA WRENCH COLUMNS MOMENTA DEFORMATION BIAS MODAL_BIAS "
     "MODAL SCRATCH MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR MULTIPLIER TOUCH "
-    "LAW LOAD TURN DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MAGNITUDE CORRECTION LATCHED "
-    "WATCH CONTROL"
+    "LAW LOAD TURN DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MEMORY MAGNITUDE CORRECTION "
+    "LATCHED WATCH CONTROL"
 ).split()
 _PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK])}
 HEADER = len(_PLACE)
@@ -186,6 +186,7 @@ def place(name: str) -> int:
     Y_STAGE,
     SLOPES,
     DENSE,
+    MEMORY,
     MAGNITUDE,
     CORRECTION,
     LATCHED,
@@ -215,7 +216,7 @@ TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 6, 9, 12, 15
 # ledger before the contacts' slots (normal, friction each): work of drives, loss of modal damping
 DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
 # what evaluate reports in n[EVALUATION]
-OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED = range(4)
+OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 #: first entries of n, the integers that change: report of the last evaluation; then the laws' active pieces
 #: and the contacts' modes start where n[ACTIVE] and n[MODE] say
 EVALUATION, ACTIVE, MODE = range(3)

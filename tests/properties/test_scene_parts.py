@@ -70,7 +70,12 @@ WRONG = {
         "driven already by 'd'",
         "remove",
     ),
-    '[drive.d]\njoint = "hinge"\nlaw = { type = "constant", value = "3 mm" }': ("drive.d.law", "'0.003 m'", "an angle", "deg"),
+    '[drive.d]\njoint = "hinge"\nlaw = { type = "constant", value = "3 mm" }': (
+        "drive.d.law",
+        "'0.003 m'",
+        "an angle",
+        "deg",
+    ),
     '[drive.d]\njoint = "hinge"\nlaw = { type = "stepp" }': ("drive.d", "stepp"),
     '[drive.d]\njoint = "hinge"\nlaw = { type = "harmonic", amplitude = [1.0], frequency = [] }': ("one entry per",),
     '[drive.d]\njoint = "hinge"\nlaw = { type = "polynomial", coefficients = [] }': ("coefficients",),

@@ -42,6 +42,27 @@ MESH: Schema = {
     "frame_node": _V(("frame",), "1", "node to which the named frame is tied"),
     "frame_position": _V(("frame", "axis"), "m", "origin of the named frame in the mesh frame"),
     "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, frame to mesh frame"),
+    "abscissa": _V(("node",), "m", "place of the node along the rod", optional=True),
+    "rod_rotation": _V(
+        ("axis", "axis2"), "1", "rotation matrix, rod axes (x along the rod) to mesh frame", optional=True
+    ),
+    "shear_coefficient": _V(
+        ("cell", "axis"), "1", "share of the area that carries force along x, y and z of the rod", optional=True
+    ),
+    "product_moment": _V(("cell",), "m4", "integral of y z over the section (stiffness)", optional=True),
+    "inertia_product": _V(("cell",), "m4", "integral of y z over the section (mass)", optional=True),
+    "area_profile": _V(("cell", "point"), "1", "area at the Gauss points over that of the cell", optional=True),
+    "second_moment_profile": _V(
+        ("cell", "point", "axis"), "1", "second moments at the Gauss points over those of the cell", optional=True
+    ),
+    "inertia_moment_profile": _V(("cell", "point", "axis"), "1", "second moments of the mass likewise", optional=True),
+    "shear_coefficient_profile": _V(("cell", "point", "axis"), "1", "shear coefficients likewise", optional=True),
+    "lump_node": _V(("lump",), "1", "node that carries the lumped mass", optional=True),
+    "lump_mass": _V(("lump",), "kg", "lumped mass", optional=True),
+    "lump_offset": _V(("lump", "axis"), "m", "centre of the lumped mass seen from its node, mesh axes", optional=True),
+    "lump_inertia": _V(
+        ("lump", "axis", "axis2"), "kg m2", "inertia of the lumped mass about its centre, mesh axes", optional=True
+    ),
 }
 
 #: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
@@ -151,6 +172,13 @@ RUN: Schema = {
         ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work - load_work, minus its start value"
     ),
     "constraint_error": _V(("time",), "m", "largest violation of a loop closure"),
+    "horizon": _V((), "s", "time up to which pointwise values mean something", optional=True),
+    "twin_separation": _V(
+        ("twin_time",),
+        "m s-1",
+        "largest distance of a velocity from that in the same run started `twin_perturbation` [m] away",
+        optional=True,
+    ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
     "event_contact": _V(("event",), "1", "index of the contact", optional=True),
     "event_kind": _V(("event",), "1", "closing or opening", optional=True),

@@ -48,6 +48,8 @@ if TYPE_CHECKING:
     Pressure: TypeAlias = float
     Density: TypeAlias = float
     Number: TypeAlias = float
+    Area: TypeAlias = float
+    SecondMoment: TypeAlias = float
     Position: TypeAlias = tuple[float, float, float]
     Velocity: TypeAlias = tuple[float, float, float]
     AngularVelocity: TypeAlias = tuple[float, float, float]
@@ -66,6 +68,8 @@ else:
     Pressure = _scalar("pressure")
     Density = _scalar("density")
     Number = _scalar("number")
+    Area = _scalar("area")
+    SecondMoment = _scalar("second moment of area")
     Position = _vector("length")
     Velocity = _vector("velocity")
     AngularVelocity = _vector("angular velocity")

@@ -46,6 +46,22 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     return scene
 
 
+def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
+    """A copy of a scene with dotted places changed, as in `load_scene`; None takes a setting or a part away."""
+    table = scene.model_dump(mode="json", exclude_none=True)
+    for place, value in override.items():
+        if value is not None:
+            _put(table, place, value, f"edit of {scene.name}")
+        elif place in table:
+            del table[place]
+    try:
+        result = Scene.model_validate(table)
+    except ValidationError as error:
+        raise InputErrors([_input_error(Path(scene.name), e) for e in error.errors()]) from None
+    result._name, result._path = scene._name, scene._path
+    return result
+
+
 def scene_name(path: Path) -> str:
     """Path below the last folder called ``scenes``, without suffix; else the file's stem."""
     parts = path.resolve().with_suffix("").parts
@@ -201,7 +217,8 @@ def _tables(node: object) -> Iterator[dict[str, Any]]:
 
 def _input_error(path: Path, error: Any) -> InputError:
     # pydantic puts the type by which it chose a part's model into the place; the file has no such key
-    place = ".".join(str(key) for k, key in enumerate(error["loc"]) if k < 2 or key not in TYPES)
+    keys = [key for key in error["loc"] if not str(key).startswith("<")]
+    place = ".".join(str(key) for k, key in enumerate(keys) if k < 2 or key not in TYPES)
     message = error["msg"].removeprefix("Value error, ")
     if error["type"] == "extra_forbidden":
         message = "unknown key"
@@ -209,4 +226,4 @@ def _input_error(path: Path, error: Any) -> InputError:
         message = "is missing"
     value = error.get("input")
     shown = f" (got {value!r})" if isinstance(value, (str, int, float)) and error["type"] != "missing" else ""
-    return InputError(f"{path} [{place}]", f"{message}{shown}")
+    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}")

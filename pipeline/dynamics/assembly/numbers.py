@@ -20,6 +20,7 @@ from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.packing import Packed, pack
 from pipeline.dynamics.assembly.system import Link, System
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate.method import Method
 
 NORMAL = "pipeline.dynamics.contact.normal"
 INTEGRATORS = "pipeline.dynamics.integrate"
@@ -48,6 +49,7 @@ class Tables:
     layout: Layout
     kinds: Kinds
     packed: Packed
+    method: Method
     closure_order: np.ndarray
 
 
@@ -101,11 +103,10 @@ def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
             "GRAVITY": loading.gravity(system.scene),
             "FLOORS": floors,
         },
-        method.slopes,
-        method.dense,
+        method,
         layout.columns,
     )
-    return Tables(system, layout, kinds, packed, order)
+    return Tables(system, layout, kinds, packed, method, order)
 
 
 def _kinds(system: System, harmonics: bool, loads: tuple[str, ...]) -> Kinds:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.dynamics import tables
 from pipeline.dynamics.integrate import state
+from pipeline.dynamics.integrate.method import Method
 
 
 @dataclass(frozen=True)
@@ -47,11 +48,10 @@ def pack(
     sizes: Mapping[str, int],
     wiring: Mapping[str, np.ndarray],
     numbers: Mapping[str, np.ndarray],
-    slopes: int,
-    dense: int,
+    method: Method,
     columns: int,
 ) -> Packed:
-    """Pack named tables; `columns`: number of twist columns; slopes, dense: rows that the method needs."""
+    """Pack named tables; `columns`: number of twist columns; `method` says what room it needs."""
     all_sizes = dict(sizes)
     h = np.zeros(tables.HEADER, dtype=np.int64)
     chunks: list[np.ndarray] = [h]
@@ -74,7 +74,7 @@ def pack(
     for name in tables.SIZES:
         h[tables.place(name)] = all_sizes[name]
     start = 0
-    for name, length in _work_lengths(all_sizes, wiring, slopes, dense, columns).items():
+    for name, length in _work_lengths(all_sizes, wiring, method, columns).items():
         h[tables.place(name)] = start
         start += length
     integers = state.INTEGERS + all_sizes["N_LAWS"] + all_sizes["N_CONTACTS"]
@@ -114,7 +114,7 @@ def envelope_size(envelope: np.ndarray) -> int:
 
 
 def _work_lengths(
-    s: Mapping[str, int], wiring: Mapping[str, np.ndarray], slopes: int, dense: int, columns: int
+    s: Mapping[str, int], wiring: Mapping[str, np.ndarray], method: Method, columns: int
 ) -> dict[str, int]:
     known, contacts, ny = s["N_DRIVES"], s["N_CONTACTS"], s["NY"]
     jacobian = int(sum(c[tables.N_ROWS] * c[tables.N_SUPPORT] for c in wiring["CLOSURES"]))
@@ -156,8 +156,9 @@ def _work_lengths(
         "Y": ny,
         "Y_NEW": ny,
         "Y_STAGE": ny,
-        "SLOPES": slopes * ny,
-        "DENSE": dense * ny,
+        "SLOPES": method.slopes * ny,
+        "DENSE": method.dense * ny,
+        "MEMORY": method.memory(s["NQ"], s["NV"], ny),
         "MAGNITUDE": s["N_GROUPS"],
         "CORRECTION": s["NV"],
         "LATCHED": contacts,

@@ -12,10 +12,13 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.dynamics.assembly import fuse, initial
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import observe as observing
+from pipeline.dynamics.integrate.method import scheme_of
 from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, LOAD_SIZE, OK, TOUCH_SIZE
 
 Progress = Callable[[float | None, str], None]
 
+#: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
+SHORTEST_SEGMENT = 1e-12
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14
 
@@ -34,11 +37,16 @@ class Engine:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads in between, end."""
+        """Start, breaks of drives and loads in between, end; breaks that only rounding sets apart are one."""
         starts, found = self.built.packed.table("PIECES")[:, 0], set()
         for first, count in self.built.packed.table("LAWS"):
-            found |= {float(t) for t in starts[first + 1 : first + count] if self.start < t < self.end}
-        return np.array([self.start, *sorted(found), self.end])
+            found |= {float(t) for t in starts[first + 1 : first + count]}
+        shortest = SHORTEST_SEGMENT * (self.end - self.start)
+        times = [self.start]
+        for t in sorted(found):
+            if t - times[-1] > shortest and self.end - t > shortest:
+                times.append(t)
+        return np.array([*times, self.end])
 
     def select_pieces(self, inside: float) -> None:
         """Put the pieces of the laws in force that hold at `inside`, which is no break."""
@@ -75,13 +83,13 @@ def pieces_at(built: Tables, inside: float) -> np.ndarray:
 def prepare(built: Tables, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
     scene = built.system.scene
-    integrator = scene.solver.integrator
+    scheme = scheme_of(scene.solver)
     w, n = built.packed.work_space()
-    entry = fuse.entry(built.kinds, integrator)
+    entry = fuse.entry(built.kinds, scheme)
     engine = Engine(built, entry, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
-    if not fuse.is_compiled(built.kinds, integrator):
+    if not fuse.is_compiled(built.kinds, scheme):
         progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
-        with fuse.compiling(built.kinds, integrator):
+        with fuse.compiling(built.kinds, scheme):
             entry.evaluate(built.packed.h, built.packed.f, w, n, engine.start, 0)
     return engine
 

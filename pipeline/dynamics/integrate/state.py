@@ -11,8 +11,8 @@ from pipeline.dynamics.tables import MODE
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
-# accepted step, largest growth of the next (1 after a rejection)
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, N_CONTROLS = range(10)
+# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, N_CONTROLS = range(12)
 # integers
 (
     STATUS,
@@ -27,11 +27,14 @@ TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, N_CONTROLS =
     FRESH,
     IMMEDIATE,
     PROJECTIONS,
+    PROJECTION_EVALUATIONS,
+    JACOBIANS,
     CULPRIT,
     INTEGERS,
-) = range(MODE + 1, MODE + 15)
+) = range(MODE + 1, MODE + 17)
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
+NOT_A_NUMBER, NO_CONVERGENCE = 8, 9
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING = 0, 1

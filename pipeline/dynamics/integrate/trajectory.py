@@ -70,6 +70,7 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     control[:] = 0.0
     control[state.TIME], control[state.SPAN] = engine.start, engine.end - engine.start
     control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length
+    control[state.FIXED], control[state.PARAMETER] = scene.solver.step or 0.0, built.method.parameter(scene.solver)
     n[state.STATUS : state.INTEGERS] = 0
     n[n[MODE] :] = 0
     n[state.CAP] = scene.solver.evaluations
@@ -112,6 +113,9 @@ def _refusal(engine: Engine, run: _Run) -> str:
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than an explicit method can follow (loops closed at joints {joints})",
         state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
+        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero",
+        state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
+        "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
         state.LOST_CLOSURE: f"the loops at joints {joints} cannot be kept closed: a singular configuration",
     }
@@ -127,5 +131,7 @@ def _collect(run: _Run, drift: float) -> Trajectory:
         "steps": int(n[state.STEPS]),
         "rejected_steps": int(n[state.REJECTED]),
         "projections": int(n[state.PROJECTIONS]),
+        "projection_evaluations": int(n[state.PROJECTION_EVALUATIONS]),
+        "jacobians": int(n[state.JACOBIANS]),
     }
     return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift)

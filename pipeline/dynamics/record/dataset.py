@@ -18,6 +18,7 @@ from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.wrenches import joint_wrenches
+from pipeline.dynamics.run import Run
 from pipeline.dynamics.tables import (
     CONTACT_LOSS,
     FRICTION_POWER,
@@ -33,14 +34,9 @@ Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
-def dataset(
-    built: Tables, trajectory: Trajectory, seen: Seen, start_residual: float, scene: Scene | None = None
-) -> xr.Dataset:
-    """All that a run holds; `seen` are the observed rows of the trajectory.
-
-    scene: what the user asked for, where the run was made from another scene.
-    """
-    scene = built.system.scene if scene is None else scene
+def dataset(run: Run) -> xr.Dataset:
+    """All that is recorded of a run (schema RUN)."""
+    built, trajectory, seen = run.engine.built, run.trajectory, run.observed
     variables: Variables = {}
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
@@ -52,9 +48,13 @@ def dataset(
     if built.system.contacts:
         _contacts(built, seen, variables, coordinates)
         _events(trajectory, variables)
+    if run.twin is not None:
+        coordinates["twin_time"] = run.twin.time
+        variables["twin_separation"] = (("twin_time",), run.twin.separation)
+        variables["horizon"] = ((), np.array(run.twin.horizon))
     _ledger(built, seen, variables)
     made = xr.Dataset(variables, coords=coordinates)
-    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual))
+    result = conform(made, RUN, **attributes(run.scene), **_report(run))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.array([0, 1], dtype=np.int8),
@@ -77,12 +77,13 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
-def _report(trajectory: Trajectory, start_residual: float) -> dict[str, float | int]:
-    return {
-        **trajectory.counters,
-        "largest_drift_before_projection": trajectory.drift,
-        "closure_residual_of_given_start": start_residual,
+def _report(run: Run) -> dict[str, float | int]:
+    found: dict[str, float | int] = {
+        **run.trajectory.counters,
+        "largest_drift_before_projection": run.trajectory.drift,
+        "closure_residual_of_given_start": run.start_residual,
     }
+    return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
 
 
 def _motion(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
