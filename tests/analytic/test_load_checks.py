@@ -76,6 +76,23 @@ def test_a_joint_with_one_freedom_driven_and_one_free() -> None:
 
 
 @pytest.mark.slow
+def test_a_partly_driven_joint_may_be_written_the_other_way_round() -> None:
+    """With its first frame on the rotor, both coordinates change their signs, and so do the law and the force."""
+    known = run("checks/spindle")
+    other = run(
+        "checks/spindle",
+        (
+            ("joint.axis.between", ("rotor.axis", "ground.axis")),
+            ("drive.turning.law.amplitude", ("-60 deg",)),
+            ("drive.turning.law.offset", "60 deg"),
+        ),
+    )
+    # the same equations but for the order in which numbers are added
+    for field, sign in (("position", 1.0), ("acceleration", 1.0), ("drive_force", -1.0), ("joint_position", -1.0)):
+        assert sign * other[field].values == pytest.approx(known[field].values, abs=1e-9), field
+
+
+@pytest.mark.slow
 def test_a_torsion_spring_counts_its_turns() -> None:
     """Released five half turns from its rest, it swings through all of them: theta = 5 pi (1 - cos(w t))."""
     spring = {"type": "joint-spring", "joint": "hinge", "stiffness": "2 N m/rad", "rest": 5.0 * np.pi}

@@ -128,7 +128,7 @@ class Table(Part):
     value: Column
     degree: Literal[3, 5] = 3
     ends: Ends = "not-a-knot"
-    points: tuple[tuple[float, float], ...]
+    points: tuple[tuple[float, float], ...] = ()
 
     @model_validator(mode="before")
     @classmethod
