@@ -160,12 +160,17 @@ RUN: Schema = {
         ("time", "load", "axis"), "N", "force of the load on its frame, or its second one, world axes", optional=True
     ),
     "load_moment": _V(
-        ("time", "load", "axis"), "N m", "moment of the load there, about that frame's origin, world axes", optional=True
+        ("time", "load", "axis"),
+        "N m",
+        "moment of the load there, about that frame's origin, world axes",
+        optional=True,
     ),
     "load_length": _V(
         ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
     ),
-    "load_power": _V(("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True),
+    "load_power": _V(
+        ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
+    ),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),

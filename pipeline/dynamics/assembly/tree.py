@@ -70,7 +70,7 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
 
 def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
     """Edges from the ground to the frames whose pose is prescribed."""
-    result = []
+    result: list[Edge] = []
     for name, drive in scene.drive.items():
         if not isinstance(drive, PathDrive):
             continue
@@ -101,7 +101,9 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
     while len(branches) < len(groups):
         frontier = [e for e in left if (e.a in link_of) != (e.b in link_of)]
         if frontier:
-            best = min(frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]]))
+            best = min(
+                frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]])
+            )
             left.remove(best)
             reverse = best.a not in link_of
             parent, group = (best.b, best.a) if reverse else (best.a, best.b)

@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.loading import LEDGER, order
+from pipeline.dynamics.assembly.loading import LEDGER
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.trajectory import Trajectory
@@ -153,7 +153,7 @@ def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordina
 def _loads(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
     from pipeline.dynamics.record.loads import load_series
 
-    coordinates["load"] = order(built.system.scene)
+    coordinates["load"] = list(built.system.scene.forces())
     variables.update(load_series(built, seen))
 
 
