@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stages.families import module
+from stages.families import constants, module
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +28,14 @@ KERNELS = (
     "integrate.project",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
-CONTACT_KERNELS = ("integrate.events",)
+CONTACT_KERNELS = (
+    "contact.forces",
+    "contact.form.elastic",
+    "contact.form.hysteretic",
+    "contact.form.linear_damper",
+    "contact.validity",
+    "integrate.events",
+)
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
@@ -54,6 +61,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"
         found.add(module(joints, joint.type, where=f"[joint.{name}]", table=table))
+        if joint.type in constants(joints)["HELD"]:
+            found.add(module(joints, constants(joints)["HELD"][joint.type], where=f"[joint.{name}]"))
     for name, contact in scene.contacts().items():
         where = f"[joint.{name}.normal]"
         found.add(module(f"{DYNAMICS}.contact", contact.type, where=where))

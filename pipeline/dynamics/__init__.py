@@ -21,10 +21,12 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
-    from pipeline.dynamics.record.dataset import dataset
+    from pipeline.dynamics.record.dataset import contact_warnings, dataset
     from pipeline.dynamics.run import integrate
 
     done = integrate(scene, bundles, progress)
+    for sentence in contact_warnings(done.engine.built, done.trajectory):
+        progress(None, f"warning: {sentence}")
     return dataset(done.engine.built, done.trajectory, done.observed, done.start_residual)
 
 

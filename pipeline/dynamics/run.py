@@ -15,6 +15,7 @@ from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
+from pipeline.dynamics.record.ledger import require_closed
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,9 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     engine = engine_of(scene, bundles, progress)
     start, residual = consistent_start(engine)
     trajectory = step(engine, start, progress)
-    return Run(engine, trajectory, observed(engine, trajectory), residual)
+    seen = observed(engine, trajectory)
+    require_closed(engine.built, trajectory, seen)
+    return Run(engine, trajectory, seen, residual)
 
 
 def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:

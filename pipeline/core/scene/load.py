@@ -24,6 +24,10 @@ TYPES = (
     "prismatic",
     "fixed",
     "clearance-spherical",
+    "clearance-revolute",
+    "modified-coulomb",
+    "ambrosio",
+    "lugre",
     "step",
     "constant",
 )

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSpherical, FrameName
 from pipeline.core.scene.fields import (
     Acceleration,
     AngularVelocity,
@@ -16,13 +17,10 @@ from pipeline.core.scene.fields import (
     Part,
     Pose,
     Position,
-    Pressure,
-    Speed,
     Time,
     Velocity,
 )
 
-FrameName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*\.[A-Za-z_]\w*$", description="body.FRAME")]
 Positive = Field(gt=0.0)
 
 
@@ -82,71 +80,11 @@ Body = Annotated[Ground | RigidBody | FlexibleBody, Field(discriminator="type")]
 class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z."""
 
-    type: Literal["spherical", "revolute", "prismatic", "fixed"]
+    type: Literal["spherical", "revolute", "planar", "prismatic", "fixed"]
     between: tuple[FrameName, FrameName]
 
 
-class Material(Part):
-    """Elastic constants of a contacting surface."""
-
-    youngs_modulus: Annotated[Pressure, Positive]
-    poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
-
-
-class NormalLaw(Part):
-    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii."""
-
-    law: str
-    restitution: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
-    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
-    stiffness: Annotated[Number, Positive] | None = None
-
-
-class FrictionLaw(Part):
-    """A friction law with the paper's four parameters (Table 6)."""
-
-    law: str
-    static: Annotated[Number, Field(ge=0.0)]
-    dynamic: Annotated[Number, Field(ge=0.0)]
-    v_static: Annotated[Speed, Positive]
-    v_dynamic: Annotated[Speed, Positive]
-
-    @model_validator(mode="after")
-    def _ordered(self) -> FrictionLaw:
-        if not self.v_static < self.v_dynamic:
-            raise ValueError(
-                f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve"
-            )
-        return self
-
-
-class ClearanceSpherical(Part):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame].
-
-    floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
-    for grazing and resting contact.
-    """
-
-    type: Literal["clearance-spherical"]
-    between: tuple[FrameName, FrameName]
-    clearance: Annotated[Length, Positive]
-    ball_radius: Annotated[Length, Positive]
-    socket_material: Material | None = None
-    ball_material: Material | None = None
-    normal: NormalLaw
-    friction: FrictionLaw | None = None
-    floor: Annotated[Speed, Positive] = 1e-6
-
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> ClearanceSpherical:
-        if self.normal.stiffness is None and (self.socket_material is None or self.ball_material is None):
-            raise ValueError(
-                "the contact stiffness is unknown: give socket_material and ball_material, or normal.stiffness"
-            )
-        return self
-
-
-Joint = Annotated[IdealJoint | ClearanceSpherical, Field(discriminator="type")]
+Joint = Annotated[IdealJoint | ClearanceSpherical | ClearanceRevolute, Field(discriminator="type")]
 
 
 class Constant(Part):

@@ -26,6 +26,7 @@ from numba.core.bytecode import FunctionIdentity
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.registry import module_of
 from pipeline.core.workflow.fingerprint import Sources, imported
+from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds
 
 #: how compiled functions are named (see `compiling`); part of the digest
@@ -33,7 +34,7 @@ NAMING = "counters by entry"
 SOURCES = Sources(Path(__file__).resolve().parents[3])
 PACKAGES = {
     "joint": "pipeline.dynamics.joints",
-    "normal": "pipeline.dynamics.contact.normal",
+    "form": "pipeline.dynamics.contact.form",
     "friction": "pipeline.dynamics.contact.friction",
     "integrator": "pipeline.dynamics.integrate",
 }
@@ -121,7 +122,7 @@ def _reached(roots: set[str]) -> dict[str, str]:
 
 def _source(kinds: Kinds, integrator: str) -> str:
     lines = [
-        f'"""Generated: joints {kinds.joints}, normal laws {kinds.normals}, friction {kinds.frictions}."""',
+        f'"""Generated: joints {kinds.joints}, {kinds.contacts}."""',
         "import numpy as np",
         "from numba import njit",
         "from pipeline.dynamics.tables import SLOPES, Y",
@@ -131,17 +132,17 @@ def _source(kinds: Kinds, integrator: str) -> str:
         f"from {module_of(PACKAGES['integrator'], integrator)} import METHOD",
     ]
     lines += _imports("joint", kinds.joints, ("motion",))
-    lines.append(f"joint_motion = dispatch.joints({_names('joint', 'motion', kinds.joints)})")
+    lines.append(f"joint_motion = dispatch.choose({_names('joint', 'motion', kinds.joints)})")
     lines += _flexible_lines(kinds.flexible)
-    lines += _contact_lines(kinds)
+    lines += _contact_lines(kinds.contacts)
     lines += _closure_lines(kinds.closures)
     lines += [_BODY, _ENTRIES]
     return "\n".join(lines) + "\n"
 
 
-def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...]) -> list[str]:
+def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...], table: str = "NAMES") -> list[str]:
     return [
-        f"from {module_of(PACKAGES[family], name)} import "
+        f"from {module_of(PACKAGES[family], name, table)} import "
         + ", ".join(f"{function} as {family}_{function}_{k}" for function in functions)
         for k, name in enumerate(names)
     ]
@@ -168,18 +169,23 @@ def _flexible_lines(present: bool) -> list[str]:
     ]
 
 
-def _contact_lines(kinds: Kinds) -> list[str]:
-    if not kinds.normals:
+def _contact_lines(kinds: ContactKinds) -> list[str]:
+    if not kinds.surfaces:
         return ["contacts = equations.no_contacts", "events = (explicit.watch_nothing, explicit.settle_nothing)"]
+    rub, regimes = "frictionless()", "no_regimes"
+    if kinds.frictions:
+        rub, regimes = f"rubbing(dispatch.choose({_names('friction', 'traction', kinds.frictions)}))", "regimes"
     return [
-        "from pipeline.dynamics.joints import clearance_spherical",
-        "from pipeline.dynamics.integrate.events import EVENTS_OF_CONTACTS as events",
-        *_imports("normal", kinds.normals, ("force", "stored")),
-        *_imports("friction", kinds.frictions, ("coefficient",)),
-        f"normal = dispatch.normals({_names('normal', 'force', kinds.normals)})",
-        f"stored = dispatch.energies({_names('normal', 'stored', kinds.normals)})",
-        f"friction = dispatch.frictions({_names('friction', 'coefficient', kinds.frictions)})",
-        "contacts = clearance_spherical.compose(normal, stored, friction)",
+        "from pipeline.dynamics.contact import forces as contact_forces",
+        "from pipeline.dynamics.integrate import events as contact_events, trace",
+        *_imports("joint", kinds.surfaces, ("separation",), "CONTACTS"),
+        *_imports("friction", kinds.frictions, ("traction",)),
+        *_imports("form", kinds.forms, ("force", "stored")),
+        f"separation = dispatch.choose({_names('joint', 'separation', kinds.surfaces)})",
+        f"normal = dispatch.choose({_names('form', 'force', kinds.forms)})",
+        f"stored = dispatch.choose({_names('form', 'stored', kinds.forms)})",
+        f"contacts = contact_forces.compose(separation, normal, stored, contact_forces.{rub})",
+        f"events = contact_events.watching(trace.{regimes})",
     ]
 
 

@@ -11,7 +11,7 @@ from pipeline.core.scene.parts import Ground
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.tree import joint_class
-from pipeline.dynamics.tables import AXES, CONTACT_LOSS, OMEGA, ROW0, VELOCITY
+from pipeline.dynamics.tables import AXES, OMEGA, ROW0, VELOCITY
 
 Frames = Callable[[np.ndarray], np.ndarray]  #: state -> frames of all links, (links, FRAME_SIZE)
 
@@ -32,7 +32,7 @@ def start_state(built: Tables) -> np.ndarray:
         relative = F.inverse().of(_inboard_frame(built, i))
         coordinates = declared.coordinates(relative.R, relative.p)
         q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
-    return np.concatenate([q, v, np.zeros(CONTACT_LOSS + 2 * len(system.contacts))])
+    return np.concatenate([q, v, np.zeros(built.packed.sizes["N_LEDGER"])])
 
 
 def _inboard_frame(built: Tables, i: int) -> Placement:

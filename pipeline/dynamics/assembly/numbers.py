@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
-from pipeline.dynamics import tables
+from pipeline.dynamics.assembly import contact_numbers, wiring
 from pipeline.dynamics.assembly import flexible_numbers as flexible
-from pipeline.dynamics.assembly import wiring
+from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.layout import Layout, number
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.packing import Packed, pack
 from pipeline.dynamics.assembly.system import Link, System
 from pipeline.dynamics.assembly.tree import joint_class
 
-NORMAL = "pipeline.dynamics.contact.normal"
+if TYPE_CHECKING:
+    from pipeline.dynamics.contact.law import Resolved
+
 INTEGRATORS = "pipeline.dynamics.integrate"
-FRICTION = "pipeline.dynamics.contact.friction"
 
 
 @dataclass(frozen=True)
@@ -27,33 +28,37 @@ class Kinds:
     """Which kinds of parts a system has: all that its compiled code depends on."""
 
     joints: tuple[str, ...]
-    normals: tuple[str, ...]
-    frictions: tuple[str, ...]
+    contacts: ContactKinds
     flexible: bool
     closures: bool
 
 
 @dataclass(frozen=True)
 class Tables:
-    """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system."""
+    """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system.
+
+    laws: the normal law of every contact.
+    """
 
     system: System
     layout: Layout
     kinds: Kinds
     packed: Packed
     closure_order: np.ndarray
+    laws: tuple[Resolved, ...]
 
 
 def tabulate(system: System) -> Tables:
     """Number a system and fill its tables."""
     layout = number(system)
-    kinds = _kinds(system)
+    laws = contact_numbers.resolve(system)
+    kinds = _kinds(system, laws)
     site_pairs = [(e.kind, layout.add_site(a), layout.add_site(b)) for e, a, b in system.closures]
     touching = [(layout.add_site(a), layout.add_site(b)) for _, _, a, b in system.contacts]
     closing = wiring.closures(layout, site_pairs)
     order = closing.pop("order")
     flexible_wiring, flexible_numbers = flexible.fill(layout)
-    contacts, contact_numbers = _contacts(system, kinds, touching)
+    contacts, numbers_of_contacts = contact_numbers.fill(layout, kinds.contacts, laws, touching)
     drives, pieces = _drives(system)
     groups, floors = _error_groups(layout)
     sites = [(s.link, layout.port_of(k)) for k, s in enumerate(layout.sites)]
@@ -61,7 +66,7 @@ def tabulate(system: System) -> Tables:
     packed = pack(
         {
             "NQ": layout.nq,
-            "N_LEDGER": tables.CONTACT_LOSS + 2 * len(system.contacts),
+            "N_LEDGER": len(groups) - layout.nq - layout.nv,
             "MOST_MODES": max(layout.modes.values(), default=0),
         },
         {
@@ -78,7 +83,7 @@ def tabulate(system: System) -> Tables:
             "LINK_NUMBERS": np.array([_link_numbers(link) for link in system.links]),
             "SITE_NUMBERS": np.array([_pose_row(s.place) for s in layout.sites]),
             **flexible_numbers,
-            "CONTACT_NUMBERS": contact_numbers,
+            "CONTACT_NUMBERS": numbers_of_contacts,
             "PIECES": pieces,
             "GRAVITY": _gravity(system),
             "FLOORS": floors,
@@ -87,15 +92,13 @@ def tabulate(system: System) -> Tables:
         method.dense,
         layout.columns,
     )
-    return Tables(system, layout, kinds, packed, order)
+    return Tables(system, layout, kinds, packed, order, laws)
 
 
-def _kinds(system: System) -> Kinds:
-    contacts = [joint for _, joint, _, _ in system.contacts]
+def _kinds(system: System, laws: tuple[Resolved, ...]) -> Kinds:
     return Kinds(
         joints=tuple(sorted({link.kind for link in system.links[1:]})),
-        normals=tuple(sorted({c.normal.law for c in contacts})),
-        frictions=tuple(sorted({c.friction.law for c in contacts if c.friction is not None})),
+        contacts=contact_numbers.kinds(system, laws),
         flexible=any(link.flexible for link in system.links),
         closures=bool(system.closures),
     )
@@ -129,26 +132,6 @@ def _link_numbers(link: Link) -> np.ndarray:
         return np.zeros(10)
     mass, com, J = link.inertia
     return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
-
-
-def _contacts(system: System, kinds: Kinds, touching: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
-    rows, reals = [], []
-    for (name, joint, _, _), (socket, ball) in zip(system.contacts, touching, strict=True):
-        place = f"[joint.{name}.normal]"
-        normal = lookup(NORMAL, joint.normal.law, where=place)
-        stiffness = lookup("pipeline.dynamics.contact", joint.type, where=place)(joint)
-        try:
-            parameters = normal.parameters(joint.normal, stiffness)
-        except ValueError as error:
-            raise InputError(place, str(error)) from None
-        friction_kind, friction = -1, (0.0, 0.0, 0.0, 0.0)
-        if joint.friction is not None:
-            friction_kind = kinds.frictions.index(joint.friction.law)
-            law = lookup(FRICTION, joint.friction.law, where=f"[joint.{name}.friction]")
-            friction = law.parameters(joint.friction)
-        rows.append((socket, ball, kinds.normals.index(joint.normal.law), friction_kind))
-        reals.append([joint.clearance, joint.ball_radius, joint.floor, *parameters, *friction])
-    return wiring.integers(rows, 4), np.array(reals, dtype=float).reshape(-1, 11)
 
 
 def _drives(system: System) -> tuple[np.ndarray, np.ndarray]:
@@ -195,10 +178,9 @@ def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
                 floors.append(L * mass**0.5)
                 target[first : first + layout.modes[i]] = len(floors) - 1
     groups = [*q_group, *v_group]
-    energy = _mass(layout.system) * L**2
-    for _ in range(tables.CONTACT_LOSS + 2 * len(layout.system.contacts)):
-        floors.append(energy)
-        groups.append(len(floors) - 1)
+    for floor, count in contact_numbers.ledger_groups(layout.system, _mass(layout.system) * L**2):
+        floors.append(floor)
+        groups += [len(floors) - 1] * count
     return np.array(groups, dtype=np.int64), np.array(floors)
 
 

@@ -119,7 +119,8 @@ class Method:
     """What the stepper needs of a Runge-Kutta method.
 
     slopes: rows of SLOPES.  last: row of the slope at the step's end.  dense: rows of DENSE.
-    extra: evaluations that the dense output costs.
+    extra: evaluations that the dense output costs.  stability: reach of the region of stability
+    along the negative real axis; a step beyond it is limited by stiffness.
     """
 
     slopes: int
@@ -130,6 +131,8 @@ class Method:
     compose: Callable
     error: Callable
     interpolate: Callable
+    stability: float
 
 
-METHOD = Method(EXTENDED + 1, STAGES, 8, EXTENDED - STAGES - 1, ERROR_ORDER, compose, error, interpolate)
+# 6.1: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
+METHOD = Method(EXTENDED + 1, STAGES, 8, EXTENDED - STAGES - 1, ERROR_ORDER, compose, error, interpolate, 6.1)

@@ -101,7 +101,7 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
         return engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
 
     y = project(engine, initial.given_velocities(built, frames, y))
-    _refuse_penetration(engine, y)
+    starting_contacts(engine, y)
     return y, residual
 
 
@@ -117,17 +117,27 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     return seen["state"][0].copy()
 
 
-def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
-    engine.evaluate(y, engine.start)
+def starting_contacts(engine: Engine, y: np.ndarray) -> list[int]:
+    """Contacts whose surfaces overlap at the start, by number; InputError for those with no declared approach speed."""
     contacts = engine.built.system.contacts
+    if not contacts:
+        return []
+    engine.evaluate(y, engine.start)
     touches = engine.view("TOUCH", TOUCH_SIZE * len(contacts)).reshape(-1, TOUCH_SIZE)
-    for (name, joint, _, _), touch in zip(contacts, touches, strict=True):
-        if touch[GAP] < -1e-9 * joint.clearance:
+    found = []
+    for c, (name, joint, _, _) in enumerate(contacts):
+        gap = touches[c, GAP]
+        if gap >= -1e-9 * joint.clearance:
+            continue
+        if joint.initial_approach_speed is None:
             raise InputError(
                 f"[joint.{name}]",
-                f"ball and socket start {-touch[GAP]:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
-                "move a body, or enlarge the clearance",
+                f"its surfaces start {-gap:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
+                "move a body, enlarge the clearance, or declare the speed at which this contact began as "
+                "initial_approach_speed",
             )
+        found.append(c)
+    return found
 
 
 def observe(engine: Engine, rows: np.ndarray) -> dict[str, np.ndarray]:

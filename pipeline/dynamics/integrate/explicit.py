@@ -19,6 +19,7 @@ from pipeline.dynamics.integrate.state import (
     DRIFT,
     END,
     EVALUATIONS,
+    EVENTS_OF_A_CONTACT,
     FRESH,
     FULL,
     LAST_NORM,
@@ -37,11 +38,14 @@ from pipeline.dynamics.integrate.state import (
     SEGMENT_END,
     SPAN,
     STATUS,
+    STEEPEST,
     STEP,
     STEP_TOO_SMALL,
     STEPS,
+    STIFF_STEPS,
     TIME,
 )
+from pipeline.dynamics.integrate.stiffness import steepness
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -165,6 +169,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
     """
     attempt, extend = method.compose(evaluate)
     error, interpolate, last, extra = method.error, method.interpolate, method.last, method.extra
+    stability = method.stability
     exponent = -1.0 / (method.error_order + 1)
     remembering = exponent + 0.2 * MEMORY
     start_watch, make_settle = contact_events
@@ -181,7 +186,10 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
-        elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:
+        elif (
+            n[N_RECORDED] + waiting + ROOM > rows.shape[0]
+            or n[N_EVENTS] + ROOM + EVENTS_OF_A_CONTACT * h[N_CONTACTS] > events.shape[0]
+        ):
             n[STATUS] = FULL
         else:
             return False
@@ -227,7 +235,13 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         norm = error(h, w, step)
         if not norm <= 1.0:
             return min(norm, 1e9) if norm == norm else 1e9
-        return norm if finish(h, f, w, n, t_new) else 1e9
+        if not finish(h, f, w, n, t_new):
+            return 1e9
+        rate, c = steepness(h, w, last), h[CONTROL]
+        w[index(c + STEEPEST)] = max(w[index(c + STEEPEST)], rate)
+        if rate * step > stability:
+            n[STIFF_STEPS] += 1
+        return norm
 
     @kernel
     def accept(h, w, t_new):

@@ -11,9 +11,15 @@ Each module holds one class with
 KIND = "joint type"
 NAMES = {
     "fixed": "fixed:Fixed",
+    "planar": "planar:Planar",
     "prismatic": "prismatic:Prismatic",
     "revolute": "revolute:Revolute",
     "spherical": "spherical:Spherical",
     "free": "free:Free",
 }
-CONTACTS = {"clearance-spherical": "clearance_spherical:ClearanceSpherical"}
+CONTACTS = {
+    "clearance-spherical": "clearance_spherical:ClearanceSpherical",
+    "clearance-revolute": "clearance_revolute:ClearanceRevolute",
+}
+#: the ideal joint that a clearance joint keeps beside its contact
+HELD = {"clearance-revolute": "planar"}

@@ -14,18 +14,29 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics.record import ledger
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.tables import (
-    CONTACT_LOSS,
     FRICTION_POWER,
     GAP,
     NORMAL_FORCE,
     RATE,
+    SLIP,
     TOUCH_FORCE,
     TOUCH_OFFSET,
     TOUCH_SIZE,
 )
+
+#: event kinds by their flag values; 0 and 1 as ever
+EVENT_KINDS = ("opening", "closing", "compression", "sticking", "slipping")
+_FLAGS = {
+    state.OPENING: "opening",
+    state.CLOSING: "closing",
+    state.COMPRESSION: "compression",
+    state.STICKING: "sticking",
+    state.SLIPPING: "slipping",
+}
 
 Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -42,13 +53,13 @@ def dataset(built: Tables, trajectory: Trajectory, seen: Seen, start_residual: f
     if built.system.contacts:
         _contacts(built, seen, variables, coordinates)
         _events(trajectory, variables)
-    _ledger(built, seen, variables)
+    variables.update(ledger.series(built, seen))
     made = xr.Dataset(variables, coords=coordinates)
-    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual))
+    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual), **_told(built, trajectory))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
-            "flag_values": np.array([0, 1], dtype=np.int8),
-            "flag_meanings": "opening closing",
+            "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
+            "flag_meanings": " ".join(EVENT_KINDS),
         }
     return result
 
@@ -67,9 +78,37 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
+def _told(built: Tables, trajectory: Trajectory) -> dict[str, str]:
+    """Laws of the contacts, and in words where the run left the range of one."""
+    if not built.system.contacts:
+        return {}
+    from pipeline.dynamics.contact import validity
+
+    return {
+        "contacts": validity.laws(built.system.contacts, built.laws),
+        "warnings": "\n".join(contact_warnings(built, trajectory)),
+    }
+
+
+def contact_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
+    """Sentences about contacts that left the range for which their laws were made."""
+    if not built.system.contacts:
+        return []
+    from pipeline.dynamics.contact import validity
+
+    e, found = trajectory.events, []
+    for c, ((name, joint, _, _), law) in enumerate(zip(built.system.contacts, built.laws, strict=True)):
+        mine = e[e[:, state.EVENT_CONTACT] == c]
+        depth, force = np.fmax.reduce(mine[:, [state.PEAK_DEPTH, state.PEAK_FORCE]], axis=0, initial=0.0)
+        found += validity.warnings(name, joint, law, float(depth), float(force))
+    return found
+
+
 def _report(trajectory: Trajectory, start_residual: float) -> dict[str, float | int]:
     return {
         **trajectory.counters,
+        "stiff_share": trajectory.counters["stiff_steps"] / max(1, trajectory.counters["steps"]),
+        "largest_rate": trajectory.steepest,
         "largest_drift_before_projection": trajectory.drift,
         "closure_residual_of_given_start": start_residual,
     }
@@ -139,10 +178,12 @@ def _contacts(built: Tables, seen: Seen, variables: Variables, coordinates: dict
         "contact_rate": touch[..., RATE],
         "contact_normal_force": touch[..., NORMAL_FORCE],
         "contact_friction_power": touch[..., FRICTION_POWER],
+        "contact_sliding_speed": touch[..., SLIP],
     }
     variables.update({name: (("time", "contact"), values) for name, values in scalars.items()})
     for name, o in (("contact_force", TOUCH_FORCE), ("contact_offset", TOUCH_OFFSET)):
         variables[name] = (("time", "contact", "axis"), touch[..., o : o + 3])
+    variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in built.laws]))
 
 
 def _events(trajectory: Trajectory, variables: Variables) -> None:
@@ -150,29 +191,10 @@ def _events(trajectory: Trajectory, variables: Variables) -> None:
     columns = {
         "event_time": e[:, state.EVENT_TIME],
         "event_contact": e[:, state.EVENT_CONTACT].astype(np.int32),
-        "event_kind": (e[:, state.EVENT_KIND] == state.CLOSING).astype(np.int8),
+        "event_kind": np.array([EVENT_KINDS.index(_FLAGS[int(k)]) for k in e[:, state.EVENT_KIND]], dtype=np.int8),
         "event_approach_speed": e[:, state.SPEED],
         "event_peak_force": e[:, state.PEAK_FORCE],
         "event_peak_penetration": e[:, state.PEAK_DEPTH],
         "event_duration": e[:, state.DURATION],
     }
     variables.update({name: (("event",), values) for name, values in columns.items()})
-
-
-def _ledger(built: Tables, seen: Seen, variables: Variables) -> None:
-    ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
-    kinetic, potential, elastic = seen["energy"].T
-    # ledger: work of the drives, loss of modal damping, then per contact its normal and friction losses
-    assert ledger.shape[1] == CONTACT_LOSS + 2 * len(built.system.contacts)
-    work, dissipated = ledger[:, 0], ledger[:, 1:].sum(axis=1)
-    balance = kinetic + potential + elastic + dissipated - work
-    series = {
-        "kinetic": kinetic,
-        "potential": potential,
-        "elastic": elastic,
-        "dissipated": dissipated,
-        "drive_work": work,
-        "energy_error": balance - balance[0],
-        "constraint_error": seen["residual"][:, 0],
-    }
-    variables.update({name: (("time",), values) for name, values in series.items()})

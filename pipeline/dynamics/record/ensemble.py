@@ -7,6 +7,7 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -18,9 +19,10 @@ from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, project
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
 from pipeline.dynamics.record.dataset import attributes
+from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run import engine_of, observed
-from pipeline.dynamics.tables import BALL, FRAME_SIZE, NORMAL_FORCE, SOCKET, TOUCH_OFFSET, TOUCH_SIZE, VELOCITY
+from pipeline.dynamics.tables import FRAME_SIZE, INNER, NORMAL_FORCE, OUTER, TOUCH_OFFSET, TOUCH_SIZE, VELOCITY
 
 #: approach speed above which a closing counts as an impact [m/s]
 IMPACT = 1e-4
@@ -84,7 +86,7 @@ def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
     sites = engine.view("SITE_FRAMES", FRAME_SIZE * engine.built.packed.sizes["N_SITES"]).reshape(-1, FRAME_SIZE)
     table = engine.built.packed.table("CONTACTS")
     return np.concatenate(
-        [sites[b, VELOCITY : VELOCITY + 3] - sites[s, VELOCITY : VELOCITY + 3] for s, b in table[:, [SOCKET, BALL]]]
+        [sites[b, VELOCITY : VELOCITY + 3] - sites[a, VELOCITY : VELOCITY + 3] for a, b in table[:, [OUTER, INNER]]]
     )
 
 
@@ -105,8 +107,9 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     regular = output_times(engine.breaks, scene.output.interval)
     rows = np.searchsorted(trajectory.time, regular)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = Trajectory(trajectory.rows[rows], trajectory.events, trajectory.counters, trajectory.drift)
+    kept = replace(trajectory, rows=trajectory.rows[rows])
     seen = observed(engine, kept)
+    require_closed(engine.built, kept, seen)
     motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
     chosen = [motions[n] for n in names]
     touch = seen["touch"].reshape(len(rows), -1, TOUCH_SIZE)
