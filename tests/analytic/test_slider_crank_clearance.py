@@ -34,7 +34,7 @@ def test_contacts_begin_and_end_when_and_as_hard_as_in_the_plane() -> None:
     assert time[begin] == pytest.approx([i.start for i in known()], abs=1e-9)
     assert time[end] == pytest.approx([i.end for i in known()], abs=1e-9)
     assert speed[begin] == pytest.approx([i.approach for i in known()], rel=1e-6)
-    assert -speed[end] == pytest.approx([i.separation for i in known()], rel=1e-5)
+    assert speed[end] == pytest.approx([i.separation for i in known()], rel=1e-5)
 
 
 def test_largest_force_and_penetration_are_those_in_the_plane() -> None:
