@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.core.scene.fields import Length, Mass, Number, Part, Pressure, Speed
+from pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Pressure, Speed
 
-FrameName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*\.[A-Za-z_]\w*$", description="body.FRAME")]
 Positive = Field(gt=0.0)
 Share = Field(ge=0.0, le=1.0)
 

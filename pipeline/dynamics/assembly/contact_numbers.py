@@ -75,6 +75,11 @@ def ledger_groups(system: System, energy: float) -> list[tuple[float, int]]:
     return ledger + [(size, 3) for size in _bristles(system) if size is not None]
 
 
+def ledger_size(system: System) -> int:
+    """Variables of the ledger up to the contacts' and their bristles, where those of the loads begin."""
+    return sum(count for _, count in ledger_groups(system, 0.0))
+
+
 def bristle_places(layout: Layout) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
     place = layout.nq + layout.nv + tables.CONTACT_LOSS + 2 * len(layout.system.contacts)

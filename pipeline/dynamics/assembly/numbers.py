@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipeline.core.registry import lookup
-from pipeline.dynamics.assembly import contact_numbers, wiring
+from pipeline.dynamics.assembly import contact_numbers, loading, wiring
 from pipeline.dynamics.assembly import flexible_numbers as flexible
+from pipeline.dynamics.assembly import laws as lawful
 from pipeline.dynamics.assembly.contact_numbers import ContactKinds
+from pipeline.dynamics.assembly.driving import drive_laws, joint_class
 from pipeline.dynamics.assembly.layout import Layout, number
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.packing import Packed, pack
 from pipeline.dynamics.assembly.system import Link, System
-from pipeline.dynamics.assembly.tree import joint_class
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate.method import Method
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
 
 INTEGRATORS = "pipeline.dynamics.integrate"
+NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,8 @@ class Kinds:
     contacts: ContactKinds
     flexible: bool
     closures: bool
+    harmonics: bool = False
+    loads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -44,29 +52,39 @@ class Tables:
     layout: Layout
     kinds: Kinds
     packed: Packed
+    method: Method
     closure_order: np.ndarray
     laws: tuple[Resolved, ...]
 
 
-def tabulate(system: System) -> Tables:
-    """Number a system and fill its tables."""
+def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
+    """Number a system and fill its tables; `given`: laws of prescribed coordinates that replace the scene's."""
     layout = number(system)
-    laws = contact_numbers.resolve(system)
-    kinds = _kinds(system, laws)
-    site_pairs = [(e.kind, layout.add_site(a), layout.add_site(b)) for e, a, b in system.closures]
-    touching = [(layout.add_site(a), layout.add_site(b)) for _, _, a, b in system.contacts]
+    normals = contact_numbers.resolve(system)
+    site_pairs = [(e.kind, layout.site(a), layout.site(b)) for e, a, b in system.closures]
+    touching = [(layout.site(a), layout.site(b)) for _, _, a, b in system.contacts]
     closing = wiring.closures(layout, site_pairs)
     order = closing.pop("order")
+    loaded = loading.tabulate(system, layout)
     flexible_wiring, flexible_numbers = flexible.fill(layout)
-    contacts, numbers_of_contacts = contact_numbers.fill(layout, kinds.contacts, laws, touching)
-    drives, pieces = _drives(system)
-    groups, floors = _error_groups(layout)
+    laws = drive_laws(system.scene, given)
+    signs = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}
+    signed = [law.times(signs[name]) for name, law in zip(system.drives, laws, strict=True)]
+    law_wiring, law_numbers = lawful.fill([*signed, *loaded.laws])
+    turns, slot = loaded.turns, contact_numbers.ledger_size(system)
+    loads = loading.LEDGER if system.scene.forces() else 0
+    groups, floors = _error_groups(layout, loads, turns)
     sites = [(s.link, layout.port_of(k)) for k, s in enumerate(layout.sites)]
     method = lookup(INTEGRATORS, system.scene.solver.integrator, where="[solver.integrator]")
+    kinds = _kinds(system, normals, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
+    contacts, numbers_of_contacts = contact_numbers.fill(layout, kinds.contacts, normals, touching)
     packed = pack(
         {
             "NQ": layout.nq,
-            "N_LEDGER": len(groups) - layout.nq - layout.nv,
+            "N_LEDGER": slot + loads + turns,
+            "N_DRIVES": layout.known,
+            "N_TURNS": turns,
+            "LOAD_SLOT": slot,
             "MOST_MODES": max(layout.modes.values(), default=0),
         },
         {
@@ -76,7 +94,8 @@ def tabulate(system: System) -> Tables:
             **wiring.mass_entries(layout),
             **closing,
             "CONTACTS": contacts,
-            "DRIVES": drives,
+            **law_wiring,
+            **loaded.wiring,
             "GROUPS": groups,
         },
         {
@@ -84,30 +103,26 @@ def tabulate(system: System) -> Tables:
             "SITE_NUMBERS": np.array([_pose_row(s.place) for s in layout.sites]),
             **flexible_numbers,
             "CONTACT_NUMBERS": numbers_of_contacts,
-            "PIECES": pieces,
-            "GRAVITY": _gravity(system),
+            **law_numbers,
+            **loaded.numbers,
+            "GRAVITY": loading.gravity(system.scene),
             "FLOORS": floors,
         },
-        method.slopes,
-        method.dense,
+        method,
         layout.columns,
     )
-    return Tables(system, layout, kinds, packed, order, laws)
+    return Tables(system, layout, kinds, packed, method, order, normals)
 
 
-def _kinds(system: System, laws: tuple[Resolved, ...]) -> Kinds:
+def _kinds(system: System, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Kinds:
     return Kinds(
         joints=tuple(sorted({link.kind for link in system.links[1:]})),
-        contacts=contact_numbers.kinds(system, laws),
+        contacts=contact_numbers.kinds(system, normals),
         flexible=any(link.flexible for link in system.links),
         closures=bool(system.closures),
+        harmonics=harmonics,
+        loads=loads,
     )
-
-
-def _gravity(system: System) -> np.ndarray:
-    if not system.scene.load:
-        return np.zeros(3)
-    return lookup("pipeline.dynamics.loads", "gravity", where="[load]")(system.scene)
 
 
 def _pose_row(place: Placement) -> np.ndarray:
@@ -134,26 +149,12 @@ def _link_numbers(link: Link) -> np.ndarray:
     return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
 
-def _drives(system: System) -> tuple[np.ndarray, np.ndarray]:
-    rows: list[tuple[int, int]] = []
-    pieces: list[np.ndarray] = []
-    for drive in system.scene.drive.values():
-        law = lookup("pipeline.dynamics.drives", drive.law.type, where="[drive]")
-        table = law(drive.law).copy()
-        branch = next(b.branch for b in system.links if b.branch.edge and b.branch.edge.name == drive.joint)
-        if branch.reverse:
-            table[:, 1:] *= -1.0  # the tree meets this joint from its second frame
-        rows.append((sum(len(p) for p in pieces), len(table)))
-        pieces.append(table)
-    stacked = np.concatenate(pieces) if pieces else np.zeros((0, 7))
-    return wiring.integers(rows, 2), np.ascontiguousarray(stacked)
-
-
-def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+def _error_groups(layout: Layout, loads: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and the floor below which a group is resolved absolutely.
 
     A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
+    loads: number of the loads' energies; turns: number of angles after them.
     """
     L = layout.system.length
     groups: list[int] = []
@@ -178,7 +179,9 @@ def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
                 floors.append(L * mass**0.5)
                 target[first : first + layout.modes[i]] = len(floors) - 1
     groups = [*q_group, *v_group]
-    for floor, count in contact_numbers.ledger_groups(layout.system, _mass(layout.system) * L**2):
+    energy = _mass(layout.system) * L**2
+    tail = [*contact_numbers.ledger_groups(layout.system, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * turns]
+    for floor, count in tail:
         floors.append(floor)
         groups += [len(floors) - 1] * count
     return np.array(groups, dtype=np.int64), np.array(floors)

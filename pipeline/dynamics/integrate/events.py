@@ -131,7 +131,7 @@ def make_settle(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any, regimes: Callable
 ) -> Callable:
     """The kernel settle(h, f, w, n, step, t_new, events) -> (event?, dense output ready?, end, step)."""
-    interpolate, last, extra = method.interpolate, method.last, method.extra
+    interpolate, last = method.interpolate, method.last
     spare = method.slopes - 1  # row of SLOPES that no stage uses
 
     @kernel
@@ -206,7 +206,7 @@ def make_settle(
         """Repeat the step so that it ends on the event; its length, or -1 when it cannot be done."""
         o, slope = h[CONTROL], h[SLOPES] + h[NY] * last
         for _ in range(3):
-            n[EVALUATIONS] += last
+            n[EVALUATIONS] += 1
             if not attempt(h, f, w, n, step):
                 return -1.0
             t = w[o + TIME] + step
@@ -230,7 +230,6 @@ def make_settle(
                 continue
             if not ready:
                 extend(h, f, w, n, step)
-                n[EVALUATIONS] += extra
                 ready = True
             theta = find(h, f, w, n, step, c)
             if theta < first:
@@ -270,7 +269,6 @@ def make_settle(
             return -1, ready, t_new, step
         remember_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
-        n[EVALUATIONS] += extra
         trace(h, f, w, n, length, True, events)
         switch(h, w, n, events, which, t + length)
         return 1, True, t + length, length

@@ -11,8 +11,9 @@ from pipeline.dynamics.tables import STATE as LAST
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
-# accepted step, largest growth of the next (1 after a rejection), largest rate of the equations that a step met
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, STEEPEST, N_CONTROLS = range(11)
+# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter,
+# largest rate of the equations that a step met
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, STEEPEST, N_CONTROLS = range(13)
 # integers
 (
     STATUS,
@@ -27,12 +28,15 @@ TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, STEEPEST, N_
     FRESH,
     IMMEDIATE,
     PROJECTIONS,
+    PROJECTION_EVALUATIONS,
+    JACOBIANS,
     CULPRIT,
     STIFF_STEPS,
     INTEGERS,
-) = range(LAST + 1, LAST + 16)
+) = range(LAST + 1, LAST + 18)
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
+NOT_A_NUMBER, NO_CONVERGENCE = 8, 9
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING, COMPRESSION, STICKING, SLIPPING = range(5)

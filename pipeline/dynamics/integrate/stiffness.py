@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
-from pipeline.dynamics.tables import GROUPS, MAGNITUDE, NQ, NV, NY, SLOPES, Y_NEW, Y_STAGE
+from pipeline.dynamics.integrate.state import STEEPEST, STIFF_STEPS
+from pipeline.dynamics.tables import CONTROL, GROUPS, MAGNITUDE, NQ, NV, NY, SLOPES, Y_NEW, Y_STAGE
 from pipeline.dynamics.vectors import index, kernel
 
 #: changes of state below this share of the tolerance are rounding, from which no rate can be told
@@ -39,3 +43,24 @@ def steepness(h, w, last):
     if not positions > FELT * np.sqrt(h[NQ]):
         return rate
     return min(rate, np.sqrt(rate * difference(h, w, 0, h[NQ], end, stage) / positions))
+
+
+@kernel
+def unfelt(h, w, n, step):
+    """An implicit method, or one whose stages do not tell."""
+
+
+def detect(method: Any) -> Callable:
+    """The kernel feel(h, w, n, step) after an accepted step: notes its steepness, and whether that limits the step."""
+    if method.stability is None:
+        return unfelt
+    last, reach = method.last, method.stability
+
+    @kernel
+    def feel(h, w, n, step):
+        rate, c = steepness(h, w, last), h[CONTROL]
+        w[index(c + STEEPEST)] = max(w[index(c + STEEPEST)], rate)
+        if rate * step > reach:
+            n[STIFF_STEPS] += 1
+
+    return feel

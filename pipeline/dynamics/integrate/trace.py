@@ -108,7 +108,7 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
 
     peek(h, f, w, n, step, theta): evaluates the state at a share of the step.
     """
-    last, spare, extra = method.last, method.slopes - 1, method.extra
+    last, spare = method.last, method.slopes - 1
 
     @kernel
     def feel_trends(h, f, w, n, step):
@@ -226,7 +226,6 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
             passes = changes_regime(h, f, w, c)
             if (turns or peaks or passes) and not ready:
                 extend(h, f, w, n, step)
-                n[EVALUATIONS] += extra
                 ready = True
             if peaks:
                 event[PEAK_FORCE] = max(event[PEAK_FORCE], top(h, f, w, n, step, c))

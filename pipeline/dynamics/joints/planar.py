@@ -1,16 +1,24 @@
-"""Sliding in a plane: two translations along x and y, one rotation about z of the first frame."""
+"""Sliding in the plane of x and y of the first frame, and turning about z."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.tables import J_ACCELERATION, J_ALPHA, J_COLUMNS, J_OMEGA, J_POSITION, J_VELOCITY
+from pipeline.dynamics.joints.coordinate import ROTATION, Coordinate
+from pipeline.dynamics.tables import (
+    J_ACCELERATION,
+    J_ALPHA,
+    J_COLUMNS,
+    J_OMEGA,
+    J_POSITION,
+    J_VELOCITY,
+)
 from pipeline.dynamics.vectors import kernel
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
-    """Motion of frame G in frame F: x, y metres, then radians about z (see `spherical.motion`)."""
+    """Motion of frame G in frame F: x metres along x and y of F, radians about z (see `spherical.motion`)."""
     for k in range(J_COLUMNS + 18):
         w[joint + k] = 0.0
     cosine, sine = np.cos(w[x + 2]), np.sin(w[x + 2])
@@ -20,19 +28,19 @@ def motion(w, x, u, du, joint, rate):
         w[joint + J_VELOCITY + k] = w[u + k]
         w[joint + J_ACCELERATION + k] = w[du + k]
         w[joint + J_COLUMNS + 7 * k + 3] = 1.0
-    w[joint + J_OMEGA + 2] = w[u + 2]
-    w[joint + J_ALPHA + 2] = w[du + 2]
-    w[joint + J_COLUMNS + 14] = 1.0
-    for k in range(3):
         w[rate + k] = w[u + k]
+    w[joint + J_OMEGA + 2] = w[rate + 2] = w[u + 2]
+    w[joint + J_ALPHA + 2] = w[du + 2]
+    w[joint + J_COLUMNS + 12 + 2] = 1.0
 
 
 class Planar:
-    """Two displacements and one rotation are free."""
+    """Two displacements and the rotation about their normal are free."""
 
     POSITIONS, SPEEDS = "ttr", "ttr"  #: r: rotation [rad or -], t: translation [m]
     TRANSLATIONS: tuple[int, ...] = (2,)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
+    COORDINATES = (Coordinate("x", False, axis=0), Coordinate("y", False, axis=1), ROTATION)
     motion = staticmethod(motion)
 
     @staticmethod

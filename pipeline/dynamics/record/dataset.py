@@ -11,12 +11,15 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly.loading import order
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.record import ledger
+from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.wrenches import joint_wrenches
+from pipeline.dynamics.run import Run
 from pipeline.dynamics.tables import (
     FRICTION_POWER,
     GAP,
@@ -42,20 +45,27 @@ Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
-def dataset(built: Tables, trajectory: Trajectory, seen: Seen, start_residual: float) -> xr.Dataset:
-    """All that DESIGN promises of a run; `seen` holds the observed rows of the trajectory."""
-    scene = built.system.scene
+def dataset(run: Run) -> xr.Dataset:
+    """All that is recorded of a run (schema RUN)."""
+    built, trajectory, seen = run.engine.built, run.trajectory, run.observed
     variables: Variables = {}
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
     _modes(built, seen, variables, coordinates)
     _drives(built, seen, variables, coordinates)
+    _joint_coordinates(built, seen, variables, coordinates)
+    if built.system.scene.forces():
+        _loads(built, seen, variables, coordinates)
     if built.system.contacts:
         _contacts(built, seen, variables, coordinates)
         _events(trajectory, variables)
+    if run.twin is not None:
+        coordinates["twin_time"] = run.twin.time
+        variables["twin_separation"] = (("twin_time",), run.twin.separation)
+        variables["horizon"] = ((), np.array(run.twin.horizon))
     variables.update(ledger.series(built, seen))
     made = xr.Dataset(variables, coords=coordinates)
-    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual), **_told(built, trajectory))
+    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_told(built, trajectory))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
@@ -104,14 +114,16 @@ def contact_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
     return found
 
 
-def _report(trajectory: Trajectory, start_residual: float) -> dict[str, float | int]:
-    return {
-        **trajectory.counters,
-        "stiff_share": trajectory.counters["stiff_steps"] / max(1, trajectory.counters["steps"]),
-        "largest_rate": trajectory.steepest,
-        "largest_drift_before_projection": trajectory.drift,
-        "closure_residual_of_given_start": start_residual,
+def _report(run: Run) -> dict[str, float | int]:
+    counters = run.trajectory.counters
+    found: dict[str, float | int] = {
+        **counters,
+        "stiff_share": counters["stiff_steps"] / max(1, counters["steps"]),
+        "largest_rate": run.trajectory.steepest,
+        "largest_drift_before_projection": run.trajectory.drift,
+        "closure_residual_of_given_start": run.start_residual,
     }
+    return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
 
 
 def _motion(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
@@ -162,11 +174,26 @@ def _drives(built: Tables, seen: Seen, variables: Variables, coordinates: dict[s
     names = built.system.drives
     if not names:
         return
-    branches = {b.edge.name: b for b in (link.branch for link in built.system.links) if b.edge is not None}
-    signs = np.array([-1.0 if branches[built.system.scene.drive[n].joint].reverse else 1.0 for n in names])
+    sign_of = {name: link.stage.sign for link in built.system.links if link.stage for name in link.drives}
+    signs = np.array([sign_of[name] for name in names])
     coordinates["drive"] = names
     variables["drive_force"] = (("time", "drive"), signs * seen["drive_force"])
     variables["drive_position"] = (("time", "drive"), signs * seen["coordinate"][:, built.layout.nq :])
+
+
+def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+    found = joint_coordinates(built, seen)
+    if found:
+        coordinates["coordinate"] = list(found)
+        for k, name in enumerate(("joint_position", "joint_velocity", "joint_acceleration")):
+            variables[name] = (("time", "coordinate"), np.stack([series[k] for series in found.values()], axis=1))
+
+
+def _loads(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+    from pipeline.dynamics.record.loads import load_series
+
+    coordinates["load"] = order(built.system.scene)
+    variables.update(load_series(built, seen))
 
 
 def _contacts(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:

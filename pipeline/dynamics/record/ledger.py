@@ -27,6 +27,11 @@ def series(built: Tables, seen: Seen) -> Variables:
     work, modal = ledger[:, DRIVE_WORK], ledger[:, MODAL_LOSS]
     dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
     balance = kinetic + potential + elastic + dissipated - work
+    loaded: Variables = {}
+    if built.system.scene.forces():
+        load_work, load_loss = ledger[:, built.packed.sizes["LOAD_SLOT"] :].T[:2]
+        dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
+        loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
     found: Variables = {
         "kinetic": (("time",), kinetic),
         "potential": (("time",), potential),
@@ -35,6 +40,7 @@ def series(built: Tables, seen: Seen) -> Variables:
         "drive_work": (("time",), work),
         "energy_error": (("time",), balance - balance[0]),
         "constraint_error": (("time",), seen["residual"][:, 0]),
+        **loaded,
     }
     if built.layout.modes:
         found["modal_damping_loss"] = (("time",), modal)
@@ -49,9 +55,10 @@ def require_closed(built: Tables, trajectory: Trajectory, seen: Seen) -> None:
     """SolverError when the ledger is off by more than the scene's tolerance times the energy turned over."""
     found = {name: values for name, (_, values) in series(built, seen).items()}
     error = np.abs(found["energy_error"])
-    turned = max(float(np.ptp(found[n])) for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work"))
+    turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in found]
+    turned = max(float(np.ptp(found[n])) for n in turning)
     turned = max(turned, float(found["kinetic"].max()))
-    largest = max(float(np.abs(found[n]).max()) for n in ("kinetic", "potential", "elastic", "drive_work"))
+    largest = max(float(np.abs(found[n]).max()) for n in turning)
     tolerance = built.system.scene.solver.ledger_tolerance
     worst = int(np.argmax(error)) if np.isfinite(error).all() else int(np.argmin(np.isfinite(error)))
     if error[worst] <= tolerance * turned + ROUNDING * largest:
@@ -72,4 +79,6 @@ def _losses(built: Tables, found: dict[str, np.ndarray], k: int) -> str:
             parts.append(f"{found[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
     if "modal_damping_loss" in found:
         parts.append(f"{found['modal_damping_loss'][k]:.3g} J to modal damping")
+    if "load_loss" in found:
+        parts.append(f"{found['load_loss'][k]:.3g} J to the loads")
     return ", ".join(parts) or "nothing"
