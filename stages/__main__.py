@@ -9,6 +9,7 @@ import argparse
 import json
 import os
 import sys
+from functools import partial
 from pathlib import Path
 
 from pipeline.core.errors import FlexclearError, InputError
@@ -38,7 +39,10 @@ def parser() -> argparse.ArgumentParser:
     """The command line: one sub-command per verb."""
     from stages.graph import STAGES
 
-    top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    # one line per command, whatever the terminal
+    wide = partial(argparse.HelpFormatter, max_help_position=24, width=100)
+    about = "Flexible multibody mechanisms with joint clearance."
+    top = argparse.ArgumentParser(prog="flexclear", description=about, formatter_class=wide)
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     command = _verb(verbs, "run", _run, "bring scenes up to date")
