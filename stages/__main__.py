@@ -9,7 +9,6 @@ import argparse
 import json
 import os
 import sys
-from functools import partial
 from pathlib import Path
 
 from pipeline.core.errors import FlexclearError, InputError
@@ -39,10 +38,7 @@ def parser() -> argparse.ArgumentParser:
     """The command line: one sub-command per verb."""
     from stages.graph import STAGES
 
-    # one line per command, whatever the terminal
-    wide = partial(argparse.HelpFormatter, max_help_position=24, width=100)
-    about = "Flexible multibody mechanisms with joint clearance."
-    top = argparse.ArgumentParser(prog="flexclear", description=about, formatter_class=wide)
+    top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     command = _verb(verbs, "run", _run, "bring scenes up to date")
