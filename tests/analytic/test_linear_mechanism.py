@@ -37,7 +37,8 @@ def test_a_vibration_let_loose_swings_as_its_frequency_and_shape_say(number: int
     known = found.at.moves @ w * speed / omega
     assert moved == pytest.approx(known, abs=1e-4 * np.abs(known).max())
     stopped = done.rows[-1, 1 + nq : 1 + nq + nv]
-    assert np.abs(stopped).max() < 1e-4 * speed * np.abs(w).max()
+    # what is of second order in the swing shakes the stiff rod: some 1e-4 of the speed in the slowest vibration
+    assert np.abs(stopped).max() < 1e-3 * speed * np.abs(w).max()
 
 
 @pytest.mark.slow
