@@ -55,7 +55,9 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
     """
     study: Any = import_module("stages.cost")
     run_: Any = import_module("stages.run")
-    dataset: xr.Dataset = study.bring(load_scene(scene) if isinstance(scene, (str, Path)) else scene, run_.workplace())[0]
+    dataset: xr.Dataset = study.bring(load_scene(scene) if isinstance(scene, (str, Path)) else scene, run_.workplace())[
+        0
+    ]
     return dataset
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stages.families import module
+from stages.families import constants, module
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,14 @@ KERNELS = (
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
 STIFFENING_KERNELS = ("bodies.shortening",)
-CONTACT_KERNELS = ("integrate.events",)
+CONTACT_KERNELS = (
+    "contact.forces",
+    "contact.form.elastic",
+    "contact.form.hysteretic",
+    "contact.form.linear_damper",
+    "contact.validity",
+    "integrate.events",
+)
 #: of scenes with contacts that are noticed at step ends, and of fixed or chosen steps
 UNLOCATED_KERNELS = ("integrate.step_ends",)
 FIXED_KERNELS, ADAPTIVE_KERNELS = ("integrate.fixed",), ("integrate.adaptive",)
@@ -71,7 +78,10 @@ def modules(scene: Scene) -> tuple[str, ...]:
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"
         found.add(module(joints, joint.type, where=f"[joint.{name}]", table=table))
-    if any(j.type in ("universal", "cylindrical", "planar") for j in scene.joint.values()) or any(
+        if joint.type in constants(joints)["HELD"]:
+            found.add(module(joints, constants(joints)["HELD"][joint.type], where=f"[joint.{name}]"))
+    several = ("universal", "cylindrical", "planar", *constants(joints)["HELD"])
+    if any(j.type in several for j in scene.joint.values()) or any(
         not hasattr(d, "joint") for d in scene.drive.values()
     ):
         found |= {module(joints, name, where="joint") for name in CHAIN}

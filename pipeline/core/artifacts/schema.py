@@ -160,18 +160,38 @@ RUN: Schema = {
         ("time", "load", "axis"), "N", "force of the load on its frame, or its second one, world axes", optional=True
     ),
     "load_moment": _V(
-        ("time", "load", "axis"), "N m", "moment of the load there, about that frame's origin, world axes", optional=True
+        ("time", "load", "axis"),
+        "N m",
+        "moment of the load there, about that frame's origin, world axes",
+        optional=True,
     ),
     "load_length": _V(
         ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
     ),
-    "load_power": _V(("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True),
+    "load_power": _V(
+        ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
+    ),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
     "contact_force": _V(("time", "contact", "axis"), "N", "contact force on the ball, world axes", optional=True),
     "contact_normal_force": _V(("time", "contact"), "N", "normal contact force, >= 0", optional=True),
-    "contact_friction_power": _V(("time", "contact"), "W", "power of the friction force, <= 0", optional=True),
+    "contact_friction_power": _V(("time", "contact"), "W", "minus the power that friction takes, <= 0", optional=True),
+    "contact_sliding_speed": _V(
+        ("time", "contact"), "m s-1", "sliding speed at the contact; 0 without friction or contact", optional=True
+    ),
+    "contact_elastic": _V(("time", "contact"), "J", "energy stored in the contact and its bristles", optional=True),
+    "contact_damping_loss": _V(
+        ("time", "contact"), "J", "energy lost to the normal damping of the contact since the start", optional=True
+    ),
+    "contact_friction_loss": _V(
+        ("time", "contact"), "J", "energy lost to the friction of the contact since the start", optional=True
+    ),
+    "contact_delivered_restitution": _V(
+        ("contact",), "1", "rebound over approach speed that the contact's law gives a free impact", optional=True
+    ),
+    "load_loss": _V(("time",), "J", "energy lost to the loads since the start", optional=True),
+    "modal_damping_loss": _V(("time",), "J", "energy lost to modal damping since the start", optional=True),
     "contact_offset": _V(
         ("time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True
     ),
@@ -194,9 +214,11 @@ RUN: Schema = {
     ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
     "event_contact": _V(("event",), "1", "index of the contact", optional=True),
-    "event_kind": _V(("event",), "1", "closing or opening", optional=True),
+    "event_kind": _V(
+        ("event",), "1", "opening, closing, maximum compression, begin of sticking or slipping", optional=True
+    ),
     "event_approach_speed": _V(
-        ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening", optional=True
+        ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening, 0 at compression", optional=True
     ),
     "event_peak_force": _V(
         ("event",), "N", "largest normal force of the contact that this closing begins", optional=True

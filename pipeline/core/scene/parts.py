@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
+from pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
     Inertia,
-    Length,
     Mass,
     Number,
     Part,
     Pose,
     Position,
-    Pressure,
-    Speed,
     Time,
     Velocity,
 )
@@ -107,64 +105,4 @@ class IdealJoint(Part):
     between: tuple[FrameName, FrameName]
 
 
-class Material(Part):
-    """Elastic constants of a contacting surface."""
-
-    youngs_modulus: Annotated[Pressure, Positive]
-    poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
-
-
-class NormalLaw(Part):
-    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii."""
-
-    law: str
-    restitution: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
-    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
-    stiffness: Annotated[Number, Positive] | None = None
-
-
-class FrictionLaw(Part):
-    """A friction law with the paper's four parameters (Table 6)."""
-
-    law: str
-    static: Annotated[Number, Field(ge=0.0)]
-    dynamic: Annotated[Number, Field(ge=0.0)]
-    v_static: Annotated[Speed, Positive]
-    v_dynamic: Annotated[Speed, Positive]
-
-    @model_validator(mode="after")
-    def _ordered(self) -> FrictionLaw:
-        if not self.v_static < self.v_dynamic:
-            raise ValueError(
-                f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve"
-            )
-        return self
-
-
-class ClearanceSpherical(Part):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame].
-
-    floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
-    for grazing and resting contact.
-    """
-
-    type: Literal["clearance-spherical"]
-    between: tuple[FrameName, FrameName]
-    clearance: Annotated[Length, Positive]
-    ball_radius: Annotated[Length, Positive]
-    socket_material: Material | None = None
-    ball_material: Material | None = None
-    normal: NormalLaw
-    friction: FrictionLaw | None = None
-    floor: Annotated[Speed, Positive] = 1e-6
-
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> ClearanceSpherical:
-        if self.normal.stiffness is None and (self.socket_material is None or self.ball_material is None):
-            raise ValueError(
-                "the contact stiffness is unknown: give socket_material and ball_material, or normal.stiffness"
-            )
-        return self
-
-
-Joint = Annotated[IdealJoint | ClearanceSpherical, Field(discriminator="type")]
+Joint = Annotated[IdealJoint | ClearanceSpherical | ClearanceRevolute, Field(discriminator="type")]
