@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import InputError
-from pipeline.core.scene.parts import ClearanceSpherical
+from pipeline.core.scene.clearance import Clearance
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.chain import Stage, stages
 from pipeline.dynamics.assembly.driving import prescribed
@@ -77,7 +77,7 @@ class System:
     links: list[Link]
     link_of: dict[str, int]
     closures: list[tuple[Edge, Site, Site]]
-    contacts: list[tuple[str, ClearanceSpherical, Site, Site]]
+    contacts: list[tuple[str, Clearance, Site, Site]]
     origin: np.ndarray
     length: float
 

@@ -135,16 +135,25 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     return seen["state"][0].copy()
 
 
-def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
-    engine.evaluate(y, engine.start)
+def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
+    """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
     contacts = engine.built.system.contacts
-    touches = engine.view("TOUCH", TOUCH_SIZE * len(contacts)).reshape(-1, TOUCH_SIZE)
-    for (name, joint, _, _), touch in zip(contacts, touches, strict=True):
-        if touch[GAP] < -1e-9 * joint.clearance:
+    if not contacts:
+        return {}
+    engine.evaluate(y, engine.start)
+    gaps = engine.view("TOUCH", TOUCH_SIZE * len(contacts)).reshape(-1, TOUCH_SIZE)[:, GAP]
+    return {c: -float(gaps[c]) for c, (_, joint, _, _) in enumerate(contacts) if gaps[c] < -1e-9 * joint.clearance}
+
+
+def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
+    for c, depth in overlapping(engine, y).items():
+        name, joint, _, _ = engine.built.system.contacts[c]
+        if joint.initial_approach_speed is None:
             raise InputError(
                 f"[joint.{name}]",
-                f"ball and socket start {-touch[GAP]:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
-                "move a body, or enlarge the clearance",
+                f"its surfaces start {depth:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
+                "move a body, enlarge the clearance, or declare the speed at which this contact began as "
+                "initial_approach_speed",
             )
 
 

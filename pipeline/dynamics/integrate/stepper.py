@@ -20,6 +20,7 @@ from pipeline.dynamics.integrate.state import (
     DRIFT,
     END,
     EVALUATIONS,
+    EVENTS_OF_A_CONTACT,
     FRESH,
     FULL,
     LENGTH,
@@ -31,6 +32,7 @@ from pipeline.dynamics.integrate.state import (
     PAUSED,
     PROJECTION_EVALUATIONS,
     PROJECTIONS,
+    RATE_DRIFT,
     REJECTED,
     ROOM,
     RTOL,
@@ -42,6 +44,7 @@ from pipeline.dynamics.integrate.state import (
     STEPS,
     TIME,
 )
+from pipeline.dynamics.integrate.stiffness import detect
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -57,6 +60,7 @@ from pipeline.dynamics.tables import (
     NY,
     OK,
     RESIDUAL,
+    RESIDUAL_RATE,
     SLOPES,
     Y_NEW,
     Y_STAGE,
@@ -146,6 +150,7 @@ def compose(
     interpolate, last, ends = method.interpolate, method.last, method.ends
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
+    feel = detect(method)
     first_step, judge, after_rejection, next_step = stepping(evaluate, start_watch, begin, error, method)
 
     @kernel
@@ -158,7 +163,10 @@ def compose(
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
-        elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:
+        elif (
+            n[N_RECORDED] + waiting + ROOM > rows.shape[0]
+            or n[N_EVENTS] + ROOM + EVENTS_OF_A_CONTACT * h[N_CONTACTS] > events.shape[0]
+        ):
             n[STATUS] = FULL
         else:
             return False
@@ -191,6 +199,7 @@ def compose(
             n[EVALUATION] = NOT_FINITE
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
+        w[index(c + RATE_DRIFT)] = max(w[index(c + RATE_DRIFT)], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
         used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[index(c + RTOL)] * w[index(c + LENGTH)])
         if used > 0:
             n[EVALUATIONS] += used
@@ -209,7 +218,10 @@ def compose(
             return 1e9
         if norm > 1.0:
             return min(norm, 1e9)
-        return norm if finish(h, f, w, n, t_new) else 1e9
+        if not finish(h, f, w, n, t_new):
+            return 1e9
+        feel(h, w, n, step)
+        return norm
 
     @kernel
     def accept(h, w, t_new):
