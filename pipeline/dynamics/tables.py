@@ -93,30 +93,10 @@ def place(name: str) -> int:
     return _PLACE[name]
 
 
-(
-    N_LINKS,
-    N_SITES,
-    N_FLEX,
-    N_CLOSURES,
-    N_CLOSURE_ROWS,
-    N_CONTACTS,
-    N_DRIVES,
-    NQ,
-    NV,
-    NY,
-    N_LEDGER,
-    N_PAIRS,
-    N_KNOWN_PAIRS,
-    N_KNOWN_ENTRIES,
-    N_CLOSURE_PAIRS,
-    N_GROUPS,
-    MASS_SIZE,
-    SCHUR_SIZE,
-    MOST_MODES,
-    N_LAWS,
-    N_LOADS,
-    N_TURNS,
-) = (place(name) for name in SIZES if name not in ELSEWHERE)
+_SIZES = [place(name) for name in SIZES if name not in ELSEWHERE]
+N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER = _SIZES[:11]
+N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE = _SIZES[11:18]
+MOST_MODES, N_LAWS, N_LOADS, N_TURNS = _SIZES[18:]
 (
     LINKS,
     SITES,
