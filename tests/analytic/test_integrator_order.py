@@ -14,7 +14,7 @@ CASES: dict[str, tuple[int, int, tuple[int, ...], float]] = {
     "dop853": (8, 8, (20, 24, 28, 32), NO_PROJECTION),
     "dopri5": (5, 5, (160, 240, 320), NO_PROJECTION),
     "rk4": (4, 4, (80, 160, 320), NO_PROJECTION),
-    "adams-bashforth-moulton": (4, 4, (320, 640, 1280), NO_PROJECTION),
+    "adams-bashforth-moulton": (4, 4, (1280, 1920, 2560), NO_PROJECTION),
     "generalized-alpha": (2, 2, (200, 400, 800), 1e-6),
     "radau": (5, 4, (20, 40, 80), 1e-11),
 }
