@@ -53,8 +53,8 @@ def test_order_is_as_claimed(name: str, integrator: str) -> None:
 
 
 #: integrator -> error that rtol 1e-7 leaves at most: some ten steps, through a motion that doubles errors a few times;
-#: of second order, hundreds of steps
-TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-4}
+#: of second order, a thousand steps, at speeds of some 10 rad/s
+TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-3}
 
 
 @pytest.mark.parametrize("integrator", TOLERANCES)
