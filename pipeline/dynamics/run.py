@@ -17,6 +17,7 @@ from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
+from pipeline.dynamics.record.ledger import require_closed
 
 if TYPE_CHECKING:
     from pipeline.dynamics.sensitivity import Twin
@@ -54,7 +55,9 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     engine = prepare(tabulate(build(driven, bundles), given), progress)
     start, residual = consistent_start(engine)
     trajectory = step(engine, start, progress)
-    return Run(scene, engine, trajectory, observed(engine, trajectory), residual, _twin(engine, start, trajectory))
+    seen = observed(engine, trajectory)
+    require_closed(engine.built, trajectory, seen)
+    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory))
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:

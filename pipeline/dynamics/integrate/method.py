@@ -47,6 +47,8 @@ class Method:
     steady: a growth of the step below this is not worth another factorisation.
     memory: floats kept between steps, from the numbers of positions, speeds and state variables.
     parameter: the method's number in the scene's solver table.
+    stability: reach of the region of stability along the negative real axis, of an explicit method whose last
+        stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
     """
 
     slopes: int
@@ -59,6 +61,7 @@ class Method:
     steady: float = 1.0
     memory: Callable[[int, int, int], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
+    stability: float | None = None
 
 
 @dataclass(frozen=True)

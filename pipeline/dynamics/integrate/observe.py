@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.tables import (
     ACTIVE,
+    BENT,
     DRIVE_FORCE,
     DU,
     EVALUATION,
@@ -181,7 +182,7 @@ def compose(
                 kinetic += rigid_energy(h, f, w, i)
             potential -= dot(at(f, h[GRAVITY]), at(w, h[OWN] + INERTIA_SIZE * i + 1))
         for c in range(h[N_CONTACTS]):
-            elastic += w[touch(h, c) + STORED]
+            elastic += w[touch(h, c) + STORED] + w[touch(h, c) + BENT]
         for k in range(h[N_LOADS]):
             elastic += w[h[LOAD] + LOAD_SIZE * k + LOAD_STORED]
         out[column], out[column + 1], out[column + 2] = kinetic, potential, elastic

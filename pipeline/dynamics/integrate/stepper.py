@@ -20,6 +20,7 @@ from pipeline.dynamics.integrate.state import (
     DRIFT,
     END,
     EVALUATIONS,
+    EVENTS_OF_A_CONTACT,
     FRESH,
     FULL,
     LENGTH,
@@ -43,6 +44,7 @@ from pipeline.dynamics.integrate.state import (
     STEPS,
     TIME,
 )
+from pipeline.dynamics.integrate.stiffness import detect
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -148,6 +150,7 @@ def compose(
     interpolate, last, ends = method.interpolate, method.last, method.ends
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
+    feel = detect(method)
     first_step, judge, after_rejection, next_step = stepping(evaluate, start_watch, begin, error, method)
 
     @kernel
@@ -160,7 +163,10 @@ def compose(
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
-        elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:
+        elif (
+            n[N_RECORDED] + waiting + ROOM > rows.shape[0]
+            or n[N_EVENTS] + ROOM + EVENTS_OF_A_CONTACT * h[N_CONTACTS] > events.shape[0]
+        ):
             n[STATUS] = FULL
         else:
             return False
@@ -212,7 +218,10 @@ def compose(
             return 1e9
         if norm > 1.0:
             return min(norm, 1e9)
-        return norm if finish(h, f, w, n, t_new) else 1e9
+        if not finish(h, f, w, n, t_new):
+            return 1e9
+        feel(h, w, n, step)
+        return norm
 
     @kernel
     def accept(h, w, t_new):

@@ -7,6 +7,7 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -20,6 +21,7 @@ from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_star
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
 from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.record.dataset import attributes
+from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run import engine_of, observed
 from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
@@ -68,10 +70,9 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     regular = output_times(engine.breaks, scene.output.interval)
     rows = np.searchsorted(trajectory.time, regular)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = Trajectory(
-        trajectory.rows[rows], trajectory.events, trajectory.counters, trajectory.drift, trajectory.rate_drift
-    )
+    kept = replace(trajectory, rows=trajectory.rows[rows])
     seen = observed(engine, kept)
+    require_closed(engine.built, kept, seen)
     motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
     chosen = [motions[n] for n in names]
     touch = seen["touch"].reshape(len(rows), -1, TOUCH_SIZE)
