@@ -20,7 +20,7 @@ def solver(**keys: object) -> Overrides:
 
 #: solver -> largest error of the six impact times [s] and speeds [m/s]; the ball bounces for a second
 BOUNCES = {
-    "dopri5": (solver(integrator="dopri5", rtol=1e-10), 1e-8, 1e-8),
+    "dopri5": (solver(integrator="dopri5", rtol=1e-10), 5e-8, 5e-8),
     # third-order dense output is not used where a step is repeated to end on the event
     "radau": (solver(integrator="radau", rtol=1e-10), 1e-7, 1e-7),
     # second order: the error per step is rtol, the number of steps goes with its cube root
