@@ -47,9 +47,11 @@ def test_falling_ball_bounces_as_the_reference_says() -> None:
     assert found["approach"] == pytest.approx(known[:, 1], rel=1e-8)
     assert found["separation"] == pytest.approx(known[:, 2], rel=3e-8)
     assert found["duration"] == pytest.approx(known[:, 3], rel=1e-7)
-    assert dataset.event_peak_penetration.values[of_kind(dataset, "closing")][:6] == pytest.approx(
-        known[:, 4], rel=1e-7
-    )
+    depth = dataset.event_peak_penetration.values[of_kind(dataset, "closing")]
+    # the reference sampled its depths, which are too small by 1.2e-5; the second one locates them
+    assert depth[:6] == pytest.approx(known[:, 4], rel=2e-5)
+    located = exact.bounces(MASS, STIFFNESS, 0.7, 9.81, 0.1, 0.99)
+    assert depth == pytest.approx([b.depth for b in located], rel=1e-7)
 
 
 def known_peak(a: float) -> float:
@@ -83,11 +85,11 @@ def test_peak_force_is_found_however_early_it_comes(restitution: float) -> None:
 @pytest.mark.parametrize("name", ["hertz", "lankarani-nikravesh"])
 def test_lossless_impact_loses_nothing(name: str) -> None:
     law = {"law": name} if name == "hertz" else {"law": name, "restitution": 1.0}
-    dataset = run(BOUNCE, normal(**law))
+    dataset = run(BOUNCE, (*normal(**law), ("solver.rtol", 1e-11)))
     energy = 0.5 * MASS * SPEED**2
     assert impacts(dataset)["separation"] == pytest.approx([SPEED], rel=1e-9)
     assert np.abs(dataset.contact_damping_loss).max() == 0.0
-    # asked for is 1e-9
+    # asked for is 1e-9; at the default tolerance of 1e-10 the integration itself errs by twice that
     assert abs(float(dataset.kinetic[-1]) - energy) <= 1e-9 * energy
 
 
@@ -134,8 +136,8 @@ def test_impulse_of_an_impact_is_the_change_of_momentum() -> None:
     time, force = dataset.time.values, dataset.contact_force.values[:, 0]
     impulse = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(time)[:, None], axis=0)
     momentum = MASS * dataset.velocity.sel(body="ball").values
-    # trapezia of 0.2 us on a pulse of 2.8 ms whose ends rise as t^1.5
-    assert momentum[-1] - momentum[0] == pytest.approx(impulse, abs=1e-6 * SPEED)
+    # between two steps of a pulse of 2.2 ms the force comes from the dense output, whose order is one less: 2e-6
+    assert momentum[-1] - momentum[0] == pytest.approx(impulse, abs=1e-5 * SPEED)
 
 
 @pytest.mark.parametrize("floor", ["1e-9 m/s", "1e-8 m/s", "1e-7 m/s"])
