@@ -30,6 +30,7 @@ KERNELS = (
     "integrate.stepper",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
+STIFFENING_KERNELS = ("bodies.shortening",)
 CONTACT_KERNELS = (
     "contact.forces",
     "contact.form.elastic",
@@ -71,6 +72,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
     kernels += (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
     kernels += UNLOCATED_KERNELS if scene.contacts() and scene.solver.events != "located" else ()
     kernels += (LOAD_KERNELS if scene.forces() else ()) + (("drives.oscillation",) if "harmonic" in laws else ())
+    if any(body.stiffening is not None for body in scene.flexible().values()):
+        kernels += STIFFENING_KERNELS
     found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"

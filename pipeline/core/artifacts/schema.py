@@ -103,6 +103,24 @@ BUNDLE: Schema = {
     "frame_rotation_shape": _V(
         ("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"
     ),
+    "shortening_first_moment": _V(
+        ("mode", "mode2"),
+        "m-1",
+        "integral of rho times the displacement along x that bending causes, second derivative",
+        optional=True,
+    ),
+    "shortening_second_moment": _V(
+        ("mode", "mode2"),
+        "1",
+        "integral of rho x times the displacement along x that bending causes, second derivative",
+        optional=True,
+    ),
+    "frame_shortening": _V(
+        ("frame", "mode", "mode2"),
+        "kg-1 m-1",
+        "displacement of the frame along x that bending causes, second derivative by modal coordinates",
+        optional=True,
+    ),
     "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
     "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
     "shape_translation": _V(("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"),
@@ -224,6 +242,31 @@ ENSEMBLE: Schema = {
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
+}
+
+_STILL = """position quaternion frame_position joint_force joint_moment joint_position modal_coordinate
+drive_force drive_position load_force load_moment load_length contact_gap contact_penetration contact_force
+contact_normal_force contact_offset potential elastic"""
+#: static equilibrium, or steady motion: what a run says at one instant
+EQUILIBRIUM: Schema = {
+    name: _V(RUN[name].dims[1:], RUN[name].units, RUN[name].long_name, RUN[name].optional) for name in _STILL.split()
+}
+
+#: natural vibrations about it; shapes per unit of a coordinate with unit modal mass, parts real and imaginary
+LINEAR: Schema = EQUILIBRIUM | {
+    "frequency": _V(("vibration",), "Hz", "frequency of the vibration, damping included"),
+    "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
+    "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
+    "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
+    "dominant": _V(("vibration",), "1", "body with the largest share of the kinetic energy"),
+    "energy_share": _V(("vibration", "moving_body"), "1", "share of the body in the kinetic energy"),
+    "frame_translation": _V(
+        ("vibration", "part", "frame", "axis"), "kg-0.5", "displacement of the named frame, world axes"
+    ),
+    "frame_rotation": _V(
+        ("vibration", "part", "frame", "axis"), "kg-0.5 m-1", "rotation vector of the named frame, world axes"
+    ),
+    "modal_shape": _V(("vibration", "part", "mode"), "1", "modal coordinates of the flexible bodies", optional=True),
 }
 
 

@@ -16,6 +16,7 @@ from pipeline.core.scene.fields import (
     Part,
     Pose,
     Position,
+    Time,
     Velocity,
 )
 
@@ -56,17 +57,39 @@ class Modes(Part):
     interfaces: tuple[str, ...] | None = None
 
 
+class RatioPerMode(Part):
+    """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
+
+    ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
+
+
+class Rayleigh(Part):
+    """Damping matrix alpha M + beta K of the deformation; rigid motion of the body is not damped.
+
+    alpha [1/s], beta [s]: the ratio of a mode with frequency omega is (alpha/omega + beta omega)/2.
+    """
+
+    alpha: Annotated[Number, Field(ge=0.0)] = 0.0
+    beta: Annotated[Time, Field(ge=0.0)] = 0.0
+
+
+class Stiffening(Part):
+    """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
+
+
 class FlexibleBody(Part):
     """A body reduced from a mesh; its frames are those of the recipe.
 
     pose: start pose of the undeformed mesh frame.
-    damping: modal damping ratio of every elastic coordinate; absent means none.
+    damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
+    stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
     """
 
     type: Literal["flexible"]
     mesh: str
     modes: Modes
-    damping: Annotated[Number, Field(gt=0.0)] | None = None
+    damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
+    stiffening: Stiffening | None = None
     pose: Pose | None = None
     velocity: Velocity | None = None
     angular_velocity: AngularVelocity | None = None

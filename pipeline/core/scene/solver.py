@@ -62,9 +62,15 @@ class GeneralizedAlpha(Stepping):
 
 
 class Radau(Stepping):
-    """Implicit Runge-Kutta method of order 5 for stiff scenes."""
+    """Implicit Runge-Kutta method of order 5 for stiff scenes, with chosen steps."""
 
     integrator: Literal["radau"]
+
+    @model_validator(mode="after")
+    def _chooses_steps(self) -> Radau:
+        if self.step is not None:
+            raise ValueError("radau chooses its steps by rtol: remove step, or take generalized-alpha")
+        return self
 
 
 #: integrator -> tag of its model; tags stand in angles because error messages leave those out

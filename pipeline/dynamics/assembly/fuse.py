@@ -139,7 +139,7 @@ def _source(kinds: Kinds, scheme: Scheme) -> str:
     ]
     lines += _imports("joint", kinds.joints, ("motion",))
     lines.append(f"joint_motion = dispatch.choose({_names('joint', 'motion', kinds.joints)})")
-    lines += _flexible_lines(kinds.flexible)
+    lines += _flexible_lines(kinds.flexible, kinds.stiffening)
     lines += _contact_lines(kinds.contacts, scheme)
     lines += _law_lines(kinds.harmonics)
     lines += _load_lines(kinds)
@@ -160,20 +160,27 @@ def _names(family: str, function: str, names: tuple[str, ...]) -> str:
     return "(" + "".join(f"{family}_{function}_{k}, " for k in range(len(names))) + ")"
 
 
-def _flexible_lines(present: bool) -> list[str]:
+def _flexible_lines(present: bool, stiffening: bool) -> list[str]:
     if not present:
         return [
             "port, inboard = motion.no_port, motion.no_inboard",
             "flexible_inertia, port_load, modal = equations.no_flexible, equations.no_port_load, equations.no_modal",
             "flexible_observed, flexible_energy = observing.no_modal, observing.no_energy",
         ]
+    plain = ["shorten, shorten_port = (flexible.straight, flexible.straight), flexible.straight"]
+    forms = [
+        "from pipeline.dynamics.bodies import shortening",
+        "shorten, shorten_port = (shortening.first_moment, shortening.second_moment), shortening.at_port",
+    ]
     return [
         "from pipeline.dynamics.bodies import flexible, ports",
-        "port, inboard = ports.site, ports.inboard",
-        "flexible_inertia = equations.flexible_inertia(flexible.inertia, flexible.mass_matrix)",
+        *(forms if stiffening else plain),
+        "body = flexible.compose(*shorten)",
+        "port, inboard = ports.compose(shorten_port)",
+        "flexible_inertia = equations.flexible_inertia(body.inertia, body.mass_matrix)",
         "port_load, modal = equations.gather_port, equations.modal_forces",
-        "flexible_observed = observing.modal_inertias(flexible.inertia, flexible.modal_inertia)",
-        "flexible_energy = observing.flexible_energies(flexible.energies)",
+        "flexible_observed = observing.modal_inertias(body.inertia, body.modal_inertia)",
+        "flexible_energy = observing.flexible_energies(body.energies)",
     ]
 
 

@@ -39,6 +39,7 @@ class Kinds:
     closures: bool
     harmonics: bool = False
     loads: tuple[str, ...] = ()
+    stiffening: bool = False
 
 
 @dataclass(frozen=True)
@@ -122,6 +123,7 @@ def _kinds(system: System, normals: tuple[Resolved, ...], harmonics: bool, loads
         closures=bool(system.closures),
         harmonics=harmonics,
         loads=loads,
+        stiffening=any(b.stiffening is not None for b in system.scene.flexible().values()),
     )
 
 

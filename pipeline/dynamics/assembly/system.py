@@ -159,7 +159,7 @@ def _joined(
     inboard = Site(0, Placement(-origin), None) if edge.kind == PATH else _site(frames, links, link_of, near)
     parts = stages(edge, branch.reverse, inboard.frame is not None, group.flexible)
     here = links[inboard.link].start.of(inboard.place)
-    axes, made = np.eye(3), []
+    axes, made = np.eye(3), list[Link]()
     for k, part in enumerate(parts):
         turned = Placement(R=axes.T @ part.axes)
         site = Site(inboard.link, inboard.place.of(turned), inboard.frame)

@@ -72,7 +72,7 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
 
 def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
     """Edges from the ground to the frames whose pose is prescribed."""
-    result = []
+    result: list[Edge] = []
     for name, drive in scene.drive.items():
         if not isinstance(drive, PathDrive):
             continue

@@ -102,13 +102,14 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     engine.evaluate(y, engine.start)
     residual = initial.check_residual(built, engine.view("RESIDUAL", built.packed.sizes["N_CLOSURE_ROWS"]))
     y = project(engine, y)
-    links = built.packed.sizes["N_LINKS"]
+    links, rows = built.packed.sizes["N_LINKS"], built.packed.sizes["N_CLOSURE_ROWS"]
 
-    def frames(state_vector: np.ndarray) -> np.ndarray:
+    def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         engine.evaluate(state_vector, engine.start)
-        return engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
+        frames = engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
+        return frames, engine.view("RESIDUAL_RATE", rows).copy()
 
-    y = project(engine, initial.given_velocities(built, frames, y))
+    y = project(engine, initial.given_velocities(built, motion, y))
     if built.kinds.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)

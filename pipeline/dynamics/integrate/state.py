@@ -12,8 +12,23 @@ from pipeline.dynamics.tables import STATE as LAST
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
 # accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter,
-# largest rate of the equations that a step met
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, STEEPEST, N_CONTROLS = range(13)
+# largest rate of a closure before projection, largest rate of the equations that a step met
+(
+    TIME,
+    STEP,
+    END,
+    RTOL,
+    SPAN,
+    LENGTH,
+    DRIFT,
+    LAST_NORM,
+    MOST_GROWTH,
+    FIXED,
+    PARAMETER,
+    RATE_DRIFT,
+    STEEPEST,
+    N_CONTROLS,
+) = range(14)
 # integers
 (
     STATUS,

@@ -32,6 +32,7 @@ from pipeline.dynamics.integrate.state import (
     PAUSED,
     PROJECTION_EVALUATIONS,
     PROJECTIONS,
+    RATE_DRIFT,
     REJECTED,
     ROOM,
     RTOL,
@@ -59,6 +60,7 @@ from pipeline.dynamics.tables import (
     NY,
     OK,
     RESIDUAL,
+    RESIDUAL_RATE,
     SLOPES,
     Y_NEW,
     Y_STAGE,
@@ -197,6 +199,7 @@ def compose(
             n[EVALUATION] = NOT_FINITE
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
+        w[index(c + RATE_DRIFT)] = max(w[index(c + RATE_DRIFT)], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
         used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[index(c + RTOL)] * w[index(c + LENGTH)])
         if used > 0:
             n[EVALUATIONS] += used

@@ -23,14 +23,16 @@ STIFF_SHARE = 0.3
 class Trajectory:
     """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`, by time.
 
+    drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
     """
 
     rows: np.ndarray
     events: np.ndarray
     counters: dict[str, int]
-    drift: float
-    steepest: float
+    drift: float = 0.0
+    rate_drift: float = 0.0
+    steepest: float = 0.0
 
     @property
     def time(self) -> np.ndarray:
@@ -66,7 +68,7 @@ def integrate(engine: Engine, y: np.ndarray, progress: Progress) -> Trajectory:
         engine.select_pieces(0.5 * (a + b))
         control[state.END], run.n[state.FRESH] = b, 1
         _segment(engine, run, progress)
-    return _collect(run, float(control[state.DRIFT]), float(control[state.STEEPEST]))
+    return _collect(run, control)
 
 
 def _begin(engine: Engine, y: np.ndarray) -> _Run:
@@ -143,7 +145,8 @@ def _refusal(engine: Engine, run: _Run) -> str:
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than an explicit method can follow (loops closed at joints {joints})",
         state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero",
+        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
+        + (f", or the fixed step of {control[state.FIXED]:.2g} s is too long for it" if control[state.FIXED] else ""),
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
@@ -163,7 +166,7 @@ def _why_so_many(n: np.ndarray, control: np.ndarray) -> str:
     return "contacts may be collapsing in time, or the tolerance is too tight"
 
 
-def _collect(run: _Run, drift: float, steepest: float) -> Trajectory:
+def _collect(run: _Run, control: np.ndarray) -> Trajectory:
     n = run.n
     rows = run.rows[: n[state.N_RECORDED]]
     keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
@@ -179,4 +182,5 @@ def _collect(run: _Run, drift: float, steepest: float) -> Trajectory:
     events = run.events[: n[state.N_EVENTS]]
     # what happens inside a step is noted when the step is done: one contact after the other
     in_order = events[np.argsort(events[:, state.EVENT_TIME], kind="stable")]
-    return Trajectory(rows[keep], in_order, counters, drift, steepest)
+    drift, rate_drift, steepest = (float(control[k]) for k in (state.DRIFT, state.RATE_DRIFT, state.STEEPEST))
+    return Trajectory(rows[keep], in_order, counters, drift, rate_drift, steepest)

@@ -11,7 +11,6 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.loading import order
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.trajectory import Trajectory
@@ -118,9 +117,10 @@ def _report(run: Run) -> dict[str, float | int]:
     counters = run.trajectory.counters
     found: dict[str, float | int] = {
         **counters,
-        "stiff_share": counters["stiff_steps"] / max(1, counters["steps"]),
+        "stiff_share": counters.get("stiff_steps", 0) / max(1, counters.get("steps", 0)),
         "largest_rate": run.trajectory.steepest,
         "largest_drift_before_projection": run.trajectory.drift,
+        "largest_rate_drift_before_projection": run.trajectory.rate_drift,
         "closure_residual_of_given_start": run.start_residual,
     }
     return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
@@ -192,7 +192,7 @@ def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordina
 def _loads(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
     from pipeline.dynamics.record.loads import load_series
 
-    coordinates["load"] = order(built.system.scene)
+    coordinates["load"] = list(built.system.scene.forces())
     variables.update(load_series(built, seen))
 
 
