@@ -42,10 +42,21 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
 def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """The observed rows of a trajectory; SolverError where one of them could not be evaluated."""
-    seen = observe(engine, trajectory.rows)
+    seen = _observed_rows(engine, trajectory)
     bad = np.flatnonzero(seen["status"][:, 0])
     if len(bad):
         raise SolverError(
             f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
         )
     return seen
+
+
+def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """Every row with the closure rows that were solved for when it was made."""
+    starts = np.array([start for start, _ in trajectory.selections])
+    used = np.maximum(np.searchsorted(starts, trajectory.time, side="left") - 1, 0)
+    parts = []
+    for k, (_, kept) in enumerate(trajectory.selections):
+        engine.keep(kept)
+        parts.append(observe(engine, trajectory.rows[used == k]))
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -23,8 +23,8 @@ from pipeline.dynamics.vectors import index, kernel
 
 #: header of h: sizes
 SIZES = (
-    "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS "
-    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE MOST_MODES"
+    "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_KEPT_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS "
+    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE JACOBIAN_SIZE MOST_MODES"
 ).split()
 #: wiring tables in h: name -> columns
 WIRING = {
@@ -40,15 +40,16 @@ WIRING = {
     "PAIRS": 3,  # momentum, column, place in the mass matrix's envelope
     "KNOWN_PAIRS": 4,  # momentum, column, prescribed coordinate, free coordinate
     "ENVELOPE": 2,  # first column, start of each row of the mass matrix
-    # site a, site b, first row, rows, first of support, its length, first of Jacobian, first entry, entries
-    "CLOSURES": 9,
+    # site a, site b, first row, rows, first of support, its length, first of Jacobian, first entry, entries,
+    # first and number of the rows that are solved for: the first ones of the closure, those left over follow from them
+    "CLOSURES": 11,
     "CLOSURE_ROWS": 3,  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
     "SUPPORT": 1,  # coordinates on which a closure depends
     "ENTRIES": 3,  # slot in the support, column, sign
     "KNOWN_ENTRIES": 4,  # closure, prescribed coordinate, column, sign
     "CLOSURE_PAIRS": 4,  # closure a, closure b >= a, start and number of their common slots
     "COMMON": 2,  # slot in a, slot in b
-    "CLOSURE_ENVELOPE": 2,
+    "CLOSURE_ENVELOPE": 2,  # of the rows that are solved for
     "CONTACTS": 4,  # socket site, ball site, normal law, friction law
     "DRIVES": 2,  # first piece, number of pieces
     "GROUPS": 1,  # error group of each state variable
@@ -70,7 +71,7 @@ NUMBERS = {
 #: work space in w: its places, in order; sizes follow from the header (see `assembly.packing`)
 WORK = (
     "X U DU LINK_FRAMES SITE_FRAMES JOINT OWN INERTIA WRENCH COLUMNS MOMENTA DEFORMATION BIAS MODAL_BIAS "
-    "MODAL SCRATCH MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR MULTIPLIER TOUCH "
+    "MODAL SCRATCH MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR ROW_SCALE PIVOT MULTIPLIER TOUCH "
     "DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MAGNITUDE CORRECTION LATCHED WATCH "
     "CONTROL"
 ).split()
@@ -89,6 +90,7 @@ def place(name: str) -> int:
     N_FLEX,
     N_CLOSURES,
     N_CLOSURE_ROWS,
+    N_KEPT_ROWS,
     N_CONTACTS,
     N_DRIVES,
     NQ,
@@ -102,6 +104,7 @@ def place(name: str) -> int:
     N_GROUPS,
     MASS_SIZE,
     SCHUR_SIZE,
+    JACOBIAN_SIZE,
     MOST_MODES,
 ) = (place(name) for name in SIZES)
 (
@@ -164,6 +167,8 @@ def place(name: str) -> int:
     JACOBIAN,
     SPREAD,
     SCHUR,
+    ROW_SCALE,
+    PIVOT,
     MULTIPLIER,
     TOUCH,
     DRIVE_FORCE,
@@ -185,7 +190,7 @@ def place(name: str) -> int:
 PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)
 FLEX_LINK, N_MODES, FLEX_Q0, FLEX_C0, DATA0, MOMENT0, N_MOMENTS, FLEX_INBOARD = range(8)
 PORT_FLEX, PORT_COLUMN, PORT_SHAPES = range(3)
-SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES = range(9)
+SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES, KEPT0, N_KEPT = range(11)
 SOCKET, BALL, NORMAL_KIND, FRICTION_KIND = range(4)
 CLEARANCE, BALL_RADIUS, FLOOR, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 7
 # a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
@@ -208,6 +213,9 @@ GAP, RATE, NORMAL_FORCE, FRICTION_POWER, DAMPING_POWER, STORED = range(6)
 TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 6, 9, 12, 15
 # ledger before the contacts' slots (normal, friction each): work of drives, loss of modal damping
 DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
+# smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry so far (1: rows at right angles, 0:
+# dependent or nothing): of the last evaluation; below which the stepper asks for other rows
+LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
 # what evaluate reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED = range(4)
 #: first entries of n, the integers that change: report of the last evaluation; then the drives' active pieces
@@ -236,7 +244,7 @@ def port(h, k, field):
 @kernel
 def closure(h, c, field):
     """A field of closure c."""
-    return h[index(h[CLOSURES] + 9 * c + field)]
+    return h[index(h[CLOSURES] + 11 * c + field)]
 
 
 @kernel

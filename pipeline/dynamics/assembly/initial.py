@@ -8,15 +8,12 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.parts import Ground
-from pipeline.dynamics.assembly.merge import Placement
+from pipeline.dynamics.assembly.constraints import outboard_place
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.tree import joint_class
-from pipeline.dynamics.tables import AXES, CONTACT_LOSS, OMEGA, ROW0, VELOCITY
+from pipeline.dynamics.tables import AXES, CONTACT_LOSS, OMEGA, VELOCITY
 
 Frames = Callable[[np.ndarray], np.ndarray]  #: state -> frames of all links, (links, FRAME_SIZE)
-
-#: a start further from closed than this share of the mechanism's size is a mistake, not rounding
-WORST_GUESS = 0.05
 
 
 def start_state(built: Tables) -> np.ndarray:
@@ -29,20 +26,10 @@ def start_state(built: Tables) -> np.ndarray:
             continue
         assert link.inboard is not None
         F = system.links[link.inboard.link].start.of(link.inboard.place)
-        relative = F.inverse().of(_inboard_frame(built, i))
+        relative = F.inverse().of(link.start.of(outboard_place(system, link)))
         coordinates = declared.coordinates(relative.R, relative.p)
         q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
     return np.concatenate([q, v, np.zeros(CONTACT_LOSS + 2 * len(system.contacts))])
-
-
-def _inboard_frame(built: Tables, i: int) -> Placement:
-    """World pose of a link's own side of its inboard joint."""
-    link = built.system.links[i]
-    edge = link.branch.edge
-    if edge is None or not link.flexible:
-        return link.start
-    frame = built.system.frames[edge.frame_a if link.branch.reverse else edge.frame_b]
-    return link.start.of(frame.place)
 
 
 def given_velocities(built: Tables, frames: Frames, y: np.ndarray) -> np.ndarray:
@@ -98,21 +85,3 @@ def _twists(built: Tables, frames: Frames, y: np.ndarray, bodies: dict) -> np.nd
         arm = R @ (place.p + place.R @ np.array(getattr(bodies[name], "com", (0.0, 0.0, 0.0))))
         found += [omega, v + np.cross(omega, arm)]
     return np.concatenate(found).copy()
-
-
-def check_residual(built: Tables, residuals: np.ndarray) -> float:
-    """Largest residual of the loops as given [m]; InputError when they are too far from closed."""
-    if not len(residuals):
-        return 0.0
-    worst = int(np.argmax(np.abs(residuals)))
-    residual = float(np.abs(residuals[worst]))
-    if residual > WORST_GUESS * built.system.length:
-        first_rows = built.packed.table("CLOSURES")[:, ROW0]
-        closure = int(np.searchsorted(first_rows, worst, side="right")) - 1
-        edge = built.system.closures[built.closure_order[closure]][0]
-        raise InputError(
-            f"[joint.{edge.name}.between]",
-            f"its two frames start {residual:.3g} m (or rad) apart",
-            "correct the poses of the bodies, or the frames",
-        )
-    return residual

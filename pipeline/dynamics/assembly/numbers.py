@@ -11,6 +11,7 @@ from pipeline.core.registry import lookup
 from pipeline.dynamics import tables
 from pipeline.dynamics.assembly import flexible_numbers as flexible
 from pipeline.dynamics.assembly import wiring
+from pipeline.dynamics.assembly.closing import assembled
 from pipeline.dynamics.assembly.layout import Layout, number
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.packing import Packed, pack
@@ -45,7 +46,8 @@ class Tables:
 
 
 def tabulate(system: System) -> Tables:
-    """Number a system and fill its tables."""
+    """Place a system's links so that its joints fit, number it and fill its tables."""
+    system = assembled(system)
     layout = number(system)
     kinds = _kinds(system)
     site_pairs = [(e.kind, layout.add_site(a), layout.add_site(b)) for e, a, b in system.closures]

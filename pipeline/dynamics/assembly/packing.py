@@ -74,7 +74,7 @@ def pack(
     for name in tables.SIZES:
         h[tables.place(name)] = all_sizes[name]
     start = 0
-    for name, length in _work_lengths(all_sizes, wiring, slopes, dense, columns).items():
+    for name, length in _work_lengths(all_sizes, slopes, dense, columns).items():
         h[tables.place(name)] = start
         start += length
     integers = state.INTEGERS + all_sizes["N_DRIVES"] + all_sizes["N_CONTACTS"]
@@ -90,6 +90,7 @@ def _sizes(sizes: Mapping[str, int], wiring: Mapping[str, np.ndarray]) -> dict[s
         "N_FLEX": count["FLEXES"],
         "N_CLOSURES": count["CLOSURES"],
         "N_CLOSURE_ROWS": count["CLOSURE_ROWS"],
+        "N_KEPT_ROWS": count["CLOSURE_ENVELOPE"],
         "N_CONTACTS": count["CONTACTS"],
         "N_DRIVES": count["DRIVES"],
         "NV": count["ENVELOPE"],
@@ -101,6 +102,7 @@ def _sizes(sizes: Mapping[str, int], wiring: Mapping[str, np.ndarray]) -> dict[s
         "N_GROUPS": sizes["rows of FLOORS"],
         "MASS_SIZE": envelope_size(wiring["ENVELOPE"]),
         "SCHUR_SIZE": envelope_size(wiring["CLOSURE_ENVELOPE"]),
+        "JACOBIAN_SIZE": int(sum(c[tables.N_ROWS] * c[tables.N_SUPPORT] for c in wiring["CLOSURES"])),
     }
 
 
@@ -112,11 +114,9 @@ def envelope_size(envelope: np.ndarray) -> int:
     return int(envelope[last, 1] + last - envelope[last, 0] + 1)
 
 
-def _work_lengths(
-    s: Mapping[str, int], wiring: Mapping[str, np.ndarray], slopes: int, dense: int, columns: int
-) -> dict[str, int]:
+def _work_lengths(s: Mapping[str, int], slopes: int, dense: int, columns: int) -> dict[str, int]:
     known, contacts, ny = s["N_DRIVES"], s["N_CONTACTS"], s["NY"]
-    jacobian = int(sum(c[tables.N_ROWS] * c[tables.N_SUPPORT] for c in wiring["CLOSURES"]))
+    jacobian = s["JACOBIAN_SIZE"]
     rows, coordinates, positions = s["N_CLOSURE_ROWS"], s["NV"] + known, s["NQ"] + known
     lengths = {
         "X": positions,
@@ -144,6 +144,8 @@ def _work_lengths(
         "JACOBIAN": jacobian,
         "SPREAD": jacobian,
         "SCHUR": s["SCHUR_SIZE"],
+        "ROW_SCALE": rows,
+        "PIVOT": tables.PIVOT_SIZE,
         "MULTIPLIER": rows,
         "TOUCH": tables.TOUCH_SIZE * contacts,
         "DRIVE_FORCE": known,

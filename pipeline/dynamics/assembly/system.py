@@ -59,7 +59,8 @@ class Link:
 class System:
     """Links in tree order, closures, contacts and drives of a scene; lengths in the world's axes.
 
-    origin: point of the world that the kernels use as theirs, near the mechanism.
+    origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
+    start_residual: largest residual of a joint in the poses that the scene gives [m, or the sine of an angle].
     """
 
     scene: Scene
@@ -71,6 +72,7 @@ class System:
     contacts: list[tuple[str, ClearanceSpherical, Site, Site]]
     origin: np.ndarray
     length: float
+    start_residual: float = 0.0
 
     @property
     def drives(self) -> list[str]:

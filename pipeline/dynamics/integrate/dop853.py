@@ -119,7 +119,8 @@ class Method:
     """What the stepper needs of a Runge-Kutta method.
 
     slopes: rows of SLOPES.  last: row of the slope at the step's end.  dense: rows of DENSE.
-    extra: evaluations that the dense output costs.
+    extra: evaluations that the dense output costs.  gap: middle of the widest gap between the stages, as share of
+    the step.
     """
 
     slopes: int
@@ -130,6 +131,7 @@ class Method:
     compose: Callable
     error: Callable
     interpolate: Callable
+    gap: float = 0.5
 
 
-METHOD = Method(EXTENDED + 1, STAGES, 8, EXTENDED - STAGES - 1, ERROR_ORDER, compose, error, interpolate)
+METHOD = Method(EXTENDED + 1, STAGES, 8, EXTENDED - STAGES - 1, ERROR_ORDER, compose, error, interpolate, 0.467)

@@ -40,13 +40,18 @@ from pipeline.dynamics.integrate.state import (
     STEP,
     STEP_TOO_SMALL,
     STEPS,
+    STRADDLING,
     TIME,
+    WORN_ROWS,
 )
+from pipeline.dynamics.integrate.straddle import compose as compose_foresee
+from pipeline.dynamics.integrate.straddle import forget, near, note, steer
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
     FLOORS,
     GROUPS,
+    LAST_PIVOT,
     LATCHED,
     MAGNITUDE,
     MODE,
@@ -55,8 +60,10 @@ from pipeline.dynamics.tables import (
     N_GROUPS,
     NY,
     OK,
+    PIVOT,
     RESIDUAL,
     SLOPES,
+    WANTED_PIVOT,
     Y_NEW,
     Y_STAGE,
     Y,
@@ -67,6 +74,8 @@ from pipeline.dynamics.vectors import index, kernel
 # the memory keeps steps quiet where stability, not accuracy, limits them
 SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
 LEAST_NORM = 1e-4
+#: share of the mechanism's size to which closures are closed before a singular pose
+TIGHTLY = 1e-15
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
 
@@ -86,15 +95,18 @@ def snapshot(h, w, n, rows, t, y):
 
 @kernel
 def set_magnitudes(h, f, w, y):
-    """Scale of each error group: tolerance times its floor plus its largest value at both ends."""
+    """Scale of each error group: tolerance times its floor plus the length of its vector at the step's ends.
+
+    The length, not the largest component: that would depend on the axes in which a scene is written.
+    """
     m, o = h[MAGNITUDE], h[Y]
     for g in range(h[N_GROUPS]):
         w[index(m + g)] = 0.0
     for c in range(h[NY]):
         g = m + h[index(h[GROUPS] + c)]
-        w[index(g)] = max(w[index(g)], max(abs(w[index(y + c)]), abs(w[index(o + c)])))
+        w[index(g)] += 0.5 * (w[index(y + c)] ** 2 + w[index(o + c)] ** 2)
     for g in range(h[N_GROUPS]):
-        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + w[index(m + g)])
+        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + np.sqrt(w[index(m + g)]))
 
 
 @kernel
@@ -135,6 +147,7 @@ def compose_start(evaluate: Callable, start_watch: Callable, order: int) -> Call
             n[STATUS] = NO_START
             return False
         start_watch(h, w)
+        note(h, w)
         set_magnitudes(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
         step = 1e-6 * w[index(c + SPAN)]
@@ -152,6 +165,7 @@ def compose_start(evaluate: Callable, start_watch: Callable, order: int) -> Call
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
         w[index(c + STEP)] = step
         w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = LEAST_NORM, GROW
+        forget(h, w, w[index(c + TIME)])
         n[FRESH] = 0
         return True
 
@@ -164,11 +178,12 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
     contact_events: start_watch and make_settle of `events`, or those that do nothing.
     """
     attempt, extend = method.compose(evaluate)
-    error, interpolate, last, extra = method.error, method.interpolate, method.last, method.extra
+    error, interpolate, last, extra, gap = method.error, method.interpolate, method.last, method.extra, method.gap
     exponent = -1.0 / (method.error_order + 1)
     remembering = exponent + 0.2 * MEMORY
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
+    foresee = compose_foresee(evaluate)
     first_step = compose_start(evaluate, start_watch, method.error_order + 1)
 
     @kernel
@@ -181,6 +196,8 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
+        elif w[index(h[PIVOT] + LAST_PIVOT)] < w[index(h[PIVOT] + WANTED_PIVOT)]:
+            n[STATUS] = WORN_ROWS
         elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:
             n[STATUS] = FULL
         else:
@@ -211,7 +228,9 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         if n[EVALUATION] != OK:
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
-        used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[index(c + RTOL)] * w[index(c + LENGTH)])
+        share = TIGHTLY if near(h, w, t_new, t_new - w[index(c + TIME)]) else w[index(c + RTOL)]
+        used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[index(c + LENGTH)])
+        note(h, w)
         if used > 0:
             n[EVALUATIONS] += used
             n[PROJECTIONS] += 1
@@ -256,7 +275,8 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         while not must_stop(h, w, n, outputs, rows, events):
             if n[FRESH] and not first_step(h, f, w, n):
                 return
-            step, t = w[index(c + STEP)], w[index(c + TIME)]
+            t = w[index(c + TIME)]
+            step = steer(h, w, t, w[index(c + STEP)], gap)
             final = t + 1.0001 * step >= w[index(c + END)]
             if final:
                 step = w[index(c + END)] - t
@@ -275,11 +295,16 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
             if happened < 0:
                 return
             n[STEPS] += 1
+            straddling = w[index(c + STRADDLING)] > 0.0
+            if straddling:
+                snapshot(h, w, n, rows, t, h[Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
             accept(h, w, t_new)
             w[index(c + STEP)] = step * growth
-            if happened > 0:
+            foresee(h, f, w, n, t_new)
+            if happened > 0 or straddling:
                 snapshot(h, w, n, rows, t_new, h[Y])
+            if happened > 0:
                 n[FRESH] = 1
 
     return advance

@@ -14,6 +14,9 @@ from pipeline.dynamics.tables import (
     FRAME_SIZE,
     GRAVITY,
     INERTIA_SIZE,
+    JACOBIAN,
+    JACOBIAN_SIZE,
+    KEPT0,
     LATCHED,
     LINK_FRAMES,
     MODE,
@@ -23,8 +26,8 @@ from pipeline.dynamics.tables import (
     N_CONTACTS,
     N_DRIVES,
     N_FLEX,
+    N_KEPT,
     N_LINKS,
-    N_ROWS,
     N_SITES,
     NOT_CLOSED,
     NQ,
@@ -71,6 +74,7 @@ def widths(sizes: dict[str, int]) -> dict[str, int]:
         "touch": TOUCH_SIZE * sizes["N_CONTACTS"],
         "drive_force": drives,
         "energy": 3,  # kinetic, potential of gravity, elastic
+        "jacobian": sizes["JACOBIAN_SIZE"],
         "residual": 1,
         "status": 1,
     }
@@ -139,8 +143,9 @@ def compose(
         for c in range(h[N_CLOSURES]):
             for e in range(6):
                 total = 0.0
-                for k in range(closure(h, c, ROW0), closure(h, c, ROW0) + closure(h, c, N_ROWS)):
-                    total += w[h[ROWS] + 6 * k + e] * w[h[MULTIPLIER] + k]
+                for k in range(closure(h, c, N_KEPT)):
+                    wrench_row = h[ROWS] + 6 * (closure(h, c, ROW0) + k)
+                    total += w[wrench_row + e] * w[h[MULTIPLIER] + closure(h, c, KEPT0) + k]
                 out[column + 6 * c + e] = total
                 w[wrench(h, site_link(h, closure(h, c, SITE_B))) + e] -= total
                 w[wrench(h, site_link(h, closure(h, c, SITE_A))) + e] += total
@@ -211,6 +216,7 @@ def compose(
             o = _copy(w, h[TOUCH], TOUCH_SIZE * contacts_count, line, o)
             o = _copy(w, h[DRIVE_FORCE], h[N_DRIVES], line, o)
             o = energies(h, f, w, line, o)
+            o = _copy(w, h[JACOBIAN], h[JACOBIAN_SIZE], line, o)
             line[o], line[o + 1] = residual, status
 
     return observe

@@ -11,8 +11,11 @@ from pipeline.dynamics.tables import MODE
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
-# accepted step, largest growth of the next (1 after a rejection)
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, N_CONTROLS = range(10)
+# accepted step, largest growth of the next (1 after a rejection); then what `straddle` keeps: independence of
+# the closure rows at the end of the step and at its start, its start, time of the next singular pose, whether
+# the present step is laid over it
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH = range(9)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, N_CONTROLS = range(9, 15)
 # integers
 (
     STATUS,
@@ -31,7 +34,7 @@ TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, N_CONTROLS =
     INTEGERS,
 ) = range(MODE + 1, MODE + 15)
 # values of n[STATUS]
-SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
+SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE, WORN_ROWS = range(9)
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING = 0, 1

@@ -7,23 +7,30 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics.integrate import state
+from pipeline.dynamics import tables
+from pipeline.dynamics.integrate import singular, state
 from pipeline.dynamics.integrate.engine import Engine, Progress
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
 #: events for which there is room at first
 EVENT_ROWS = 4096
+#: why the stepper stops that another choice of closure rows may mend
+STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`."""
+    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`.
+
+    selections: closure rows solved for, each from a time on.
+    """
 
     rows: np.ndarray
     events: np.ndarray
     counters: dict[str, int]
     drift: float
+    selections: tuple[tuple[float, np.ndarray], ...]
 
     @property
     def time(self) -> np.ndarray:
@@ -40,6 +47,7 @@ class _Run:
     outputs: np.ndarray
     rows: np.ndarray
     events: np.ndarray
+    selections: list[tuple[float, np.ndarray]]
 
 
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
@@ -78,7 +86,11 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     rows = np.zeros((len(outputs) + room + state.ROOM, 1 + 2 * contacts + len(y)))
     rows[0, 0], rows[0, 1 + 2 * contacts :] = engine.start, y
     n[state.N_RECORDED], n[state.NEXT_OUTPUT] = 1, 1
-    return _Run(engine.w, n, outputs, rows, np.full((room + state.ROOM, state.EVENT_SIZE), np.nan))
+    ratio = singular.select_rows(engine, y, engine.start)
+    engine.view("Y", len(y))[:] = y
+    engine.view("PIVOT", tables.PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    events = np.full((room + state.ROOM, state.EVENT_SIZE), np.nan)
+    return _Run(engine.w, n, outputs, rows, events, [(engine.start, engine.kept.copy())])
 
 
 def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
@@ -86,7 +98,7 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
     control = engine.view("CONTROL", state.N_CONTROLS)
     while True:
         n[state.BUDGET] = n[state.EVALUATIONS] + SLICE
-        engine.entry.advance(packed.h, packed.f, run.w, n, run.outputs, run.rows, run.events)
+        engine.entry.advance(engine.h, packed.f, run.w, n, run.outputs, run.rows, run.events)
         t = control[state.TIME]
         progress((t - engine.start) / control[state.SPAN], f"t = {t:.5f} s, {n[state.EVALUATIONS]} evaluations")
         status = n[state.STATUS]
@@ -95,23 +107,29 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
         if status == state.FULL:
             run.rows = np.concatenate([run.rows, np.zeros_like(run.rows)])
             run.events = np.concatenate([run.events, np.full_like(run.events, np.nan)])
+        elif status == state.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
+            if singular.improve(engine, float(t)):
+                run.selections.append((float(t), engine.kept.copy()))
+            elif status != state.WORN_ROWS:
+                raise SolverError(_refusal(engine, run))
         elif status != state.PAUSED:
             raise SolverError(_refusal(engine, run))
 
 
 def _refusal(engine: Engine, run: _Run) -> str:
     control, n = engine.view("CONTROL", state.N_CONTROLS), run.n
-    joints = ", ".join(e.name for e, _, _ in engine.built.system.closures) or "none"
+    where = singular.diagnosis(engine)
     contacts = [name for name, *_ in engine.built.system.contacts]
     culprit = contacts[n[state.CULPRIT]] if contacts else ""
     reasons = {
         state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
         "contacts may be collapsing in time, or the tolerance is too tight",
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
-        f"or stiffer than an explicit method can follow (loops closed at joints {joints})",
-        state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
+        f"or stiffer than an explicit method can follow ({where})",
+        state.NO_START: f"the equations are singular here ({where})",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
-        state.LOST_CLOSURE: f"the loops at joints {joints} cannot be kept closed: a singular configuration",
+        state.LOST_CLOSURE: "the loops cannot be kept closed: a singular pose in which they can go on in several ways "
+        f"({where})",
     }
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
 
@@ -126,4 +144,4 @@ def _collect(run: _Run, drift: float) -> Trajectory:
         "rejected_steps": int(n[state.REJECTED]),
         "projections": int(n[state.PROJECTIONS]),
     }
-    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift)
+    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift, tuple(run.selections))

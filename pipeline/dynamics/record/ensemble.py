@@ -7,6 +7,7 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -105,7 +106,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     regular = output_times(engine.breaks, scene.output.interval)
     rows = np.searchsorted(trajectory.time, regular)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = Trajectory(trajectory.rows[rows], trajectory.events, trajectory.counters, trajectory.drift)
+    kept = replace(trajectory, rows=trajectory.rows[rows])
     seen = observed(engine, kept)
     motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
     chosen = [motions[n] for n in names]
