@@ -25,7 +25,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     from pipeline.dynamics.run import integrate
 
     done = integrate(scene, bundles, progress)
-    return dataset(done.engine.built, done.trajectory, done.observed, done.start_residual)
+    return dataset(done.engine, done.trajectory, done.observed, done.start_residual)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:

@@ -53,10 +53,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
 
 def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """Every row with the closure rows that were solved for when it was made."""
-    starts = np.array([start for start, _ in trajectory.selections])
-    used = np.maximum(np.searchsorted(starts, trajectory.time, side="left") - 1, 0)
     parts = []
-    for k, (_, kept) in enumerate(trajectory.selections):
+    for part, kept in trajectory.parts():
         engine.keep(kept)
-        parts.append(observe(engine, trajectory.rows[used == k]))
+        parts.append(observe(engine, trajectory.rows[part]))
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -23,7 +23,7 @@ def path(loops: int) -> Path:
 
 
 def text(loops: int, end: float = 10.0, interval: float = 0.1) -> str:
-    """The scene file: rods 0..N stand on ground pins, beams 1..N join their tops. All pins are revolute joints in space."""
+    """The scene file: rods 0..N stand on ground pins, beams 1..N join their tops, all by revolute joints in space."""
     lines = [
         "# written by tests/analytic/four_bars.py",
         f'title = "{loops} four-bar loop{"s" if loops > 1 else ""} in a row, passing singular poses"',

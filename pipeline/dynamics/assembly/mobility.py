@@ -170,8 +170,8 @@ def _refuse_singular_start(built: Tables, J: np.ndarray, rank: int) -> None:
             values = np.linalg.svd(J, compute_uv=False)
             ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
             raise SolverError(
-                f"at t = {built.system.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its loops "
-                f"(closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
+                f"at t = {built.system.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
+                f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
                 "start it in another pose of its path"
             )
 

@@ -44,8 +44,8 @@ from pipeline.dynamics.integrate.state import (
     TIME,
     WORN_ROWS,
 )
+from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan_next, steer
 from pipeline.dynamics.integrate.straddle import compose as compose_foresee
-from pipeline.dynamics.integrate.straddle import forget, near, note, steer
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -228,7 +228,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         if n[EVALUATION] != OK:
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
-        share = TIGHTLY if near(h, w, t_new, t_new - w[index(c + TIME)]) else w[index(c + RTOL)]
+        share = TIGHTLY if near(h, w, t_new) else w[index(c + RTOL)]
         used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[index(c + LENGTH)])
         note(h, w)
         if used > 0:
@@ -244,7 +244,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
             return 1e9
         set_magnitudes(h, f, w, h[Y_NEW])
         norm = error(h, w, step)
-        if not norm <= 1.0:
+        if not norm <= allowed(h, w):
             return min(norm, 1e9) if norm == norm else 1e9
         return norm if finish(h, f, w, n, t_new) else 1e9
 
@@ -285,7 +285,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
                 return
             t_new = w[index(c + END)] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
-            if norm > 1.0:
+            if norm > allowed(h, w):
                 n[REJECTED] += 1
                 w[index(c + STEP)] = step * max(SHRINK, SAFETY * norm**exponent)
                 w[index(c + MOST_GROWTH)] = 1.0
@@ -300,7 +300,7 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
                 snapshot(h, w, n, rows, t, h[Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
             accept(h, w, t_new)
-            w[index(c + STEP)] = step * growth
+            plan_next(h, w, step, growth)
             foresee(h, f, w, n, t_new)
             if happened > 0 or straddling:
                 snapshot(h, w, n, rows, t_new, h[Y])

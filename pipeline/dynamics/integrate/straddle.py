@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.integrate.state import EVALUATIONS, PASS_TIME, PAST_SIGMA, PAST_TIME, SIGMA, STRADDLING
+from pipeline.dynamics.integrate.state import EVALUATIONS, PASS_TIME, PAST_SIGMA, PAST_TIME, SIGMA, STEP, STRADDLING
 from pipeline.dynamics.tables import CONTROL, EVALUATION, LAST_PIVOT, NY, OK, PIVOT, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
 
@@ -23,8 +23,13 @@ NEVER = 1e300
 STRETCH = 1.1
 #: a step before the straddling one ends so much nearer than the straddling one needs
 MARGIN = 0.9
+#: share of the planned step below which a step has been cut short
+CUT = 0.9
 #: steps before a singular pose within which the closures are closed to rounding
 CLOSELY = 4.0
+#: error norm allowed over a singular pose: its stages are blurred beside the branch by rounding over sigma, which the
+#: projection at the end removes; along the branch the step is as exact as those before, being no longer
+BLURRED = 1e4
 #: share of a step over which a slope is taken: the state there comes from the slope at the end
 A_LITTLE = 1e-4
 
@@ -68,7 +73,7 @@ def compose(evaluate: Callable) -> Callable:
         if straddled or not sigma < past:
             return
         rough = sigma * span / (past - sigma)
-        if rough > CLOSELY * span:
+        if rough > CLOSELY * max(span, w[index(c + STEP)]):
             return
         back = A_LITTLE * min(span, rough)
         for k in range(h[NY]):
@@ -97,6 +102,20 @@ def steer(h, w, t, step, gap):
 
 
 @kernel
-def near(h, w, t, step):
+def plan_next(h, w, step, growth):
+    """The step to try next; one that was cut short for a singular pose says little about how long it may be."""
+    planned = h[CONTROL] + STEP
+    least = w[index(planned)] if step < CUT * w[index(planned)] else 0.0
+    w[index(planned)] = max(step * growth, least)
+
+
+@kernel
+def allowed(h, w):
+    """Largest error norm with which the present step is accepted."""
+    return BLURRED if w[index(h[CONTROL] + STRADDLING)] > 0.0 else 1.0
+
+
+@kernel
+def near(h, w, t):
     """Whether a singular pose is so near that the closures must be closed to rounding."""
-    return w[index(h[CONTROL] + PASS_TIME)] - t < CLOSELY * step
+    return w[index(h[CONTROL] + PASS_TIME)] - t < CLOSELY * w[index(h[CONTROL] + STEP)]

@@ -37,6 +37,18 @@ class Trajectory:
         """Times of the rows [s], strictly increasing."""
         return self.rows[:, 0]
 
+    def parts(self) -> list[tuple[slice, np.ndarray]]:
+        """Stretches of rows, each with the closure rows that were solved for to reach them."""
+        starts = [start for start, _ in self.selections]
+        firsts = np.maximum(np.searchsorted(self.time, starts, side="right"), 0)
+        firsts[0] = 0
+        ends = [*firsts[1:], len(self.rows)]
+        return [(slice(a, b), kept) for a, b, (_, kept) in zip(firsts, ends, self.selections, strict=True)]
+
+    def selection(self, row: int) -> np.ndarray:
+        """Closure rows that were solved for to reach a row."""
+        return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
+
 
 @dataclass
 class _Run:

@@ -13,8 +13,10 @@ from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
+from pipeline.dynamics.integrate.engine import Engine
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
+from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.tables import (
     CONTACT_LOSS,
@@ -31,9 +33,9 @@ Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
-def dataset(built: Tables, trajectory: Trajectory, seen: Seen, start_residual: float) -> xr.Dataset:
+def dataset(engine: Engine, trajectory: Trajectory, seen: Seen, start_residual: float) -> xr.Dataset:
     """All that DESIGN promises of a run; `seen` holds the observed rows of the trajectory."""
-    scene = built.system.scene
+    built, scene = engine.built, engine.built.system.scene
     variables: Variables = {}
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
@@ -43,8 +45,9 @@ def dataset(built: Tables, trajectory: Trajectory, seen: Seen, start_residual: f
         _contacts(built, seen, variables, coordinates)
         _events(trajectory, variables)
     _ledger(built, seen, variables)
-    made = xr.Dataset(variables, coords=coordinates)
-    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual))
+    topological, named = topology(engine, trajectory, seen, list(scene.joint))
+    made = xr.Dataset(variables | topological, coords=coordinates | named)
+    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual), **_counts(engine))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.array([0, 1], dtype=np.int8),
@@ -73,6 +76,14 @@ def _report(trajectory: Trajectory, start_residual: float) -> dict[str, float | 
         "largest_drift_before_projection": trajectory.drift,
         "closure_residual_of_given_start": start_residual,
     }
+
+
+def _counts(engine: Engine) -> dict[str, str | int]:
+    """Redundancy, in words for the attributes."""
+    found: dict[str, str | int] = {"redundant_closure_rows": engine.mobility.redundant}
+    if engine.mobility.redundant:
+        found["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+    return found
 
 
 def _motion(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:

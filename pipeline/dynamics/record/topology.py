@@ -1,0 +1,145 @@
+"""Mobility, rank and condition along a run, its passes through singular poses, and redundant reactions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.errors import SolverError
+from pipeline.dynamics.assembly import selection
+from pipeline.dynamics.integrate import singular
+from pipeline.dynamics.integrate.engine import Engine
+from pipeline.dynamics.integrate.trajectory import Trajectory
+
+Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+
+#: singular values of the kept closure rows below this share of the largest count as zero in the rank
+ZERO = 1e-9
+#: a least singular value that has a minimum below this share of its median may reach zero beside that row
+LOW = 0.5
+#: bisections for the time of a pass
+HALVINGS = 40
+#: a pass with less than this share of the run's largest kinetic energy does not choose its branch
+AT_REST = 1e-10
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A singular pose on the way. lost: ranks lost; joint: whose closure is dependent there."""
+
+    time: float
+    condition: float
+    lost: int
+    joint: str
+
+
+def topology(
+    engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray], joints: list[str]
+) -> tuple[Variables, dict[str, object]]:
+    """Variables and coordinates of the run dataset; joints: names along its joint dimension."""
+    redundant = np.array([name in engine.mobility.redundant_joints for name in joints], dtype=np.int8)
+    variables: Variables = {"reaction_redundant": (("joint",), redundant)}
+    rows, nv = len(trajectory.rows), engine.built.layout.nv
+    values = _singular_values(engine, trajectory, seen)
+    rank = np.zeros(rows, dtype=np.int32)
+    if values.shape[1]:
+        rank = np.sum(values > ZERO * values[:, :1], axis=1).astype(np.int32)
+        least = np.maximum(values[:, -1], values[:, 0] / singular.INFINITE)
+        variables["condition"] = (("time",), np.minimum(values[:, 0] / least, singular.INFINITE))
+    variables["rank"] = (("time",), rank)
+    variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
+    if not values.shape[1]:
+        return variables, {}
+    found = _passes(engine, trajectory, values)
+    _refuse_rest(found, trajectory, seen["energy"][:, 0])
+    variables |= {
+        "pass_time": (("singular_pass",), np.array([p.time for p in found])),
+        "pass_condition": (("singular_pass",), np.array([p.condition for p in found])),
+        "pass_rank_loss": (("singular_pass",), np.array([p.lost for p in found], dtype=np.int32)),
+    }
+    return variables, {"pass_joint": ("singular_pass", np.array([p.joint for p in found], dtype=str))}
+
+
+def _jacobians(engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> np.ndarray:
+    """Scaled closure Jacobian of every row, with the rows solved for there; (time, rank, nv)."""
+    parts = []
+    for part, kept in trajectory.parts():
+        engine.keep(kept)
+        J = selection.dense(engine.built, engine.h, seen["jacobian"][part])
+        parts.append(singular.scaled(engine.built, engine.h, J))
+    return np.concatenate(parts)
+
+
+def _singular_values(engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> np.ndarray:
+    J = _jacobians(engine, trajectory, seen)
+    return np.linalg.svd(J, compute_uv=False) if J.size else np.zeros((len(J), 0))
+
+
+def _passes(engine: Engine, trajectory: Trajectory, values: np.ndarray) -> list[Pass]:
+    """Poses between two rows in which singular values of the closures pass through zero.
+
+    A singular value has no sign, but u^T J v with the singular vectors u, v of the row before has one, and keeps
+    it unless it passes through zero.
+    """
+    least = values[:, -1]
+    lowest = np.r_[True, least[1:] <= least[:-1]] & np.r_[least[:-1] <= least[1:], True]
+    valleys = np.flatnonzero(lowest & (least < LOW * np.median(least)))
+    starts = {int(k) for k in (*(valleys - 1), *valleys) if 0 <= k < len(least) - 1}
+    found = (_pass_after(engine, trajectory, k) for k in sorted(starts))
+    return [p for p in found if p is not None]
+
+
+def _pass_after(engine: Engine, trajectory: Trajectory, k: int) -> Pass | None:
+    """The pass between rows k and k + 1, if there is one."""
+    jacobian = _between(engine, trajectory, k)
+    U, _, Vt = np.linalg.svd(jacobian(0.0), full_matrices=False)
+
+    def signed(share: float) -> np.ndarray:
+        B = U.T @ jacobian(share) @ Vt.T
+        return np.asarray(np.linalg.eigvalsh(0.5 * (B + B.T)))
+
+    lost = int(np.sum(signed(1.0) < 0.0))
+    if not lost:
+        return None
+    low, high = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if signed(middle)[0] < 0.0 else (middle, high)
+    times = trajectory.time
+    there = np.linalg.svd(jacobian(low))
+    joint = singular.worst_joint(engine, there[0][:, -1])
+    return Pass(float(times[k] + low * (times[k + 1] - times[k])), singular.condition(there[1]), lost, joint)
+
+
+def _between(engine: Engine, trajectory: Trajectory, k: int) -> Callable[[float], np.ndarray]:
+    """Scaled closure Jacobian at a share of the way from row k to k + 1, on the states' cubic Hermite interpolant."""
+    start, end = trajectory.time[k], trajectory.time[k + 1]
+    engine.keep(trajectory.selection(k + 1))
+    engine.select_pieces(0.5 * (start + end))
+    first = 1 + 2 * len(engine.built.system.contacts)
+    states, step = trajectory.rows[k : k + 2, first:], end - start
+    rates = []
+    for t, y in zip((start, end), states, strict=True):
+        engine.attempt(y, t)
+        rates.append(engine.view("SLOPES", len(y)).copy())
+
+    def jacobian(share: float) -> np.ndarray:
+        s = share
+        weights = (1 + 2 * s) * (1 - s) ** 2, s * s * (3 - 2 * s), s * (1 - s) ** 2 * step, s * s * (s - 1) * step
+        y = weights[0] * states[0] + weights[1] * states[1] + weights[2] * rates[0] + weights[3] * rates[1]
+        engine.attempt(y, float(start + s * step))
+        return singular.scaled(engine.built, engine.h, engine.rows("JACOBIAN"))
+
+    return jacobian
+
+
+def _refuse_rest(found: list[Pass], trajectory: Trajectory, kinetic: np.ndarray) -> None:
+    """SolverError for a singular pose passed so slowly that rounding, not motion, chooses how it goes on."""
+    for p in found:
+        if np.interp(p.time, trajectory.time, kinetic) <= AT_REST * np.max(kinetic):
+            raise SolverError(
+                f"at t = {p.time:.6g} s: the mechanism comes to rest in a singular pose (joint {p.joint}, condition "
+                f"number {p.condition:.3g}), where it can go on in several ways; give it another motion"
+            )
