@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
-__all__ = ["load_scene", "run"]
+__all__ = ["cost", "load_scene", "run"]
 
 
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
@@ -46,3 +46,14 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     # resolved only here, at the door.
     stages: Any = import_module("stages.run")
     return stages.run(load_scene(scene) if isinstance(scene, (str, Path)) else scene)
+
+
+def cost(scene: Scene | str | Path) -> xr.Dataset:
+    """Error against cost of a scene over integrators, tolerances, steps and models; cached point by point.
+
+    The quantities are those of the scene's `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    """
+    study: Any = import_module("stages.cost")
+    run_: Any = import_module("stages.run")
+    dataset: xr.Dataset = study.bring(load_scene(scene) if isinstance(scene, (str, Path)) else scene, run_.workplace())[0]
+    return dataset

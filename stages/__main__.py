@@ -52,6 +52,10 @@ def parser() -> argparse.ArgumentParser:
     command.add_argument("scenes", nargs="+", metavar="SCENE")
     command.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
 
+    command = _verb(verbs, "cost", _cost, "what accuracy costs: errors against cost, and where they come from")
+    command.add_argument("scenes", nargs="+", metavar="SCENE")
+    command.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
+
     command = _verb(verbs, "render", _render, "pictures, film and interactive page of scenes")
     command.add_argument("scenes", nargs="+", metavar="SCENE")
 
@@ -93,6 +97,18 @@ def _why(options: argparse.Namespace) -> None:
         for state in states(graph.up_to(options.to), place.store, place.sources):
             lines = list(state.why) or ["fresh"]
             print(f"  {state.task.label:<16} {lines[0]}", *(f"  {'':<16} {line}" for line in lines[1:]), sep="\n")
+
+
+def _cost(options: argparse.Namespace) -> None:
+    from stages import cost, run
+
+    place, studies = run.workplace(), {}
+    for graph in run.graphs(options.scenes):
+        studies[graph.scene.name] = _, folder = cost.bring(graph.scene, place)
+        print(*((folder / name).read_text() for name in cost.PRINTED if (folder / name).is_file()), sep="\n")
+        print(f"figures and data: {folder}\n")
+    if options.page is not None:
+        cost.write_page(studies, options.page)
 
 
 def _render(options: argparse.Namespace) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
@@ -27,16 +29,24 @@ class Graph:
 
     shown: whether the artifacts take their place below results/runs; an edited copy of a scene
     must not take that of its original.
+    recipe: edits of all mesh recipes: `theory`, and a factor for the number of `elements`.
     """
 
     scene: Scene
     shown: bool = True
+    recipe: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def mesh(self) -> dict[str, Task]:
         """By flexible body."""
         return {
-            body: self._body_task("mesh", body, "stages.s1_mesh:run", s1_mesh.params(Path(part.mesh)))
+            body: self._body_task(
+                "mesh",
+                body,
+                "stages.s1_mesh:run",
+                s1_mesh.params(Path(part.mesh), self.recipe),
+                modules=s1_mesh.modules(Path(part.mesh)),
+            )
             for body, part in self.scene.flexible().items()
         }
 
@@ -60,9 +70,14 @@ class Graph:
         """By flexible body."""
         return {
             body: self._body_task(
-                "bundle", body, "stages.s3_bundle:run", {}, {"mesh": self.mesh[body], "modes": self.modes[body]}
+                "bundle",
+                body,
+                "stages.s3_bundle:run",
+                {},
+                {"mesh": self.mesh[body], "modes": self.modes[body]},
+                s1_mesh.modules(Path(part.mesh)),
             )
-            for body in self.scene.flexible()
+            for body, part in self.scene.flexible().items()
         }
 
     @cached_property

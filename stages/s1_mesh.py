@@ -15,9 +15,16 @@ if TYPE_CHECKING:
     from pipeline.core.workflow.execute import Progress
 
 
-def params(recipe: Path) -> dict[str, Any]:
-    """The recipe's content; where it lies does not matter. Raises InputError when it cannot be read."""
-    return {"recipe": read_toml(recipe)}
+def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The recipe's content; where it lies does not matter. Raises InputError when it cannot be read.
+
+    edits: values that take the place of the recipe's; of `elements` a factor.
+    """
+    table = read_toml(recipe)
+    changes = dict(edits or {})
+    if "elements" in changes:
+        changes["elements"] = changes["elements"] * table["elements"]
+    return {"recipe": table | changes}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

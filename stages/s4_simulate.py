@@ -21,20 +21,28 @@ KERNELS = (
     "assembly.closures",
     "assembly.dispatch",
     "assembly.equations",
+    "assembly.known",
     "assembly.kinematics",
     "bodies.rigid",
-    "integrate.explicit",
+    "integrate.displace",
     "integrate.observe",
     "integrate.project",
+    "integrate.stepper",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
 CONTACT_KERNELS = ("integrate.events",)
+#: of scenes with contacts that are noticed at step ends, and of fixed or chosen steps
+UNLOCATED_KERNELS = ("integrate.step_ends",)
+FIXED_KERNELS, ADAPTIVE_KERNELS = ("integrate.fixed",), ("integrate.adaptive",)
+LOAD_KERNELS = ("loads.composing",)
+#: joint types that the chain of a joint with several axes, or of a path, is made of
+CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
     """What the engine sees of a scene. Titles and the place of files on disk are not part of it,
-    nor is the ensemble of a single run, nor the accuracy that somebody wants."""
-    left_out = {"title", "description", "accuracy"} | (set() if ensemble else {"ensemble"})
+    nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
+    left_out = {"title", "description", "accuracy" if ensemble else "ensemble"}
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.flexible():
         table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
@@ -46,14 +54,24 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
+    from pipeline.core.scene.laws import law_types
+
     joints = f"{DYNAMICS}.joints"
     found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
     found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
-    kernels = KERNELS + (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
+    laws = {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
+    kernels: tuple[str, ...] = KERNELS + (ADAPTIVE_KERNELS if scene.solver.step is None else FIXED_KERNELS)
+    kernels += (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
+    kernels += UNLOCATED_KERNELS if scene.contacts() and scene.solver.events != "located" else ()
+    kernels += (LOAD_KERNELS if scene.forces() else ()) + (("drives.oscillation",) if "harmonic" in laws else ())
     found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"
         found.add(module(joints, joint.type, where=f"[joint.{name}]", table=table))
+    if any(j.type in ("universal", "cylindrical", "planar") for j in scene.joint.values()) or any(
+        not hasattr(d, "joint") for d in scene.drive.values()
+    ):
+        found |= {module(joints, name, where="joint") for name in CHAIN}
     for name, contact in scene.contacts().items():
         where = f"[joint.{name}.normal]"
         found.add(module(f"{DYNAMICS}.contact", contact.type, where=where))
@@ -61,8 +79,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
         if contact.friction is not None:
             where = f"[joint.{name}.friction]"
             found.add(module(f"{DYNAMICS}.contact.friction", contact.friction.law, where=where))
-    for name, drive in scene.drive.items():
-        found.add(module(f"{DYNAMICS}.drives", drive.law.type, where=f"[drive.{name}.law]"))
+    found |= {module(f"{DYNAMICS}.drives", law, where="law") for law in laws}
     for name, load in scene.load.items():
         found.add(module(f"{DYNAMICS}.loads", load.type, where=f"[load.{name}]"))
     return tuple(sorted(found))

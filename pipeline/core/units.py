@@ -10,6 +10,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "m": (1.0, "length"),
     "mm": (1e-3, "length"),
     "um": (1e-6, "length"),
+    "nm": (1e-9, "length"),
     "cm": (1e-2, "length"),
     "in": (0.0254, "length"),
     "s": (1.0, "time"),
@@ -20,11 +21,13 @@ UNITS: dict[str, tuple[float, str]] = {
     "t": (1e3, "mass"),
     "rad": (1.0, "angle"),
     "mrad": (1e-3, "angle"),
+    "urad": (1e-6, "angle"),
     "deg": (math.pi / 180.0, "angle"),
     "N": (1.0, "force"),
     "kN": (1e3, "force"),
     "N m": (1.0, "torque"),
     "N mm": (1e-3, "torque"),
+    "N s": (1.0, "impulse"),
     "Pa": (1.0, "pressure"),
     "MPa": (1e6, "pressure"),
     "GPa": (1e9, "pressure"),
@@ -48,8 +51,11 @@ UNITS: dict[str, tuple[float, str]] = {
     "N/m": (1.0, "stiffness"),
     "N/mm": (1e3, "stiffness"),
     "N/m^1.5": (1.0, "Hertz stiffness"),
+    "kN/m": (1e3, "stiffness"),
     "N s/m": (1.0, "damping"),
+    "N s/mm": (1e3, "damping"),
     "N m/rad": (1.0, "torsional stiffness"),
+    "N m/deg": (180.0 / math.pi, "torsional stiffness"),
     "N m s/rad": (1.0, "torsional damping"),
     "%": (1e-2, "number"),
 }
@@ -86,9 +92,26 @@ def quantity(value: object, dimension: str) -> float:
     return result
 
 
+def any_quantity(value: object) -> float | str:
+    """A bare number, or a quantity in words in its SI unit (``"60 mm"`` -> ``"0.06 m"``), whatever it measures.
+
+    For places whose dimension another part of the scene decides; `quantity` reads the result.
+    Raises ValueError as `quantity` does.
+    """
+    match = _QUANTITY.match(value) if isinstance(value, str) else None
+    unit = match[2] if match is not None else None
+    if unit is None or unit == "%":
+        return quantity(value, "number")
+    if unit not in UNITS:
+        raise ValueError(f"unknown unit '{unit}'; known: {', '.join(UNITS)}")
+    dimension = UNITS[unit][1]
+    return f"{quantity(value, dimension)!r} {_example(dimension, factor=1.0)}"
+
+
 def _known(dimension: str) -> str:
     return ", ".join(unit for unit, (_, found) in UNITS.items() if found == dimension) or "SI"
 
 
-def _example(dimension: str) -> str:
-    return next((unit for unit, (_, found) in UNITS.items() if found == dimension), "")
+def _example(dimension: str, factor: float | None = None) -> str:
+    """A unit of this dimension; with `factor`, the one that is so many SI units."""
+    return next((u for u, (f, found) in UNITS.items() if found == dimension and factor in (None, f)), "")

@@ -19,13 +19,20 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     """One run of a scene (schema RUN).
 
     bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
+    A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
     from pipeline.dynamics.record.dataset import dataset
     from pipeline.dynamics.run import integrate
 
-    done = integrate(scene, bundles, progress)
-    return dataset(done.engine, done.trajectory, done.observed, done.start_residual)
+    def once(edited: Scene) -> xr.Dataset:
+        return dataset(integrate(edited, bundles, progress))
+
+    if scene.accuracy is None or not scene.accuracy.quantities:
+        return once(scene)
+    from pipeline.dynamics.accuracy import deliver
+
+    return deliver(scene, once, progress)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:

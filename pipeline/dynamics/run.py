@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -12,19 +13,30 @@ from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
 
+if TYPE_CHECKING:
+    from pipeline.dynamics.sensitivity import Twin
+
 
 @dataclass(frozen=True)
 class Run:
-    """A finished integration. start_residual: loops' residual as the scene gives its start [m]."""
+    """A finished integration.
 
+    scene: as the user gave it; the engine may hold another, made for it.
+    start_residual: loops' residual as the scene gives its start [m].
+    twin: the run's twin, of scenes with contacts.
+    """
+
+    scene: Scene
     engine: Engine
     trajectory: Trajectory
     observed: dict[str, np.ndarray]
     start_residual: float
+    twin: Twin | None
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
@@ -33,11 +45,24 @@ def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
 
 def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
-    """Build, start, integrate and observe a scene."""
-    engine = engine_of(scene, bundles, progress)
+    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands."""
+    driven, given = scene, dict[str, Pieces]()
+    if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
+        from pipeline.dynamics.inverse import actuated
+
+        driven, given = actuated(scene, bundles, progress)
+    engine = prepare(tabulate(build(driven, bundles), given), progress)
     start, residual = consistent_start(engine)
     trajectory = step(engine, start, progress)
-    return Run(engine, trajectory, observed(engine, trajectory), residual)
+    return Run(scene, engine, trajectory, observed(engine, trajectory), residual, _twin(engine, start, trajectory))
+
+
+def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+    if not engine.built.system.contacts:
+        return None
+    from pipeline.dynamics.sensitivity import twin
+
+    return twin(engine, start, trajectory)
 
 
 def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:

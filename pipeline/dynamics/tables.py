@@ -9,11 +9,10 @@ are, what is joined to what, every number, stands in three flat arrays that ever
 
 Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
 
-Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site*
-is a frame on a link that a joint, closure or contact uses. A *port* is a site on a flexible
-link. A *coordinate* is one generalised speed; free ones come first, in the order of
-elimination (descendants before ancestors), prescribed ones after. A *column* is the twist
-(angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
+Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
+that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
+speed; free ones come first, in the order of elimination (descendants before ancestors), prescribed ones after. A
+*column* is the twist (angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
 coordinate has one, and every port one more per mode.
 """
 
@@ -24,7 +23,7 @@ from pipeline.dynamics.vectors import index, kernel
 #: header of h: sizes
 SIZES = (
     "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_KEPT_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS "
-    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE JACOBIAN_SIZE MOST_MODES"
+    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE JACOBIAN_SIZE MOST_MODES N_LAWS N_LOADS N_TURNS LOAD_SLOT"
 ).split()
 #: wiring tables in h: name -> columns
 WIRING = {
@@ -51,7 +50,10 @@ WIRING = {
     "COMMON": 2,  # slot in a, slot in b
     "CLOSURE_ENVELOPE": 2,  # of the rows that are solved for
     "CONTACTS": 4,  # socket site, ball site, normal law, friction law
-    "DRIVES": 2,  # first piece, number of pieces
+    "LAWS": 2,  # first piece, number of pieces; the drives' laws first
+    "PIECE_HARMONICS": 2,  # first harmonic, number of harmonics
+    "LOADS": 12,  # see `loads.fields`
+    "LOAD_KINDS": 2,  # first load of a kind, number of them
     "GROUPS": 1,  # error group of each state variable
 }
 #: numbers in f: name -> columns
@@ -64,7 +66,9 @@ NUMBERS = {
     "PORT_NUMBERS": 12,  # undeformed position (3), rotation (9)
     "PORT_DATA": 1,  # per port: translation shape (3n), rotation shape (3n)
     "CONTACT_NUMBERS": 11,  # clearance, ball radius, floor, normal law (4), friction law (4)
-    "PIECES": 7,  # start, six coefficients
+    "PIECES": 9,  # start, eight coefficients
+    "HARMONICS": 3,  # amplitude, angular frequency, phase
+    "LOAD_NUMBERS": 5,  # see `loads`
     "GRAVITY": 3,
     "FLOORS": 1,  # per error group: magnitude below which it is resolved absolutely
 }
@@ -72,11 +76,13 @@ NUMBERS = {
 WORK = (
     "X U DU LINK_FRAMES SITE_FRAMES JOINT OWN INERTIA WRENCH COLUMNS MOMENTA DEFORMATION BIAS MODAL_BIAS "
     "MODAL SCRATCH MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR ROW_SCALE PIVOT MULTIPLIER TOUCH "
-    "DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MAGNITUDE CORRECTION LATCHED WATCH "
-    "CONTROL"
+    "LAW LOAD TURN DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MEMORY MAGNITUDE CORRECTION "
+    "LATCHED WATCH CONTROL"
 ).split()
 _PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK])}
 HEADER = len(_PLACE)
+#: places that only the kernels of some effects need, which name them themselves
+ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT".split()
 
 
 def place(name: str) -> int:
@@ -106,7 +112,10 @@ def place(name: str) -> int:
     SCHUR_SIZE,
     JACOBIAN_SIZE,
     MOST_MODES,
-) = (place(name) for name in SIZES)
+    N_LAWS,
+    N_LOADS,
+    N_TURNS,
+) = (place(name) for name in SIZES if name not in ELSEWHERE)
 (
     LINKS,
     SITES,
@@ -125,9 +134,8 @@ def place(name: str) -> int:
     COMMON,
     CLOSURE_ENVELOPE,
     CONTACTS,
-    DRIVES,
     GROUPS,
-) = (place(name) for name in WIRING)
+) = (place(name) for name in WIRING if name not in ELSEWHERE)
 (
     LINK_NUMBERS,
     SITE_NUMBERS,
@@ -140,7 +148,7 @@ def place(name: str) -> int:
     PIECES,
     GRAVITY,
     FLOORS,
-) = (place(name) for name in NUMBERS)
+) = (place(name) for name in NUMBERS if name not in ELSEWHERE)
 (
     X,
     U,
@@ -171,6 +179,9 @@ def place(name: str) -> int:
     PIVOT,
     MULTIPLIER,
     TOUCH,
+    LAW,
+    LOAD,
+    TURN,
     DRIVE_FORCE,
     LEDGER_RATE,
     POSITION_RATE,
@@ -179,6 +190,7 @@ def place(name: str) -> int:
     Y_STAGE,
     SLOPES,
     DENSE,
+    MEMORY,
     MAGNITUDE,
     CORRECTION,
     LATCHED,
@@ -196,16 +208,10 @@ CLEARANCE, BALL_RADIUS, FLOOR, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 7
 # a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
 ORIGIN, AXES, OMEGA, VELOCITY, ALPHA, ACCELERATION, FRAME_SIZE = 0, 3, 12, 15, 18, 21, 24
 # a joint's motion: rotation (9), position (3), rates (3 + 3), rate biases (3 + 3), then columns (6 each)
-J_ROTATION, J_POSITION, J_OMEGA, J_VELOCITY, J_ALPHA, J_ACCELERATION, J_COLUMNS, JOINT_SIZE = (
-    0,
-    9,
-    12,
-    15,
-    18,
-    21,
-    24,
-    60,
-)
+J_ROTATION, J_POSITION, J_OMEGA, J_VELOCITY, J_ALPHA, J_ACCELERATION, J_COLUMNS = 0, 9, 12, 15, 18, 21, 24
+JOINT_SIZE = 60
+# a law's value, rate and second rate; a piece of it; what a load does now, and in it the energy that it stores
+LAW_SIZE, PIECE_SIZE, LOAD_SIZE, LOAD_STORED = 3, 9, 11, 8
 # spatial inertia: mass, mass * centre (3), inertia about the kernels' origin (xx yy zz xy xz yz)
 INERTIA_SIZE = 10
 # what a contact does now
@@ -217,8 +223,8 @@ DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
 # dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
 # what evaluate reports in n[EVALUATION]
-OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED = range(4)
-#: first entries of n, the integers that change: report of the last evaluation; then the drives' active pieces
+OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
+#: first entries of n, the integers that change: report of the last evaluation; then the laws' active pieces
 #: and the contacts' modes start where n[ACTIVE] and n[MODE] say
 EVALUATION, ACTIVE, MODE = range(3)
 

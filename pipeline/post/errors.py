@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.post.rotations import angle_about_y, rotation_between
-
-#: two output times are the same when they agree after rounding to this many decimals [s]; outputs are
-#: 1e-4 s apart and event times fall anywhere, so a nanosecond separates what is equal from what is not
-DECIMALS = 9
+from pipeline.core.algebra import rotation_between
+from pipeline.core.quantities import DECIMALS, common_times
+from pipeline.post.rotations import angle_about_y
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +21,6 @@ class Deviation:
     displacement: float  #: z [m]
     velocity: float  #: along z [m/s]
     until: float  #: last time that was compared [s]
-
-
-def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Indices into a and into b of the times that both have, ascending, each time once."""
-    _, first, second = np.intersect1d(np.round(a, DECIMALS), np.round(b, DECIMALS), return_indices=True)
-    return first, second
 
 
 def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: float = np.inf) -> Deviation:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-#: a located closing counts as an impact above this approach speed [m/s]
-THRESHOLD = 1e-4
+from pipeline.core.quantities import IMPACT
 
 
 def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Variables ``impact_*`` of the post artifact; empty for a run without contacts.
 
-    Listed are the closings with an approach speed above THRESHOLD whose contact ended inside the
+    Listed are the closings with an approach speed above IMPACT whose contact ended inside the
     run; the separation speed is that of the next opening of the same contact.  `impact_count` also
     counts a last one that has not ended.
     """
@@ -21,7 +20,7 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     contact = run.event_contact.values.astype(int)
     speed = run.event_approach_speed.values
     closings = closing(run)
-    strong = np.flatnonzero(closings & (speed > THRESHOLD))
+    strong = np.flatnonzero(closings & (speed > IMPACT))
     opens = np.array([_next_opening(int(i), contact, closings) for i in strong], dtype=int)
     kept, opens = strong[opens >= 0], opens[opens >= 0]
     peak = run.event_peak_force.values[kept]

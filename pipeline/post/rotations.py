@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.algebra import quaternion_conjugate, quaternion_product, quaternion_to_matrix
+from pipeline.core.algebra import quaternion_to_matrix
 
 
 def angle_about_y(quaternion: np.ndarray) -> np.ndarray:
@@ -15,13 +15,3 @@ def angle_about_y(quaternion: np.ndarray) -> np.ndarray:
     """
     R = quaternion_to_matrix(quaternion)
     return np.arcsin(np.clip(R[..., 0, 2], -1.0, 1.0))
-
-
-def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Angle of the rotation that takes pose a to pose b [rad], shape (...,), in [0, pi].
-
-    a, b: unit quaternions, shape (..., 4).  Accurate for small angles too: the angle is taken from
-    the vector part, not from an arc cosine near 1.
-    """
-    relative = quaternion_product(quaternion_conjugate(a), b)
-    return 2.0 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))

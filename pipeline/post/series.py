@@ -7,10 +7,12 @@ import json
 import numpy as np
 import xarray as xr
 
+from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.schema import conform
+from pipeline.core.quantities import IMPACT
 from pipeline.post.horizon import SHARE, Variables, ensemble_statistics, horizon
-from pipeline.post.impacts import THRESHOLD, impacts
-from pipeline.post.rotations import angle_about_y, rotation_between
+from pipeline.post.impacts import impacts
+from pipeline.post.rotations import angle_about_y
 from pipeline.post.schema import POST
 
 
@@ -18,13 +20,13 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     """The post artifact of one run (schema POST): rotations, displacements, reactions, impacts, horizon.
 
     run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one the horizon is
-    the end of the run and there are no ensemble variables.  Nothing is interpolated: series are on
-    the run's own times, ensemble statistics on `ensemble_time`.
+    the run's own (its end where it has none) and there are no ensemble variables.  Nothing is
+    interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
     """
     data: Variables = {**motion(run), **contacts(run), **impacts(run)}
     names, force = reactions(run)
     data["reaction"] = (("time", "joint"), force)
-    end = float(run.time.values[-1])
+    end = float(run["horizon"] if "horizon" in run else run.time.values[-1])
     coords = {name: run[name].values for name in ("time", "body", "contact") if name in run.coords}
     coords["joint"] = np.array(names, dtype=str)
     if ensemble is not None:
@@ -34,8 +36,8 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     data["horizon"] = ((), np.array(end))
     attributes = {
         "scene": str(run.attrs.get("scene", "")),
-        "impact_threshold": f"{THRESHOLD:g} m/s",
-        "horizon_criterion": f"velocities of the ensemble's members differ by {SHARE:g} of the largest velocity",
+        "impact_threshold": f"{IMPACT:g} m/s",
+        "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {SHARE:g} of the largest",
     }
     result = conform(xr.Dataset(data, coords=coords), POST, **attributes)
     if ensemble is not None:

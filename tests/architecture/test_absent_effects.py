@@ -16,6 +16,7 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly import fuse
 from pipeline.dynamics.assembly.numbers import Kinds, tabulate
 from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics.integrate.method import Scheme, scheme_of
 from tests.analytic.mechanism_runs import bundles
 
 CONTACT = (
@@ -24,7 +25,7 @@ CONTACT = (
     "pipeline.dynamics.integrate.events",
 )
 FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
-INTEGRATOR = "dop853"
+SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 
 #: runs a scene for a moment, then says which modules of the project it took
@@ -109,7 +110,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str) -> None:
     found, present = CASES[case]
-    source = fuse._source(found, INTEGRATOR)
+    source = fuse._source(found, SCHEME)
     modules = reached(source)
     for effect, (word, module) in EFFECTS.items():
         assert (word in source) == (effect in present), effect
@@ -120,7 +121,7 @@ def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str)
 def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     """An edit of a part that a scene does not use leaves its machine code alone."""
     found, present = CASES[case]
-    modules = reached(fuse._source(found, INTEGRATOR))
+    modules = reached(fuse._source(found, SCHEME))
     wanted = {fuse.module_of(fuse.PACKAGES["joint"], n) for n in found.joints}
     if "contact" in present:
         wanted.add("pipeline.dynamics.joints.clearance_spherical")
@@ -132,7 +133,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 
 
 def test_frictionless_clearance_reaches_no_friction_law() -> None:
-    modules = reached(fuse._source(CASES["smooth clearance"][0], INTEGRATOR))
+    modules = reached(fuse._source(CASES["smooth clearance"][0], SCHEME))
     assert below(modules, ("pipeline.dynamics.contact.friction",)) == set()
 
 
@@ -140,7 +141,7 @@ def test_frictionless_clearance_reaches_no_friction_law() -> None:
 
 
 def digest(scene: Scene) -> str:
-    return fuse._digest(fuse._source(kinds_of(scene), scene.solver.integrator))
+    return fuse._digest(fuse._source(kinds_of(scene), scheme_of(scene.solver)))
 
 
 #: one number of every kind that a scene has

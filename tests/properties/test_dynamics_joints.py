@@ -48,6 +48,8 @@ def coordinates(name: str, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     random = np.random.default_rng(seed)
     part = declared(name)
     x = random.uniform(-2.0, 2.0, len(part.POSITIONS))
+    if name == "rotation-vector":
+        x *= random.choice([1e-3, 0.05, 1.4]) / np.linalg.norm(x) * 2.0  # below pi: its inverse is unique there
     if part.POSITIONS.startswith("rrrr"):
         turning = random.normal(size=3)
         x[:4] = rotation_vector_to_quaternion(turning / np.linalg.norm(turning) * random.uniform(0.0, 3.1))

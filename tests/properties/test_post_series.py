@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.core.algebra import quaternion_product, rotation_vector_to_quaternion
+from pipeline.core.algebra import quaternion_product, rotation_between, rotation_vector_to_quaternion
+from pipeline.core.quantities import common_times
 from pipeline.post import derive
-from pipeline.post.errors import common_times, ensemble_deviations, max_deviation
+from pipeline.post.errors import ensemble_deviations, max_deviation
 from pipeline.post.horizon import horizon, spread
 from pipeline.post.poincare import at_times, strobe_times
-from pipeline.post.rotations import angle_about_y, rotation_between
+from pipeline.post.rotations import angle_about_y
 from pipeline.post.spectra import amplitude_spectrum, dominant_frequency
 from tests.paper import synthetic
 

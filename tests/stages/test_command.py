@@ -61,8 +61,8 @@ WRONG = {
         ["joint.J.normal", "did you mean 'lankarani-nikravesh'"],
     ),
     "unknown integrator": (
-        SCENE + JOINT + '\n[solver]\nintegrator = "rk4"\n',
-        ["[solver]", "no integrator is called 'rk4'"],
+        SCENE + JOINT + '\n[solver]\nintegrator = "rk5"\n',
+        ["[solver]", "no integrator is called 'rk5'", "did you mean 'rk4'"],
     ),
     "no such recipe": (
         SCENE + ROD,

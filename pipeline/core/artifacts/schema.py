@@ -42,6 +42,27 @@ MESH: Schema = {
     "frame_node": _V(("frame",), "1", "node to which the named frame is tied"),
     "frame_position": _V(("frame", "axis"), "m", "origin of the named frame in the mesh frame"),
     "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, frame to mesh frame"),
+    "abscissa": _V(("node",), "m", "place of the node along the rod", optional=True),
+    "rod_rotation": _V(
+        ("axis", "axis2"), "1", "rotation matrix, rod axes (x along the rod) to mesh frame", optional=True
+    ),
+    "shear_coefficient": _V(
+        ("cell", "axis"), "1", "share of the area that carries force along x, y and z of the rod", optional=True
+    ),
+    "product_moment": _V(("cell",), "m4", "integral of y z over the section (stiffness)", optional=True),
+    "inertia_product": _V(("cell",), "m4", "integral of y z over the section (mass)", optional=True),
+    "area_profile": _V(("cell", "point"), "1", "area at the Gauss points over that of the cell", optional=True),
+    "second_moment_profile": _V(
+        ("cell", "point", "axis"), "1", "second moments at the Gauss points over those of the cell", optional=True
+    ),
+    "inertia_moment_profile": _V(("cell", "point", "axis"), "1", "second moments of the mass likewise", optional=True),
+    "shear_coefficient_profile": _V(("cell", "point", "axis"), "1", "shear coefficients likewise", optional=True),
+    "lump_node": _V(("lump",), "1", "node that carries the lumped mass", optional=True),
+    "lump_mass": _V(("lump",), "kg", "lumped mass", optional=True),
+    "lump_offset": _V(("lump", "axis"), "m", "centre of the lumped mass seen from its node, mesh axes", optional=True),
+    "lump_inertia": _V(
+        ("lump", "axis", "axis2"), "kg m2", "inertia of the lumped mass about its centre, mesh axes", optional=True
+    ),
 }
 
 #: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
@@ -110,6 +131,28 @@ RUN: Schema = {
     "modal_velocity": _V(("time", "mode"), "kg0.5 m s-1", "rate of the modal coordinate", optional=True),
     "drive_force": _V(("time", "drive"), "N or N m", "what the drive supplies along its coordinate", optional=True),
     "drive_position": _V(("time", "drive"), "m or rad", "prescribed coordinate", optional=True),
+    "joint_position": _V(
+        ("time", "coordinate"), "m or rad", "joint coordinate of the second frame against the first", optional=True
+    ),
+    "joint_velocity": _V(("time", "coordinate"), "m s-1 or rad s-1", "rate of the joint coordinate", optional=True),
+    "joint_acceleration": _V(
+        ("time", "coordinate"), "m s-2 or rad s-2", "second rate of the joint coordinate", optional=True
+    ),
+    "load_force": _V(
+        ("time", "load", "axis"), "N", "force of the load on its frame, or its second one, world axes", optional=True
+    ),
+    "load_moment": _V(
+        ("time", "load", "axis"),
+        "N m",
+        "moment of the load there, about that frame's origin, world axes",
+        optional=True,
+    ),
+    "load_length": _V(
+        ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
+    ),
+    "load_power": _V(
+        ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
+    ),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
@@ -124,8 +167,9 @@ RUN: Schema = {
     "elastic": _V(("time",), "J", "energy stored in flexible bodies, springs and contacts"),
     "dissipated": _V(("time",), "J", "energy dissipated since the start"),
     "drive_work": _V(("time",), "J", "work supplied by the drives since the start"),
+    "load_work": _V(("time",), "J", "work of forces and torques since the start", optional=True),
     "energy_error": _V(
-        ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work, minus its start value"
+        ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work - load_work, minus its start value"
     ),
     "constraint_error": _V(("time",), "m", "largest violation of a loop closure, redundant rows included"),
     "mobility": _V(("time",), "1", "degrees of freedom, prescribed ones not counted", optional=True),
@@ -139,6 +183,13 @@ RUN: Schema = {
     "pass_time": _V(("singular_pass",), "s", "time of a pass through a singular pose", optional=True),
     "pass_condition": _V(("singular_pass",), "1", "condition number where the pass was located", optional=True),
     "pass_rank_loss": _V(("singular_pass",), "1", "closure rows that depend on others in that pose", optional=True),
+    "horizon": _V((), "s", "time up to which pointwise values mean something", optional=True),
+    "twin_separation": _V(
+        ("twin_time",),
+        "m s-1",
+        "largest distance of a velocity from that in the same run started `twin_perturbation` [m] away",
+        optional=True,
+    ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
     "event_contact": _V(("event",), "1", "index of the contact", optional=True),
     "event_kind": _V(("event",), "1", "closing or opening", optional=True),

@@ -42,9 +42,14 @@ if TYPE_CHECKING:
     Mass: TypeAlias = float
     Angle: TypeAlias = float
     Speed: TypeAlias = float
+    Rate: TypeAlias = float
+    Stiffness: TypeAlias = float
+    Damping: TypeAlias = float
     Pressure: TypeAlias = float
     Density: TypeAlias = float
     Number: TypeAlias = float
+    Area: TypeAlias = float
+    SecondMoment: TypeAlias = float
     Position: TypeAlias = tuple[float, float, float]
     Velocity: TypeAlias = tuple[float, float, float]
     AngularVelocity: TypeAlias = tuple[float, float, float]
@@ -57,9 +62,14 @@ else:
     Mass = _scalar("mass")
     Angle = _scalar("angle")
     Speed = _scalar("velocity")
+    Rate = _scalar("angular velocity")
+    Stiffness = _scalar("stiffness")
+    Damping = _scalar("damping")
     Pressure = _scalar("pressure")
     Density = _scalar("density")
     Number = _scalar("number")
+    Area = _scalar("area")
+    SecondMoment = _scalar("second moment of area")
     Position = _vector("length")
     Velocity = _vector("velocity")
     AngularVelocity = _vector("angular velocity")
@@ -95,6 +105,8 @@ Inertia = Annotated[
     BeforeValidator(_inertia),
     WithJsonSchema({"type": "array", "description": "[Ixx, Iyy, Izz] or 3x3, about the centre of mass, body axes"}),
 ]
+
+FrameName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*\.[A-Za-z_]\w*$", description="body.FRAME")]
 
 #: where values come from: one text for the whole part, or one per key; "assumed: why" for assumptions
 Source = str | dict[str, str]

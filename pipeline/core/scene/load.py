@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +15,13 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
+#: types of parts, by which their models are chosen
 TYPES = (
-    "ground",
-    "rigid",
-    "flexible",
-    "spherical",
-    "revolute",
-    "prismatic",
-    "fixed",
-    "clearance-spherical",
-    "step",
-    "constant",
+    *("ground", "rigid", "flexible"),
+    *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "clearance-spherical"),
+    *("joint-drive", "path-drive"),
+    *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise"),
+    *("gravity", "point-force", "point-torque", "spring-damper", "joint-force", "joint-spring", "joint-friction"),
 )
 SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
 EDITS = ("extends", "replace", "set", "remove")
@@ -50,6 +46,22 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     return scene
 
 
+def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
+    """A copy of a scene with dotted places changed, as in `load_scene`; None takes a setting or a part away."""
+    table = scene.model_dump(mode="json", exclude_none=True)
+    for place, value in override.items():
+        if value is not None:
+            _put(table, place, value, f"edit of {scene.name}")
+        elif place in table:
+            del table[place]
+    try:
+        result = Scene.model_validate(table)
+    except ValidationError as error:
+        raise InputErrors([_input_error(Path(scene.name), e) for e in error.errors()]) from None
+    result._name, result._path = scene._name, scene._path
+    return result
+
+
 def scene_name(path: Path) -> str:
     """Path below the last folder called ``scenes``, without suffix; else the file's stem."""
     parts = path.resolve().with_suffix("").parts
@@ -70,7 +82,7 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
         extra = [key for key in EDITS if key in table]
         if extra:
             raise InputError(f"{path} [{extra[0]}]", "edits another scene, but none is extended", 'add extends = "..."')
-        _absolute_meshes(table, path)
+        _absolute_files(table, path)
         return table
     base = compose(path.parent / str(table["extends"]), (*above, path))
     return _edited(base, table, path)
@@ -103,7 +115,7 @@ def _edited(base: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str
         for family, parts in table.get(edit, {}).items():
             _edit_family(result, family, parts, edit, path)
     own = {key: value for key, value in table.items() if key not in EDITS}
-    _absolute_meshes(own, path)
+    _absolute_files(own, path)
     for key, value in own.items():
         if key in FAMILIES:
             _add_parts(result, key, value, path)
@@ -121,7 +133,7 @@ def _edit_family(result: dict[str, Any], family: str, parts: object, edit: str, 
         raise InputError(f"{where}]", f"there is no '{family}' to {edit}", suggestion(family, list(FAMILIES)))
     if not isinstance(parts, dict):
         raise InputError(f"{where}]", "expected a table of named parts")
-    _absolute_meshes({family: parts}, path)
+    _absolute_files({family: parts}, path)
     there = result.get(family, {})
     for name, part in parts.items():
         if name not in there:
@@ -177,18 +189,36 @@ def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
     table[key] = value
 
 
-def _absolute_meshes(table: dict[str, Any], path: Path) -> None:
-    """Recipe paths are looked for beside the scene, then in each folder above it."""
+def _absolute_files(table: dict[str, Any], path: Path) -> None:
+    """Recipes and tables are looked for beside the scene, then in each folder above it."""
+
+    def found(name: str) -> str:
+        return str(next((p for p in (folder / name for folder in path.parents) if p.is_file()), path.parent / name))
+
     for body in table.get("body", {}).values():
         mesh = body.get("mesh") if isinstance(body, dict) else None
         if isinstance(mesh, str) and not Path(mesh).is_absolute():
-            found = (folder / mesh for folder in path.parents)
-            body["mesh"] = str(next((p for p in found if p.is_file()), path.parent / mesh))
+            body["mesh"] = found(mesh)
+    for law in _tables([table.get("drive"), table.get("load")]):
+        if not Path(law["file"]).is_absolute():
+            law["file"] = found(law["file"])
+
+
+def _tables(node: object) -> Iterator[dict[str, Any]]:
+    """Laws that stand in a file, at any depth."""
+    if isinstance(node, dict):
+        if node.get("type") == "table" and isinstance(node.get("file"), str) and "points" not in node:
+            yield node
+        node = list(node.values())
+    if isinstance(node, list):
+        for item in node:
+            yield from _tables(item)
 
 
 def _input_error(path: Path, error: Any) -> InputError:
     # pydantic puts the type by which it chose a part's model into the place; the file has no such key
-    place = ".".join(str(key) for k, key in enumerate(error["loc"]) if k < 2 or key not in TYPES)
+    keys = [key for key in error["loc"] if not str(key).startswith("<")]
+    place = ".".join(str(key) for k, key in enumerate(keys) if k < 2 or key not in TYPES)
     message = error["msg"].removeprefix("Value error, ")
     if error["type"] == "extra_forbidden":
         message = "unknown key"
@@ -196,4 +226,4 @@ def _input_error(path: Path, error: Any) -> InputError:
         message = "is missing"
     value = error.get("input")
     shown = f" (got {value!r})" if isinstance(value, (str, int, float)) and error["type"] != "missing" else ""
-    return InputError(f"{path} [{place}]", f"{message}{shown}")
+    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}")

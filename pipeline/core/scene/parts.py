@@ -1,14 +1,14 @@
-"""The parts of a scene: bodies, joints, drives, loads. An effect is a part; absent means not there."""
+"""The parts of a scene: bodies and joints. An effect is a part; absent means not there."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.core.scene.fields import (
-    Acceleration,
     AngularVelocity,
+    FrameName,
     Inertia,
     Length,
     Mass,
@@ -18,11 +18,9 @@ from pipeline.core.scene.fields import (
     Position,
     Pressure,
     Speed,
-    Time,
     Velocity,
 )
 
-FrameName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*\.[A-Za-z_]\w*$", description="body.FRAME")]
 Positive = Field(gt=0.0)
 
 
@@ -82,7 +80,7 @@ Body = Annotated[Ground | RigidBody | FlexibleBody, Field(discriminator="type")]
 class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z."""
 
-    type: Literal["spherical", "revolute", "prismatic", "fixed"]
+    type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed"]
     between: tuple[FrameName, FrameName]
 
 
@@ -147,54 +145,3 @@ class ClearanceSpherical(Part):
 
 
 Joint = Annotated[IdealJoint | ClearanceSpherical, Field(discriminator="type")]
-
-
-class Constant(Part):
-    """The coordinate keeps a value."""
-
-    type: Literal["constant"]
-    value: Length = 0.0
-
-
-class Step(Part):
-    """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35)."""
-
-    type: Literal["step"]
-    start: tuple[Time, ...]
-    end: tuple[Time, ...]
-    change: tuple[Length, ...]
-
-    @field_validator("change")
-    @classmethod
-    def _not_empty(cls, value: tuple[float, ...]) -> tuple[float, ...]:
-        if not value:
-            raise ValueError("a step law has at least one step")
-        return value
-
-    @model_validator(mode="after")
-    def _same_length(self) -> Step:
-        if not len(self.start) == len(self.end) == len(self.change):
-            raise ValueError("start, end and change have one entry per step each")
-        if any(not a < b for a, b in zip(self.start, self.end, strict=True)):
-            raise ValueError("each step ends after it starts")
-        return self
-
-
-DriveLaw = Annotated[Constant | Step, Field(discriminator="type")]
-
-
-class Drive(Part):
-    """Prescribes the coordinate of a prismatic or revolute joint."""
-
-    joint: str
-    law: DriveLaw
-
-
-class Gravity(Part):
-    """Uniform acceleration field, world axes."""
-
-    type: Literal["gravity"]
-    acceleration: Acceleration
-
-
-Load = Gravity

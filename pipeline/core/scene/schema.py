@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from pipeline.core import quantities
+from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, Time
+from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.parts import (
     Body,
     ClearanceSpherical,
-    Drive,
     FlexibleBody,
     Ground,
     Joint,
-    Load,
     RigidBody,
 )
+from pipeline.core.scene.solver import ExplicitPair, Solver
+from pipeline.core.units import quantity
 
 
 class TimeSpan(Part):
@@ -31,14 +34,6 @@ class TimeSpan(Part):
         if not self.end > self.start:
             raise ValueError(f"time.end = {self.end} s must lie after time.start = {self.start} s")
         return self
-
-
-class Solver(Part):
-    """Integrator and its tolerance; `evaluations` caps the right-hand sides of one run."""
-
-    integrator: str = "dop853"
-    rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
-    evaluations: Annotated[int, Field(gt=0)] = 50_000_000
 
 
 class Output(Part):
@@ -59,10 +54,58 @@ class Ensemble(Part):
     bodies: tuple[str, ...] | None = None
 
 
-class Accuracy(Part):
-    """Wanted accuracy per quantity, e.g. ``"platform.position" = "1 um"``."""
+class Wanted(Part):
+    """A wanted accuracy: absolute in SI, or relative to the quantity's own size."""
 
-    quantities: dict[str, str] = Field(default_factory=dict)
+    absolute: Annotated[Number, Field(gt=0.0)] | None = None
+    relative: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
+
+
+class Accuracy(Part):
+    """Wanted accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
+
+    The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
+    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.quantities`.
+    """
+
+    quantities: dict[str, Wanted] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _flat(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or set(table) <= {"quantities", "source"}:
+            return table
+        found = {name: _wanted(name, value) for name, value in _leaves(table, "")}
+        return {"quantities": found} | ({"source": table["source"]} if "source" in table else {})
+
+
+def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
+    """Dotted name -> value, of nested tables or quoted names alike."""
+    found = []
+    for key, value in table.items():
+        name = f"{place}.{key}".lstrip(".")
+        if isinstance(value, dict) and not set(value) <= {"absolute", "relative"}:
+            found += _leaves(value, name)
+        elif name != "source":
+            found.append((name, value))
+    return found
+
+
+def _wanted(name: str, value: Any) -> Any:
+    if isinstance(value, dict):
+        return value
+    if isinstance(value, str) and value.rstrip().endswith("%"):
+        return {"relative": quantity(value, "number")}
+    kind = quantities.KINDS.get(name.rpartition(".")[2])
+    if kind is None:
+        return {"absolute": 1.0}  # the scene, which knows its parts, tells what could have been meant
+    problems = []
+    for dimension in kind.dimensions:
+        try:
+            return {"absolute": quantity(value, dimension)}
+        except ValueError as error:
+            problems.append(str(error))
+    raise ValueError(f"{name}: {problems[0]}")
 
 
 class Scene(Part):
@@ -75,10 +118,53 @@ class Scene(Part):
     drive: dict[str, Drive] = Field(default_factory=dict)
     load: dict[str, Load] = Field(default_factory=dict)
     time: TimeSpan
-    solver: Solver = Solver()
+    solver: Solver = ExplicitPair()
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None
+
+    @model_validator(mode="after")
+    def _quantities_are_there(self) -> Scene:
+        for name in self.accuracy.quantities if self.accuracy else ():
+            try:
+                quantities.parse(name, self.owners())
+            except ValueError as error:
+                raise ValueError(f"accuracy.{name}: {error}") from None
+        return self
+
+    def owners(self) -> dict[str, tuple[str, ...]]:
+        """Names of the parts that may own a quantity, by what they are."""
+        moving = tuple(name for name, body in self.body.items() if not isinstance(body, Ground))
+        return {
+            "body": moving,
+            "joint": tuple(self.joint),
+            "drive": tuple(self.drive),
+            "contact": tuple(self.contacts()),
+        }
+
+    def wanted(self) -> list[quantities.Quantity]:
+        """The quantities that `[accuracy]` names; without it the usual ones."""
+        if self.accuracy is not None and self.accuracy.quantities:
+            return [quantities.parse(name, self.owners()) for name in self.accuracy.quantities]
+        moving = {name for name, body in self.body.items() if not isinstance(body, Ground)}
+        joints = {
+            name: [frame.partition(".")[0] for frame in joint.between if frame.partition(".")[0] in moving]
+            for name, joint in self.joint.items()
+            if joint.type != "fixed"
+        }
+        hosts = self._hosts()
+        return quantities.usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+
+    def _hosts(self) -> dict[str, str]:
+        """For every moving body the body that it is fixed to, or itself."""
+        moving = [name for name, body in self.body.items() if not isinstance(body, Ground)]
+        host = {name: name for name in moving}
+        for joint in self.joint.values():
+            a, b = (frame.partition(".")[0] for frame in joint.between)
+            if joint.type == "fixed" and a in host and b in host:
+                old, new = host[b], host[a]
+                host = {name: new if at == old else at for name, at in host.items()}
+        return host
 
     _name: str = PrivateAttr(default="scene")
     _path: Path | None = PrivateAttr(default=None)
@@ -108,6 +194,10 @@ class Scene(Part):
     def contacts(self) -> dict[str, ClearanceSpherical]:
         """Clearance joints by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, ClearanceSpherical)}
+
+    def forces(self) -> dict[str, Any]:
+        """Loads other than gravity, which is a field, by name."""
+        return {n: load for n, load in self.load.items() if not isinstance(load, Gravity)}
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
-from pipeline.dynamics.assembly.constraints import Constraint, constraints, demands, prescribed
+from pipeline.dynamics.assembly.chain import path_positions
+from pipeline.dynamics.assembly.constraints import NONE, Constraint, constraints, demands, massless, prescribed
+from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.system import Link, System
-from pipeline.dynamics.assembly.tree import joint_class
+from pipeline.dynamics.assembly.tree import PATH
+from pipeline.dynamics.drives.pieces import Pieces
 
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
@@ -38,24 +41,25 @@ class Misfit:
         return float(np.max(np.abs(self.values), initial=0.0))
 
 
-def assembled(system: System) -> System:
+def assembled(system: System, given: Mapping[str, Pieces] = NONE) -> System:
     """The system with links placed so that all joints fit and driven ones stand where their drives say.
 
     Raises InputError for joints whose frames start far apart or face each other the wrong way, and
     for a mechanism that cannot be assembled, with the residual of every joint.  A system with flexible bodies
-    is only checked: their deformation is part of its closing.
+    or paths is only checked: deformation and prescribed poses are part of its closing, which the engine does.
+    given: laws that replace the scene's.
     """
-    joints, poses = constraints(system), [link.start for link in system.links]
+    joints, poses = constraints(system, given), [link.start for link in system.links]
     _refuse_apart(system, joints, poses)
     _refuse_opposite(joints, poses)
     system = replace(system, start_residual=max(residuals(joints, poses).values(), default=0.0))
-    if any(link.flexible for link in system.links):
-        return system
+    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in system.links)
+    if paths or any(link.flexible for link in system.links):
+        return settled(system, poses)
     closed = close(system, joints, poses)
     if closed is None:
         raise _impossible(system, joints, poses)
-    links = [replace(link, start=pose) for link, pose in zip(system.links, closed, strict=True)]
-    return replace(system, links=links)
+    return settled(system, closed)
 
 
 def close(system: System, joints: list[Constraint], poses: Sequence[Placement]) -> list[Placement] | None:
@@ -98,8 +102,8 @@ def misfit(system: System, joints: list[Constraint], poses: Sequence[Placement])
     for joint in joints:
         A, B = joint.frames(poses)
         parts = [demands(joint.edge.kind, A, B)]
-        if joint.value is not None:
-            parts.append(prescribed(joint.edge.kind, A, B, joint.value))
+        if joint.values:
+            parts.append(prescribed(joint.edge.kind, A, B, joint.values))
         for residual, wrench in parts:
             force = np.any(wrench[:, 3:] != 0.0, axis=1)
             values.append(np.where(force, residual / L, residual))
@@ -123,13 +127,18 @@ def _mobilities(system: System, poses: Sequence[Placement]) -> np.ndarray:
     masses = [_mass(system, link) for link in system.links[1:]]
     largest = max(masses, default=1.0)
     for link, mass in zip(system.links[1:], masses, strict=True):
+        if massless(link):
+            result += [0.0] * 6
+            continue
         moment = float(np.linalg.eigvalsh(link.inertia[2])[0]) if link.inertia is not None else 0.0
         result += [largest / max(moment / L**2, mass * LEAST_GYRATION**2)] * 3 + [largest / mass] * 3
     return np.array(result)
 
 
 def _mass(system: System, link: Link) -> float:
-    return link.inertia[0] if link.inertia is not None else float(system.bundles[str(link.flexible)]["mass"])
+    if link.inertia is not None:
+        return link.inertia[0]
+    return 0.0 if massless(link) else float(system.bundles[str(link.flexible)]["mass"])
 
 
 def _moved(system: System, poses: list[Placement], step: np.ndarray) -> list[Placement]:
@@ -140,6 +149,39 @@ def _moved(system: System, poses: list[Placement], step: np.ndarray) -> list[Pla
         R = rotation_vector_to_matrix(turn) @ poses[i].R
         moved.append(Placement(centre + shift - R @ _centre(link), R))
     return moved
+
+
+def settled(system: System, poses: Sequence[Placement]) -> System:
+    """The system with these starts; massless links within joints stand where the joints' coordinates put them."""
+    links, settled_poses = [], list(poses)
+    for i, link in enumerate(system.links):
+        if massless(link) and i:
+            settled_poses[i] = _between(system, link, poses, settled_poses)
+        links.append(replace(link, start=settled_poses[i]))
+    return replace(system, links=links)
+
+
+def _between(system: System, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]) -> Placement:
+    """Pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
+    edge, stage, inboard = link.branch.edge, link.stage, link.inboard
+    assert edge is not None
+    assert stage is not None
+    assert inboard is not None
+    F = settled_poses[inboard.link].of(inboard.place)
+    if not stage.positions:
+        return F
+    site = system.site(edge.frame_b)
+    G = poses[site.link].of(site.place)
+    if edge.kind == PATH:
+        whole = path_positions(edge, G.R, G.p + system.origin)
+    else:
+        near = system.site(edge.frame_a)
+        relative = poses[near.link].of(near.place).inverse().of(G)
+        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
+    value = stage.sign * float(whole[stage.positions[0]])
+    if stage.kind == "revolute":
+        return F.of(Placement(R=rotation_vector_to_matrix(np.array([0.0, 0.0, value]))))
+    return F.of(Placement(np.array([0.0, 0.0, value])))
 
 
 def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:

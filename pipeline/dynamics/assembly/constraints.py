@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.registry import lookup
+from pipeline.dynamics.assembly.driving import drive_laws, joint_class
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.system import Link, System
-from pipeline.dynamics.assembly.tree import Edge, joint_class
+from pipeline.dynamics.assembly.tree import PATH, Edge
+from pipeline.dynamics.drives.pieces import Pieces
+
+NONE: Mapping[str, Pieces] = {}
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """A joint between frames on two links; `value`: what its drive prescribes at the start, or None."""
+    """A joint between frames on two links; `values`: what drives prescribe at the start, by number of coordinate."""
 
     edge: Edge
     link_a: int
     place_a: Placement
     link_b: int
     place_b: Placement
-    value: float | None
+    values: Mapping[int, float]
 
     @property
     def name(self) -> str:
@@ -34,19 +37,24 @@ class Constraint:
         return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
 
 
-def constraints(system: System) -> list[Constraint]:
-    """All joints but contacts: those of the tree in the order of its links, then the closures."""
+def constraints(system: System, given: Mapping[str, Pieces] = NONE) -> list[Constraint]:
+    """All joints but contacts and paths: those of the tree in the order of its links, then the closures."""
+    t = system.scene.time.start
+    laws = dict(zip(system.drives, drive_laws(system.scene, given), strict=True))
+    tree = [link.branch.edge for link in system.links if link.branch.edge is not None and not massless(link)]
     found = []
-    for i, link in enumerate(system.links):
-        edge = link.branch.edge
-        if edge is not None:
-            assert link.inboard is not None
-            place = outboard_place(system, link)
-            value = None if edge.drive is None else _start_value(system, edge, link.branch.reverse)
-            found.append(Constraint(edge, link.inboard.link, link.inboard.place, i, place, value))
-    for edge, a, b in system.closures:
-        found.append(Constraint(edge, a.link, a.place, b.link, b.place, None))
+    for edge in [*tree, *(edge for edge, _, _ in system.closures)]:
+        if edge.kind == PATH:
+            continue
+        a, b = system.site(edge.frame_a), system.site(edge.frame_b)
+        values = {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
+        found.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
     return found
+
+
+def massless(link: Link) -> bool:
+    """Whether a link only stands between two freedoms of a joint, or is the ground."""
+    return link.inertia is None and not link.flexible
 
 
 def outboard_place(system: System, link: Link) -> Placement:
@@ -55,15 +63,6 @@ def outboard_place(system: System, link: Link) -> Placement:
     if edge is None or not link.flexible:
         return Placement()
     return system.frames[edge.frame_a if link.branch.reverse else edge.frame_b].place
-
-
-def _start_value(system: System, edge: Edge, reverse: bool) -> float:
-    """Coordinate that the drive prescribes when the run starts."""
-    drive, t = system.scene.drive[str(edge.drive)], system.scene.time.start
-    pieces = lookup("pipeline.dynamics.drives", drive.law.type, where="[drive]")(drive.law)
-    piece = pieces[max(int(np.searchsorted(pieces[:, 0], t, side="right")) - 1, 0)]
-    value = float(np.polyval(piece[:0:-1], t - piece[0]))
-    return -value if reverse else value
 
 
 def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
@@ -84,17 +83,21 @@ def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarr
     return np.array(residuals), np.array(wrenches).reshape(-1, 6)
 
 
-def prescribed(kind: str, A: Placement, B: Placement, value: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same for the one coordinate of a driven joint."""
+def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the driven coordinates of a joint."""
     declared, relative = joint_class(kind), A.inverse().of(B)
-    miss = float(declared.coordinates(relative.R, relative.p)[0]) - value
-    along = A.R[:, 2]
-    if declared.POSITIONS == "r":
-        wrench = [*along, 0.0, 0.0, 0.0]
-        miss = (miss + np.pi) % (2.0 * np.pi) - np.pi
-    else:
-        wrench = [*np.cross(B.p, along), *along]
-    return np.array([miss]), np.array([wrench])
+    now = declared.coordinates(relative.R, relative.p)
+    residuals, wrenches = [], []
+    for k, value in values.items():
+        coordinate = declared.COORDINATES[k]
+        along, miss = (A, B)[coordinate.side].R[:, coordinate.axis], float(now[k]) - value
+        if coordinate.turning:
+            miss = (miss + np.pi) % (2.0 * np.pi) - np.pi
+            wrenches.append([*along, 0.0, 0.0, 0.0])
+        else:
+            wrenches.append([*np.cross(B.p, along), *along])
+        residuals.append(miss)
+    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
 
 
 def freedoms(kind: str, A: Placement, B: Placement, length: float) -> np.ndarray:

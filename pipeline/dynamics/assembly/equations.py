@@ -10,7 +10,6 @@ from collections.abc import Callable
 
 from pipeline.dynamics.assembly.envelope import backward, factor, forward
 from pipeline.dynamics.tables import (
-    ACTIVE,
     BIAS,
     C0,
     CARRIED_BY,
@@ -37,6 +36,7 @@ from pipeline.dynamics.tables import (
     N_MODES,
     N_PAIRS,
     N_SPEEDS,
+    N_TURNS,
     NOT_POSITIVE,
     NQ,
     NV,
@@ -44,10 +44,10 @@ from pipeline.dynamics.tables import (
     OWN,
     PAIRS,
     PARENT,
-    PIECES,
     PORT_COLUMN,
     PORT_FLEX,
     POSITION_RATE,
+    TURN,
     U,
     X,
     column,
@@ -81,6 +81,17 @@ def no_modal(h, w):
 @kernel
 def no_contacts(h, f, w, n):
     """No clearance joint."""
+
+
+def both(contacts: Callable, loads: Callable) -> Callable:
+    """Forces of contacts and of loads."""
+
+    @kernel
+    def run(h, f, w, n):
+        contacts(h, f, w, n)
+        loads(h, f, w)
+
+    return run
 
 
 @kernel
@@ -143,20 +154,6 @@ def modal_forces(h, w):
 
 
 @kernel
-def known_motion(h, f, w, n, t):
-    """Prescribed coordinates, speeds and accelerations at time t, from the piece in force."""
-    for d in range(h[N_DRIVES]):
-        piece = h[PIECES] + 7 * n[index(n[ACTIVE] + d)]
-        s = t - f[index(piece)]
-        x, v, a = f[index(piece + 6)], 0.0, 0.0
-        for k in range(5, 0, -1):
-            a = a * s + 2.0 * v
-            v = v * s + x
-            x = x * s + f[index(piece + k)]
-        w[index(h[X] + h[NQ] + d)], w[index(h[U] + h[NV] + d)], w[index(h[DU] + h[NV] + d)] = x, v, a
-
-
-@kernel
 def assemble_mass(h, w):
     """Mass matrix in its envelope, from momenta and columns."""
     o = h[PAIRS]
@@ -189,6 +186,7 @@ def flexible_inertia(inertia: Callable, mass_matrix: Callable) -> Callable:
 
 
 def compose(
+    known_motion: Callable,
     kinematics: Callable,
     rigid_inertia: Callable,
     flexible: Callable,
@@ -207,6 +205,8 @@ def compose(
         for k in range(h[NV]):
             w[index(h[U] + k)] = w[index(y + h[NQ] + k)]
             w[index(h[DU] + k)] = 0.0
+        for k in range(h[N_TURNS]):
+            w[index(h[TURN] + k)] = w[index(y + h[NQ] + h[NV] + h[N_LEDGER] - h[N_TURNS] + k)]
 
     @kernel
     def forces(h, f, w, n):

@@ -16,6 +16,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -27,6 +28,7 @@ from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.registry import module_of
 from pipeline.core.workflow.fingerprint import Sources, imported
 from pipeline.dynamics.assembly.numbers import Kinds
+from pipeline.dynamics.integrate.method import Scheme
 
 #: how compiled functions are named (see `compiling`); part of the digest
 NAMING = "counters by entry"
@@ -35,13 +37,14 @@ PACKAGES = {
     "joint": "pipeline.dynamics.joints",
     "normal": "pipeline.dynamics.contact.normal",
     "friction": "pipeline.dynamics.contact.friction",
+    "load": "pipeline.dynamics.loads",
     "integrator": "pipeline.dynamics.integrate",
 }
 
 
-def entry(kinds: Kinds, integrator: str) -> ModuleType:
+def entry(kinds: Kinds, scheme: Scheme) -> ModuleType:
     """The module with the compiled functions `advance`, `observe` and `evaluate` for these kinds."""
-    source = _source(kinds, integrator)
+    source = _source(kinds, scheme)
     name = f"flexclear_kernels_{_digest(source)}"
     if name in sys.modules:
         return sys.modules[name]
@@ -58,23 +61,23 @@ def entry(kinds: Kinds, integrator: str) -> ModuleType:
 
 
 @contextmanager
-def compiling(kinds: Kinds, integrator: str) -> Iterator[None]:
+def compiling(kinds: Kinds, scheme: Scheme) -> Iterator[None]:
     """Held while an entry may be compiled: of two processes the second waits for the first's code.
 
     Numba names the code of a function by its qualified name and a counter of the process. Entries
     that two processes compiled would share names for different code, and a third process that
     loads both would mix them up (numba issue 10486); so each entry counts from its own number.
     """
-    digest = _digest(_source(kinds, integrator))
+    digest = _digest(_source(kinds, scheme))
     with (_folder() / f"{digest}.lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         FunctionIdentity._unique_ids = itertools.count(int(digest[:12], 16) << 16)
         yield
 
 
-def is_compiled(kinds: Kinds, integrator: str) -> bool:
+def is_compiled(kinds: Kinds, scheme: Scheme) -> bool:
     """Whether the machine code of this entry is on disk already."""
-    name = f"flexclear_kernels_{_digest(_source(kinds, integrator))}"
+    name = f"flexclear_kernels_{_digest(_source(kinds, scheme))}"
     return any((_folder() / "__pycache__").glob(f"{name}.enter*.nbc"))
 
 
@@ -90,6 +93,7 @@ def _write(path: Path, source: str) -> None:
     os.replace(temporary, path)
 
 
+@cache
 def _digest(source: str) -> str:
     """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
     digest = hashlib.sha256(source.encode())
@@ -119,21 +123,25 @@ def _reached(roots: set[str]) -> dict[str, str]:
     return found
 
 
-def _source(kinds: Kinds, integrator: str) -> str:
+def _source(kinds: Kinds, scheme: Scheme) -> str:
     lines = [
         f'"""Generated: joints {kinds.joints}, normal laws {kinds.normals}, friction {kinds.frictions}."""',
+        *([f"# loads {kinds.loads}"] if kinds.loads else []),
         "import numpy as np",
         "from numba import njit",
         "from pipeline.dynamics.tables import SLOPES, Y",
-        "from pipeline.dynamics.assembly import dispatch, equations, kinematics as motion",
+        "from pipeline.dynamics.assembly import dispatch, equations, known, kinematics as motion",
         "from pipeline.dynamics.bodies import rigid",
-        "from pipeline.dynamics.integrate import explicit, observe as observing, project as projecting",
-        f"from {module_of(PACKAGES['integrator'], integrator)} import METHOD",
+        "from pipeline.dynamics.integrate import displace as displacing, observe as observing, project as projecting",
+        f"from pipeline.dynamics.integrate import stepper, {_stepping(scheme)} as stepping",
+        f"from {module_of(PACKAGES['integrator'], scheme.integrator)} import METHOD",
     ]
     lines += _imports("joint", kinds.joints, ("motion",))
     lines.append(f"joint_motion = dispatch.joints({_names('joint', 'motion', kinds.joints)})")
     lines += _flexible_lines(kinds.flexible)
-    lines += _contact_lines(kinds)
+    lines += _contact_lines(kinds, scheme)
+    lines += _law_lines(kinds.harmonics)
+    lines += _load_lines(kinds)
     lines += _closure_lines(kinds.closures)
     lines += [_BODY, _ENTRIES]
     return "\n".join(lines) + "\n"
@@ -168,18 +176,43 @@ def _flexible_lines(present: bool) -> list[str]:
     ]
 
 
-def _contact_lines(kinds: Kinds) -> list[str]:
+def _stepping(scheme: Scheme) -> str:
+    return "fixed" if scheme.fixed else "adaptive"
+
+
+def _contact_lines(kinds: Kinds, scheme: Scheme) -> list[str]:
     if not kinds.normals:
-        return ["contacts = equations.no_contacts", "events = (explicit.watch_nothing, explicit.settle_nothing)"]
+        return ["contacts = equations.no_contacts", "events = (stepper.watch_nothing, stepper.settle_nothing)"]
     return [
         "from pipeline.dynamics.joints import clearance_spherical",
-        "from pipeline.dynamics.integrate.events import EVENTS_OF_CONTACTS as events",
+        f"from pipeline.dynamics.integrate.{'events' if scheme.located else 'step_ends'} import "
+        "EVENTS_OF_CONTACTS as events",
         *_imports("normal", kinds.normals, ("force", "stored")),
         *_imports("friction", kinds.frictions, ("coefficient",)),
         f"normal = dispatch.normals({_names('normal', 'force', kinds.normals)})",
         f"stored = dispatch.energies({_names('normal', 'stored', kinds.normals)})",
         f"friction = dispatch.frictions({_names('friction', 'coefficient', kinds.frictions)})",
         "contacts = clearance_spherical.compose(normal, stored, friction)",
+    ]
+
+
+def _law_lines(harmonics: bool) -> list[str]:
+    if not harmonics:
+        return ["known_motion = known.compose(known.no_harmonics)"]
+    return [
+        "from pipeline.dynamics.drives.oscillation import oscillate",
+        "known_motion = known.compose(oscillate)",
+    ]
+
+
+def _load_lines(kinds: Kinds) -> list[str]:
+    if not kinds.loads:
+        return []
+    return [
+        "from pipeline.dynamics.loads import composing",
+        *_imports("load", kinds.loads, ("apply",)),
+        f"loads = composing.compose({_names('load', 'apply', kinds.loads)})",
+        "contacts = equations.both(contacts, loads)",
     ]
 
 
@@ -194,10 +227,11 @@ def _closure_lines(present: bool) -> list[str]:
 
 _BODY = """kinematics = motion.compose(joint_motion, port, inboard)
 rhs = equations.compose(
-    kinematics, rigid.inertia, flexible_inertia, port_load, modal, contacts, close, known_forces
+    known_motion, kinematics, rigid.inertia, flexible_inertia, port_load, modal, contacts, close, known_forces
 )
 project = projecting.compose(rhs, joint_motion, correction) if correction else projecting.none
-stepper = explicit.compose(rhs, project, METHOD, events)
+displace = displacing.compose(joint_motion)
+step = stepper.compose(rhs, project, displace, METHOD, stepping.compose, events)
 observer = observing.compose(
     rhs, project, kinematics, (rigid.inertia, rigid.kinetic_energy), (flexible_observed, flexible_energy), contacts
 )
@@ -212,7 +246,7 @@ def enter(task, h, f, w, n, t, number, outputs, rows, events, pieces, out):
         for _ in range(int(number)):
             rhs(h, f, w, n, t, h[Y], h[SLOPES])
     elif task == 1:
-        stepper(h, f, w, n, outputs, rows, events)
+        step(h, f, w, n, outputs, rows, events)
     else:
         observer(h, f, w, n, rows, pieces, number, out)
 

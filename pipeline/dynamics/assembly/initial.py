@@ -7,13 +7,21 @@ from collections.abc import Callable
 import numpy as np
 
 from pipeline.core.errors import InputError
+from pipeline.core.scene.loads import SpringDamper
 from pipeline.core.scene.parts import Ground
+from pipeline.dynamics.assembly.chain import path_positions
 from pipeline.dynamics.assembly.constraints import outboard_place
+from pipeline.dynamics.assembly.driving import joint_class
+from pipeline.dynamics.assembly.loading import order
+from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.assembly.tree import joint_class
-from pipeline.dynamics.tables import AXES, CONTACT_LOSS, OMEGA, VELOCITY
+from pipeline.dynamics.assembly.tree import PATH
+from pipeline.dynamics.tables import AXES, OMEGA, VELOCITY
 
 Frames = Callable[[np.ndarray], np.ndarray]  #: state -> frames of all links, (links, FRAME_SIZE)
+
+#: a spring shorter than this share of the mechanism's size has no direction
+SHORTEST = 1e-9
 
 
 def start_state(built: Tables) -> np.ndarray:
@@ -24,12 +32,35 @@ def start_state(built: Tables) -> np.ndarray:
         declared = joint_class(link.kind)
         if layout.driven(i) >= 0 or not declared.POSITIONS:
             continue
-        assert link.inboard is not None
+        coordinates = _coordinates(built, i)
+        q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
+    return np.concatenate([q, v, np.zeros(built.packed.sizes["N_LEDGER"])])
+
+
+def _coordinates(built: Tables, i: int) -> np.ndarray:
+    """Positions of a link's joint, or of its part of it, from the poses of the two frames."""
+    system = built.system
+    link = system.links[i]
+    edge, stage = link.branch.edge, link.stage
+    assert link.inboard is not None
+    if edge is None or stage is None or edge.kind == link.kind:
         F = system.links[link.inboard.link].start.of(link.inboard.place)
         relative = F.inverse().of(link.start.of(outboard_place(system, link)))
-        coordinates = declared.coordinates(relative.R, relative.p)
-        q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
-    return np.concatenate([q, v, np.zeros(CONTACT_LOSS + 2 * len(system.contacts))])
+        found: np.ndarray = joint_class(link.kind).coordinates(relative.R, relative.p)
+        return found
+    G = _world(built, edge.frame_b)
+    if edge.kind == PATH:
+        whole = path_positions(edge, G.R, G.p + system.origin)
+    else:
+        relative = _world(built, edge.frame_a).inverse().of(G)
+        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
+    return stage.sign * whole[list(stage.positions)]
+
+
+def _world(built: Tables, frame: str) -> Placement:
+    """Start pose of a named frame, from the kernels' origin."""
+    site = built.system.site(frame)
+    return built.system.links[site.link].start.of(site.place)
 
 
 def given_velocities(built: Tables, frames: Frames, y: np.ndarray) -> np.ndarray:
@@ -85,3 +116,25 @@ def _twists(built: Tables, frames: Frames, y: np.ndarray, bodies: dict) -> np.nd
         arm = R @ (place.p + place.R @ np.array(getattr(bodies[name], "com", (0.0, 0.0, 0.0))))
         found += [omega, v + np.cross(omega, arm)]
     return np.concatenate(found).copy()
+
+
+def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
+    """Y with the angles that loads follow; `loads`: what each does at y, shape (loads, LOAD_SIZE).
+
+    Raises InputError for a spring or damper of no length, which has no direction.
+    """
+    from pipeline.dynamics.loads.fields import TURNS, VALUE
+
+    y, scene = y.copy(), built.system.scene
+    for name, row, now in zip(order(scene), built.packed.table("LOADS"), loads, strict=True):
+        load = scene.load[name]
+        if row[TURNS] >= 0:
+            y[len(y) - built.packed.sizes["N_TURNS"] + row[TURNS]] = now[VALUE]
+        if isinstance(load, SpringDamper) and now[VALUE] <= SHORTEST * built.system.length:
+            if load.damping > 0.0 or load.free_length:
+                raise InputError(
+                    f"[load.{name}.between]",
+                    "its two ends start in one place, so that it pulls in no direction",
+                    "move an end; only a spring of no free length and no damping may start so",
+                )
+    return y

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.system import Link, Site, System
-from pipeline.dynamics.assembly.tree import joint_class
 
 Route = list[tuple[int, int]]  #: (coordinate, column) pairs that move a site
 
@@ -31,8 +33,16 @@ class Layout:
         """Number of prescribed coordinates."""
         return len(self.system.drives)
 
+    def site(self, site: Site) -> int:
+        """Number of a site; of one that is there already when the place is the same."""
+        for k, other in enumerate(self.sites):
+            same = other.link == site.link and other.frame == site.frame
+            if same and np.array_equal(other.place.p, site.place.p) and np.array_equal(other.place.R, site.place.R):
+                return k
+        return self.add_site(site)
+
     def add_site(self, site: Site) -> int:
-        """Number of a site, with a port of its own where the link is flexible."""
+        """Number of a new site, with a port of its own where the link is flexible."""
         self.sites.append(site)
         if site.frame is not None:
             self.ports.append((len(self.sites) - 1, site.frame, self.columns))
@@ -69,9 +79,9 @@ class Layout:
         return len(joint_class(self.system.links[link].kind).SPEEDS) if link else 0
 
     def driven(self, link: int) -> int:
-        """Number of the prescribed coordinate of a link's joint, or -1."""
-        edge = self.system.links[link].branch.edge
-        return -1 if edge is None or edge.drive is None else self.system.drives.index(edge.drive)
+        """Number of the first prescribed coordinate of a link, or -1; it has all prescribed or none."""
+        drives = self.system.links[link].drives
+        return self.system.drives.index(drives[0]) if drives else -1
 
 
 def number(system: System) -> Layout:

@@ -14,11 +14,11 @@ import numpy as np
 
 from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError, SolverError
-from pipeline.core.registry import lookup
-from pipeline.dynamics.assembly.closing import close
-from pipeline.dynamics.assembly.constraints import Constraint, constraints, demands, freedoms
+from pipeline.dynamics.assembly.closing import close, settled
+from pipeline.dynamics.assembly.constraints import constraints, demands, freedoms, outboard_place
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.assembly.tree import PATH
 from pipeline.dynamics.assembly.wiring import closure_route
 from pipeline.dynamics.tables import SITE_A, SITE_B
 
@@ -110,20 +110,16 @@ def _columns(built: Tables, poses: Sequence[Placement]) -> np.ndarray:
     """Twist of every column of the layout, shape (columns, 6); velocities in units of the size per second."""
     layout, L = built.layout, built.system.length
     twists = np.zeros((layout.columns, 6))
-    for i, joint in _tree(built):
-        basis = np.eye(6) if joint is None else freedoms(joint.edge.kind, *joint.frames(poses), L)
+    for i, link in enumerate(built.system.links):
+        if link.inboard is None:
+            continue
+        F = poses[link.inboard.link].of(link.inboard.place)
+        basis = freedoms(link.kind, F, poses[i].of(outboard_place(built.system, link)), L)
         twists[layout.c0[i] : layout.c0[i] + len(basis)] = basis
     for site, frame, first in layout.ports:
-        link = layout.sites[site].link
-        twists[first : first + layout.modes[link]] = _shape_twists(built, link, frame, poses[link])
+        on = layout.sites[site].link
+        twists[first : first + layout.modes[on]] = _shape_twists(built, on, frame, poses[on])
     return twists
-
-
-def _tree(built: Tables) -> list[tuple[int, Constraint | None]]:
-    """Links with their inboard joints; None for a free body."""
-    joints = iter(constraints(built.system))
-    links = built.system.links
-    return [(i, None if link.branch.edge is None else next(joints)) for i, link in enumerate(links) if i]
 
 
 def _shape_twists(built: Tables, link: int, frame: str, pose: Placement) -> np.ndarray:
@@ -155,9 +151,10 @@ def _rank(J: np.ndarray) -> int:
 def _refuse_singular_start(built: Tables, J: np.ndarray, rank: int) -> None:
     """SolverError when the closures have a higher rank in poses nearby."""
     flexible = any(link.flexible for link in built.system.links)
-    if rank == built.layout.nv or flexible:
+    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in built.system.links)
+    if rank == built.layout.nv or flexible or paths:
         return
-    joints = [j for j in constraints(built.system) if j.value is None]
+    joints = constraints(built.system)
     poses = [link.start for link in built.system.links]
     free = np.linalg.svd(J)[2][rank:]
     random = np.random.default_rng(0)
@@ -165,7 +162,10 @@ def _refuse_singular_start(built: Tables, J: np.ndarray, rank: int) -> None:
         motion = random.normal(size=len(free)) @ free
         start = _displaced(built, poses, size * motion / np.linalg.norm(motion))
         closed = close(built.system, joints, start)
-        if closed is not None and _rank(jacobians(built, closed)[0]) > rank:
+        if closed is None:
+            continue
+        there = [link.start for link in settled(built.system, closed).links]
+        if _rank(jacobians(built, there)[0]) > rank:
             names = {built.system.closures[k][0].name: None for k in built.closure_order}
             values = np.linalg.svd(J, compute_uv=False)
             ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
@@ -233,7 +233,7 @@ def _refuse_contradiction(built: Tables, J: np.ndarray, known: np.ndarray, rank:
     if not moving:
         return
     raise InputError(
-        f"[drive.{moving[0]}]",
+        f"[drive.{moving[0].partition('.')[0]}]",
         f"the mechanism is over-driven: its loops tie the coordinates of {', '.join(drives)} to each other "
         f"({built.layout.nv} free coordinates, {rank} independent closure rows, {built.layout.known} drives)",
         "remove a drive, or a joint",
@@ -247,6 +247,8 @@ def _tied(J: np.ndarray, known: np.ndarray, rank: int) -> set[int]:
 
 
 def _moves(built: Tables, name: str) -> bool:
-    drive = built.system.scene.drive[name]
-    table = lookup("pipeline.dynamics.drives", drive.law.type, where=f"[drive.{name}]")(drive.law)
-    return bool(np.any(table[:, 2:] != 0.0) or np.ptp(table[:, 1]) > 0.0)
+    first, count = built.packed.table("LAWS")[built.system.drives.index(name)]
+    pieces = slice(first, first + count)
+    values = built.packed.table("PIECES")[pieces]
+    harmonics = built.packed.table("PIECE_HARMONICS")[pieces, 1]
+    return bool(np.any(values[:, 2:] != 0.0) or np.ptp(values[:, 1]) > 0.0 or np.any(harmonics > 0))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -10,17 +12,21 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
 from pipeline.dynamics import tables
 from pipeline.dynamics.assembly import flexible_numbers as flexible
-from pipeline.dynamics.assembly import wiring
+from pipeline.dynamics.assembly import laws as lawful
+from pipeline.dynamics.assembly import loading, wiring
 from pipeline.dynamics.assembly.closing import assembled
+from pipeline.dynamics.assembly.driving import drive_laws, joint_class
 from pipeline.dynamics.assembly.layout import Layout, number
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.packing import Packed, pack
 from pipeline.dynamics.assembly.system import Link, System
-from pipeline.dynamics.assembly.tree import joint_class
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate.method import Method
 
 NORMAL = "pipeline.dynamics.contact.normal"
 INTEGRATORS = "pipeline.dynamics.integrate"
 FRICTION = "pipeline.dynamics.contact.friction"
+NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,8 @@ class Kinds:
     frictions: tuple[str, ...]
     flexible: bool
     closures: bool
+    harmonics: bool = False
+    loads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -42,28 +50,41 @@ class Tables:
     layout: Layout
     kinds: Kinds
     packed: Packed
+    method: Method
     closure_order: np.ndarray
 
 
-def tabulate(system: System) -> Tables:
-    """Place a system's links so that its joints fit, number it and fill its tables."""
-    system = assembled(system)
+def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
+    """Place a system's links so that its joints fit, number it and fill its tables.
+
+    given: laws of prescribed coordinates that replace the scene's.
+    """
+    system = assembled(system, given)
     layout = number(system)
-    kinds = _kinds(system)
-    site_pairs = [(e.kind, layout.add_site(a), layout.add_site(b)) for e, a, b in system.closures]
-    touching = [(layout.add_site(a), layout.add_site(b)) for _, _, a, b in system.contacts]
+    site_pairs = [(e.kind, layout.site(a), layout.site(b)) for e, a, b in system.closures]
+    touching = [(layout.site(a), layout.site(b)) for _, _, a, b in system.contacts]
     closing = wiring.closures(layout, site_pairs)
     order = closing.pop("order")
+    loaded = loading.tabulate(system, layout)
     flexible_wiring, flexible_numbers = flexible.fill(layout)
-    contacts, contact_numbers = _contacts(system, kinds, touching)
-    drives, pieces = _drives(system)
-    groups, floors = _error_groups(layout)
+    laws = drive_laws(system.scene, given)
+    signs = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}
+    signed = [law.times(signs[name]) for name, law in zip(system.drives, laws, strict=True)]
+    law_wiring, law_numbers = lawful.fill([*signed, *loaded.laws])
+    turns, slot = loaded.turns, tables.CONTACT_LOSS + 2 * len(system.contacts)
+    ledger = slot + (loading.LEDGER + turns if system.scene.forces() else 0)
+    groups, floors = _error_groups(layout, ledger - turns, turns)
     sites = [(s.link, layout.port_of(k)) for k, s in enumerate(layout.sites)]
     method = lookup(INTEGRATORS, system.scene.solver.integrator, where="[solver.integrator]")
+    kinds = _kinds(system, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
+    contacts, contact_numbers = _contacts(system, kinds, touching)
     packed = pack(
         {
             "NQ": layout.nq,
-            "N_LEDGER": tables.CONTACT_LOSS + 2 * len(system.contacts),
+            "N_LEDGER": ledger,
+            "N_DRIVES": layout.known,
+            "N_TURNS": turns,
+            "LOAD_SLOT": slot,
             "MOST_MODES": max(layout.modes.values(), default=0),
         },
         {
@@ -73,7 +94,8 @@ def tabulate(system: System) -> Tables:
             **wiring.mass_entries(layout),
             **closing,
             "CONTACTS": contacts,
-            "DRIVES": drives,
+            **law_wiring,
+            **loaded.wiring,
             "GROUPS": groups,
         },
         {
@@ -81,18 +103,18 @@ def tabulate(system: System) -> Tables:
             "SITE_NUMBERS": np.array([_pose_row(s.place) for s in layout.sites]),
             **flexible_numbers,
             "CONTACT_NUMBERS": contact_numbers,
-            "PIECES": pieces,
-            "GRAVITY": _gravity(system),
+            **law_numbers,
+            **loaded.numbers,
+            "GRAVITY": loading.gravity(system.scene),
             "FLOORS": floors,
         },
-        method.slopes,
-        method.dense,
+        method,
         layout.columns,
     )
-    return Tables(system, layout, kinds, packed, order)
+    return Tables(system, layout, kinds, packed, method, order)
 
 
-def _kinds(system: System) -> Kinds:
+def _kinds(system: System, harmonics: bool, loads: tuple[str, ...]) -> Kinds:
     contacts = [joint for _, joint, _, _ in system.contacts]
     return Kinds(
         joints=tuple(sorted({link.kind for link in system.links[1:]})),
@@ -100,13 +122,9 @@ def _kinds(system: System) -> Kinds:
         frictions=tuple(sorted({c.friction.law for c in contacts if c.friction is not None})),
         flexible=any(link.flexible for link in system.links),
         closures=bool(system.closures),
+        harmonics=harmonics,
+        loads=loads,
     )
-
-
-def _gravity(system: System) -> np.ndarray:
-    if not system.scene.load:
-        return np.zeros(3)
-    return lookup("pipeline.dynamics.loads", "gravity", where="[load]")(system.scene)
 
 
 def _pose_row(place: Placement) -> np.ndarray:
@@ -153,26 +171,12 @@ def _contacts(system: System, kinds: Kinds, touching: list[tuple[int, int]]) -> 
     return wiring.integers(rows, 4), np.array(reals, dtype=float).reshape(-1, 11)
 
 
-def _drives(system: System) -> tuple[np.ndarray, np.ndarray]:
-    rows: list[tuple[int, int]] = []
-    pieces: list[np.ndarray] = []
-    for drive in system.scene.drive.values():
-        law = lookup("pipeline.dynamics.drives", drive.law.type, where="[drive]")
-        table = law(drive.law).copy()
-        branch = next(b.branch for b in system.links if b.branch.edge and b.branch.edge.name == drive.joint)
-        if branch.reverse:
-            table[:, 1:] *= -1.0  # the tree meets this joint from its second frame
-        rows.append((sum(len(p) for p in pieces), len(table)))
-        pieces.append(table)
-    stacked = np.concatenate(pieces) if pieces else np.zeros((0, 7))
-    return wiring.integers(rows, 2), np.ascontiguousarray(stacked)
-
-
-def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
+def _error_groups(layout: Layout, ledger: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and the floor below which a group is resolved absolutely.
 
     A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
+    ledger: number of energies; turns: number of angles after them.
     """
     L = layout.system.length
     groups: list[int] = []
@@ -198,8 +202,8 @@ def _error_groups(layout: Layout) -> tuple[np.ndarray, np.ndarray]:
                 target[first : first + layout.modes[i]] = len(floors) - 1
     groups = [*q_group, *v_group]
     energy = _mass(layout.system) * L**2
-    for _ in range(tables.CONTACT_LOSS + 2 * len(layout.system.contacts)):
-        floors.append(energy)
+    for floor in [energy] * ledger + [1.0] * turns:
+        floors.append(floor)
         groups.append(len(floors) - 1)
     return np.array(groups, dtype=np.int64), np.array(floors)
 

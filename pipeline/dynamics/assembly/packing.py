@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.dynamics import tables
 from pipeline.dynamics.integrate import state
+from pipeline.dynamics.integrate.method import Method
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class Packed:
         axes = self.offset("LINK_FRAMES") + tables.AXES
         w[axes : axes + 9] = np.eye(3).ravel()
         n[tables.ACTIVE] = state.INTEGERS
-        n[tables.MODE] = state.INTEGERS + self.sizes["N_DRIVES"]
+        n[tables.MODE] = state.INTEGERS + self.sizes["N_LAWS"]
         return w, n
 
 
@@ -47,11 +48,10 @@ def pack(
     sizes: Mapping[str, int],
     wiring: Mapping[str, np.ndarray],
     numbers: Mapping[str, np.ndarray],
-    slopes: int,
-    dense: int,
+    method: Method,
     columns: int,
 ) -> Packed:
-    """Pack named tables; `columns`: number of twist columns; slopes, dense: rows that the method needs."""
+    """Pack named tables; `columns`: number of twist columns; `method` says what room it needs."""
     all_sizes = dict(sizes)
     h = np.zeros(tables.HEADER, dtype=np.int64)
     chunks: list[np.ndarray] = [h]
@@ -74,10 +74,10 @@ def pack(
     for name in tables.SIZES:
         h[tables.place(name)] = all_sizes[name]
     start = 0
-    for name, length in _work_lengths(all_sizes, slopes, dense, columns).items():
+    for name, length in _work_lengths(all_sizes, method, columns).items():
         h[tables.place(name)] = start
         start += length
-    integers = state.INTEGERS + all_sizes["N_DRIVES"] + all_sizes["N_CONTACTS"]
+    integers = state.INTEGERS + all_sizes["N_LAWS"] + all_sizes["N_CONTACTS"]
     return Packed(np.concatenate(chunks), np.concatenate(reals), all_sizes, start, integers)
 
 
@@ -92,7 +92,8 @@ def _sizes(sizes: Mapping[str, int], wiring: Mapping[str, np.ndarray]) -> dict[s
         "N_CLOSURE_ROWS": count["CLOSURE_ROWS"],
         "N_KEPT_ROWS": count["CLOSURE_ENVELOPE"],
         "N_CONTACTS": count["CONTACTS"],
-        "N_DRIVES": count["DRIVES"],
+        "N_LAWS": count["LAWS"],
+        "N_LOADS": count["LOADS"],
         "NV": count["ENVELOPE"],
         "NY": count["GROUPS"],
         "N_PAIRS": count["PAIRS"],
@@ -114,7 +115,7 @@ def envelope_size(envelope: np.ndarray) -> int:
     return int(envelope[last, 1] + last - envelope[last, 0] + 1)
 
 
-def _work_lengths(s: Mapping[str, int], slopes: int, dense: int, columns: int) -> dict[str, int]:
+def _work_lengths(s: Mapping[str, int], method: Method, columns: int) -> dict[str, int]:
     known, contacts, ny = s["N_DRIVES"], s["N_CONTACTS"], s["NY"]
     jacobian = s["JACOBIAN_SIZE"]
     rows, coordinates, positions = s["N_CLOSURE_ROWS"], s["NV"] + known, s["NQ"] + known
@@ -148,14 +149,18 @@ def _work_lengths(s: Mapping[str, int], slopes: int, dense: int, columns: int) -
         "PIVOT": tables.PIVOT_SIZE,
         "MULTIPLIER": rows,
         "TOUCH": tables.TOUCH_SIZE * contacts,
+        "LAW": tables.LAW_SIZE * s["N_LAWS"],
+        "LOAD": tables.LOAD_SIZE * s["N_LOADS"],
+        "TURN": s["N_TURNS"],
         "DRIVE_FORCE": known,
         "LEDGER_RATE": s["N_LEDGER"],
         "POSITION_RATE": positions,
         "Y": ny,
         "Y_NEW": ny,
         "Y_STAGE": ny,
-        "SLOPES": slopes * ny,
-        "DENSE": dense * ny,
+        "SLOPES": method.slopes * ny,
+        "DENSE": method.dense * ny,
+        "MEMORY": method.memory(s["NQ"], s["NV"], ny),
         "MAGNITUDE": s["N_GROUPS"],
         "CORRECTION": s["NV"],
         "LATCHED": contacts,

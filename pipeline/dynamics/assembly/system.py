@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -11,6 +11,8 @@ import xarray as xr
 from pipeline.core.errors import InputError
 from pipeline.core.scene.parts import ClearanceSpherical
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly.chain import Stage, stages
+from pipeline.dynamics.assembly.driving import prescribed
 from pipeline.dynamics.assembly.merge import (
     Frame,
     Group,
@@ -21,7 +23,7 @@ from pipeline.dynamics.assembly.merge import (
     rigid_inertia,
     start_places,
 )
-from pipeline.dynamics.assembly.tree import Branch, Edge, edges, span
+from pipeline.dynamics.assembly.tree import PATH, Branch, Edge, edges, span
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Link:
     """One link of the tree, in its own frame.
 
     A rigid link's frame is its inboard joint frame; a flexible one's is its body frame.
-    places: frame of each of its bodies.  start: pose in the world.
+    places: frame of each of its bodies; none for a massless link within a joint (see `chain`).
+    start: pose in the world.  stage: its part of the joint; None for a body that nothing holds.
     """
 
     branch: Branch
@@ -48,6 +51,12 @@ class Link:
     inertia: tuple[float, np.ndarray, np.ndarray] | None
     kind: str
     inboard: Site | None
+    stage: Stage | None = None
+
+    @property
+    def drives(self) -> tuple[str, ...]:
+        """Names of its prescribed coordinates: none, or all that it has."""
+        return () if self.stage is None else self.stage.drives
 
     @property
     def flexible(self) -> str | None:
@@ -76,8 +85,8 @@ class System:
 
     @property
     def drives(self) -> list[str]:
-        """Names of the drives, in the order of their prescribed coordinates."""
-        return list(self.scene.drive)
+        """Names of the prescribed coordinates, in their order."""
+        return [one.name for one in prescribed(self.scene)]
 
     def site(self, frame: str) -> Site:
         """The site at a named frame."""
@@ -101,9 +110,16 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
     origin = _centre(starts)
     links: list[Link] = []
     link_of: dict[str, int] = {}
+    carried: list[int] = []  # link that carries each branch's group
     for branch in branches:
-        links.append(_link(scene, groups[branch.group], branch, starts[branch.group], frames, links, link_of, origin))
-        link_of.update(dict.fromkeys(groups[branch.group].places, len(links) - 1))
+        group, start = groups[branch.group], Placement(starts[branch.group].p - origin, starts[branch.group].R)
+        placed = replace(branch, parent=carried[branch.parent] if branch.parent >= 0 else -1)
+        if branch.edge is None:
+            links.append(_unjoined(scene, group, placed, start))
+        else:
+            links += _joined(scene, group, placed, start, frames, links, link_of, origin)
+        carried.append(len(links) - 1)
+        link_of.update(dict.fromkeys(group.places, len(links) - 1))
 
     def at(frame: str) -> Site:
         return _site(frames, links, link_of, frame)
@@ -120,7 +136,15 @@ def _centre(starts: list[Placement]) -> np.ndarray:
     return np.mean(moving, axis=0) if moving else np.zeros(3)
 
 
-def _link(
+def _unjoined(scene: Scene, group: Group, branch: Branch, start: Placement) -> Link:
+    """The ground, or a body that nothing holds."""
+    if branch.parent < 0:
+        places = {n: start.of(p) for n, p in group.places.items()}
+        return Link(branch, group, places, Placement(), None, "fixed", None)
+    return _carrier(scene, group, branch, start, _centre_frame(scene, group), Site(0, Placement(), None), "free", None)
+
+
+def _joined(
     scene: Scene,
     group: Group,
     branch: Branch,
@@ -129,27 +153,47 @@ def _link(
     links: list[Link],
     link_of: Mapping[str, int],
     origin: np.ndarray,
+) -> list[Link]:
+    """The link of a group, preceded by the massless ones of a joint that is a chain."""
+    edge = branch.edge
+    assert edge is not None
+    near, far = (edge.frame_b, edge.frame_a) if branch.reverse else (edge.frame_a, edge.frame_b)
+    inboard = Site(0, Placement(-origin), None) if edge.kind == PATH else _site(frames, links, link_of, near)
+    parts = stages(edge, branch.reverse, inboard.frame is not None, group.flexible)
+    here = links[inboard.link].start.of(inboard.place)
+    axes, made = np.eye(3), []
+    for k, part in enumerate(parts):
+        turned = Placement(R=axes.T @ part.axes)
+        site = Site(inboard.link, inboard.place.of(turned), inboard.frame)
+        if k == len(parts) - 1:
+            own = group.places[frames[far].body].of(frames[far].place).of(Placement(R=part.axes))
+            last = replace(branch, parent=site.link)
+            return [*made, _carrier(scene, group, last, start, own, site, part.kind, part)]
+        axes = part.axes
+        pose = here.of(Placement(R=axes))
+        between = replace(branch, parent=site.link)
+        made.append(Link(between, Group("", {}, False), {}, pose, None, part.kind, site, part))
+        inboard = Site(len(links) + k, Placement(), None)
+    raise AssertionError("a joint has at least one stage")
+
+
+def _carrier(
+    scene: Scene,
+    group: Group,
+    branch: Branch,
+    start: Placement,
+    own: Placement,
+    inboard: Site,
+    kind: str,
+    stage: Stage | None,
 ) -> Link:
-    """Choose the link's frame and express its bodies in it."""
-    here = Placement(start.p - origin, start.R)
-    if branch.parent < 0:
-        places = {n: here.of(p) for n, p in group.places.items()}
-        return Link(branch, group, places, Placement(), None, "fixed", None)
-    if branch.edge is None:
-        inboard, own, kind = Site(0, Placement(), None), _centre_frame(scene, group), "free"
-    else:
-        near, far = branch.edge.frame_a, branch.edge.frame_b
-        if branch.reverse:
-            near, far = far, near
-        inboard, kind = _site(frames, links, link_of, near), branch.edge.kind
-        frame = frames[far]
-        own = group.places[frame.body].of(frame.place)
+    """Choose the link's frame, `own` in the group's host unless it is flexible, and express its bodies in it."""
     if group.flexible:
-        return Link(branch, group, dict(group.places), here, None, kind, inboard)
+        return Link(branch, group, dict(group.places), start, None, kind, inboard, stage)
     inertia = rigid_inertia(scene, group, own)
     outward = own.inverse()
     places = {n: outward.of(p) for n, p in group.places.items()}
-    return Link(branch, group, places, here.of(own), inertia, kind, inboard)
+    return Link(branch, group, places, start.of(own), inertia, kind, inboard, stage)
 
 
 def _centre_frame(scene: Scene, group: Group) -> Placement:

@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 from pipeline.core.errors import InputError
-from pipeline.core.registry import lookup
+from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly.driving import joint_class, joint_drives
 from pipeline.dynamics.assembly.merge import Frame, Group, find_frame
 
-JOINTS = "pipeline.dynamics.joints"
+#: kind of an edge that is no joint of the scene: a frame's pose in the world, prescribed in part or whole
+PATH = "path"
 
 
 @dataclass(frozen=True)
 class Edge:
-    """A joint between two groups. `drive`: name of the drive that prescribes it, or None."""
+    """A joint between two groups, or the path of a frame in the world (PATH).
+
+    drives: prescribed coordinate of each freedom, or None; empty when none is prescribed.
+    vector: whether a path turns by a rotation vector.
+    """
 
     name: str
     kind: str
@@ -24,7 +29,8 @@ class Edge:
     b: int
     frame_a: str
     frame_b: str
-    drive: str | None
+    drives: tuple[str | None, ...] = ()
+    vector: bool = False
 
 
 @dataclass(frozen=True)
@@ -41,8 +47,8 @@ class Branch:
 
 
 def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
-    """Joints between different groups; contacts are forces, not joints."""
-    driven = _driven_joints(scene)
+    """Joints between different groups, and paths; contacts are forces, not joints."""
+    driven = joint_drives(scene)
     result = []
     contacts = scene.contacts()
     for name, joint in scene.joint.items():
@@ -58,34 +64,35 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
                     f"[joint.{name}]", "its two bodies are rigidly joined already", "remove it, or a fixed joint"
                 )
             continue
-        result.append(Edge(name, joint.type, ga, gb, *joint.between, driven.get(name)))
-    return result
+        result.append(Edge(name, joint.type, ga, gb, *joint.between, driven.get(name, ())))
+    return result + _paths(scene, frames, group_of)
 
 
-def _driven_joints(scene: Scene) -> dict[str, str]:
-    driven: dict[str, str] = {}
+def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
+    """Edges from the ground to the frames whose pose is prescribed."""
+    result = []
     for name, drive in scene.drive.items():
-        place = f"[drive.{name}.joint]"
-        if drive.joint not in scene.joint:
-            raise InputError(place, f"there is no joint '{drive.joint}'", f"known: {', '.join(scene.joint)}")
-        kind = scene.joint[drive.joint].type
-        if kind not in ("prismatic", "revolute"):
-            raise InputError(
-                place, f"a {kind} joint has no single coordinate to prescribe", "drive a prismatic or revolute joint"
-            )
-        if drive.joint in driven:
-            raise InputError(
-                place, f"joint '{drive.joint}' is driven already by '{driven[drive.joint]}'", "remove one drive"
-            )
-        driven[drive.joint] = name
-    return driven
+        if not isinstance(drive, PathDrive):
+            continue
+        place = f"[drive.{name}.frame]"
+        group = group_of[find_frame(frames, drive.frame, place).body]
+        if group == 0:
+            raise InputError(place, f"'{drive.frame}' belongs to the ground, which does not move", "name another frame")
+        if group in (e.b for e in result):
+            raise InputError(place, f"the body of '{drive.frame}' has a path already", "remove one of the two")
+        laws = dict(drive.components())
+        parts = [f"{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"]
+        drives = tuple(f"{name}.{part}" if part in laws else None for part in parts)
+        vector = drive.angles == "rotation-vector" and any(drives[3:])
+        result.append(Edge(f"drive.{name}", PATH, 0, group, "", drive.frame, drives, vector))
+    return result
 
 
 def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Edge]]:
     """Links in an order where parents come first (link 0 is the ground), and the closures.
 
-    The tree takes the joints with the fewest free coordinates first (driven ones have none), then
-    those nearest to the ground: that keeps the unknowns and the chains short.
+    The tree takes joints with prescribed coordinates first, then those with the fewest free
+    coordinates, then those nearest to the ground: that keeps the unknowns and the chains short.
     """
     branches = [Branch(0, -1, None)]
     link_of = {0: 0}
@@ -94,7 +101,7 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
     while len(branches) < len(groups):
         frontier = [e for e in left if (e.a in link_of) != (e.b in link_of)]
         if frontier:
-            best = min(frontier, key=lambda e: (_freedom(e), depth[link_of[e.a if e.a in link_of else e.b]]))
+            best = min(frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]]))
             left.remove(best)
             reverse = best.a not in link_of
             parent, group = (best.b, best.a) if reverse else (best.a, best.b)
@@ -105,19 +112,17 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
         link_of[group] = len(branches) - 1
         depth.append(depth[branches[-1].parent] + 1)
     for edge in left:
-        if edge.drive is not None:
+        if any(edge.drives):
+            drive = next(d for d in edge.drives if d).partition(".")[0]
             raise InputError(
-                f"[drive.{edge.drive}]",
-                f"joint '{edge.name}' closes a loop whose other joints are all driven",
+                f"[drive.{drive}]",
+                f"'{edge.name}' closes a loop whose other joints are all driven",
                 "remove a drive",
             )
     return branches, left
 
 
 def _freedom(edge: Edge) -> int:
-    return 0 if edge.drive is not None else len(joint_class(edge.kind).SPEEDS)
-
-
-def joint_class(kind: str) -> Any:
-    """The class that declares a joint type."""
-    return lookup(JOINTS, kind, where="joint")
+    if edge.kind == PATH:
+        return edge.drives.count(None)
+    return len(joint_class(edge.kind).SPEEDS) - sum(d is not None for d in edge.drives)

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
+from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.layout import Layout
-from pipeline.dynamics.assembly.tree import joint_class
 from pipeline.dynamics.tables import KEPT0, N_KEPT
 
 

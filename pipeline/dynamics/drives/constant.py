@@ -1,12 +1,12 @@
-"""A coordinate that is held."""
+"""A law that keeps its value."""
 
 from __future__ import annotations
 
-import numpy as np
+from pipeline.core.scene.laws import Constant
+from pipeline.core.units import quantity
+from pipeline.dynamics.drives.pieces import Piece, Pieces
 
-from pipeline.core.scene.parts import Constant
 
-
-def pieces(law: Constant) -> np.ndarray:
-    """One piece, shape (1, 7)."""
-    return np.array([[0.0, law.value, 0.0, 0.0, 0.0, 0.0, 0.0]])
+def pieces(law: Constant, dimension: str) -> Pieces:
+    """One piece."""
+    return Pieces((Piece(0.0, (quantity(law.value, dimension),)),))

@@ -8,26 +8,28 @@ Source: Wang & Wang (2019), eqs. (29) and (35).
 
 from __future__ import annotations
 
-import numpy as np
+from pipeline.core.scene.laws import Step
+from pipeline.core.units import quantity
+from pipeline.dynamics.drives.pieces import Pieces, polynomials
 
-from pipeline.core.scene.parts import Step
 
-
-def pieces(law: Step) -> np.ndarray:
-    """Pieces between all starts and ends, shape (n, 7): start time, coefficients of rising order."""
+def pieces(law: Step, dimension: str) -> Pieces:
+    """Pieces between all starts and ends."""
     breaks = sorted({*law.start, *law.end})
     starts = [breaks[0] - 1.0, *breaks]
-    return np.array([[t, *_taylor(law, t, t + 0.5 * _width(starts, k))] for k, t in enumerate(starts)])
+    changes = [quantity(change, dimension) for change in law.change]
+    rows = [_taylor(law, changes, t, t + 0.5 * _width(starts, k)) for k, t in enumerate(starts)]
+    return Pieces(polynomials(starts, rows))
 
 
 def _width(starts: list[float], k: int) -> float:
     return starts[k + 1] - starts[k] if k + 1 < len(starts) else 1.0
 
 
-def _taylor(law: Step, t: float, inside: float) -> np.ndarray:
+def _taylor(law: Step, changes: list[float], t: float, inside: float) -> list[float]:
     """Coefficients about t of the polynomial that holds at the time `inside`."""
-    c = np.zeros(6)
-    for start, end, change in zip(law.start, law.end, law.change, strict=True):
+    c = [0.0] * 4
+    for start, end, change in zip(law.start, law.end, changes, strict=True):
         if inside >= end:
             c[0] += change
         elif inside > start:

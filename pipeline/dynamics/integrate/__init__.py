@@ -1,8 +1,16 @@
-"""Integrators. To add one: a module with ``compose``, a line below, a row in the order test.
+"""Integrators. To add one: a module with a `METHOD` (see `method`), a line below, a row in the order test,
+and its parameters in `pipeline.core.scene.solver`.
 
-`explicit` runs any embedded Runge-Kutta pair with dense output; `events` locates contacts in its
-steps, `project` keeps loops closed, `observe` evaluates what is recorded.
+`stepper` runs any method, with steps that `adaptive` or `fixed` choose; `events` locates contacts in
+its steps (`step_ends` does not), `project` keeps loops closed, `observe` evaluates what is recorded.
 """
 
 KIND = "integrator"
-NAMES = {"dop853": "dop853:METHOD"}
+NAMES = {
+    "dop853": "dop853:METHOD",
+    "dopri5": "dopri5:METHOD",
+    "rk4": "rk4:METHOD",
+    "adams-bashforth-moulton": "adams:METHOD",
+    "generalized-alpha": "generalized_alpha:METHOD",
+    "radau": "radau:METHOD",
+}

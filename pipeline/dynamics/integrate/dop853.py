@@ -7,24 +7,19 @@ sec. II.5 (method and error estimate) and II.6 (dense output).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.dynamics.integrate import stages
 from pipeline.dynamics.integrate.dop853_coefficients import E3, E5, ERROR_ORDER, EXTENDED, STAGES, A, B, C, D
-from pipeline.dynamics.integrate.state import TIME
-from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
+from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
+from pipeline.dynamics.integrate.stages import slope
+from pipeline.dynamics.tables import DENSE, GROUPS, MAGNITUDE, NY, SLOPES, Y_NEW, Y
 from pipeline.dynamics.vectors import index, kernel
 
 
 @kernel
-def slope(h, i):
-    """Where w holds the slope of stage i."""
-    return h[SLOPES] + h[NY] * i
-
-
-@kernel
-def error(h, w, step):
+def error(h, f, w, n, step):
     """Norm of the local error, 1 at the tolerance; MAGNITUDE holds each group's scale."""
     size, k = h[NY], h[SLOPES]
     five = three = 0.0
@@ -56,41 +51,9 @@ def interpolate(h, w, theta, out):
         w[index(out + c)] = w[index(F + 7 * size + c)] + (v + w[index(F + c)]) * theta
 
 
-def compose(evaluate: Callable) -> tuple[Callable, Callable]:
-    """The kernels attempt and extend."""
-
-    @kernel
-    def stage(h, f, w, n, step, i):
-        """Slope of stage i from those of all earlier ones."""
-        size, y, stage_y = h[NY], h[Y], h[Y_STAGE]
-        for c in range(size):
-            w[index(stage_y + c)] = w[index(y + c)]
-        for j in range(i):
-            weight = step * A[i, j]
-            if weight != 0.0:
-                k = slope(h, j)
-                for c in range(size):
-                    w[index(stage_y + c)] += weight * w[index(k + c)]
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + C[i] * step, stage_y, slope(h, i))
-
-    @kernel
-    def attempt(h, f, w, n, step):
-        """State Y_NEW after a step from Y, given its slope in row 0; False when a stage has none."""
-        size = h[NY]
-        for i in range(1, STAGES):
-            stage(h, f, w, n, step, i)
-            if n[EVALUATION] != OK:
-                return False
-        for c in range(size):
-            w[index(h[Y_NEW] + c)] = 0.0
-        for j in range(STAGES):
-            if B[j] != 0.0:
-                k = slope(h, j)
-                for c in range(size):
-                    w[index(h[Y_NEW] + c)] += B[j] * w[index(k + c)]
-        for c in range(size):
-            w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + step * w[index(h[Y_NEW] + c)]
-        return True
+def compose(evaluate: Callable, displace: Callable) -> tuple:
+    """The method's kernels."""
+    stage, attempt = stages.compose(evaluate, A, B, C)
 
     @kernel
     def extend(h, f, w, n, step):
@@ -111,27 +74,7 @@ def compose(evaluate: Callable) -> tuple[Callable, Callable]:
                 w[index(F + (3 + d) * size + c)] = step * total
             w[index(F + 7 * size + c)] = w[index(h[Y] + c)]
 
-    return attempt, extend
+    return begin_afresh, attempt, error, extend, keep_nothing
 
 
-@dataclass(frozen=True)
-class Method:
-    """What the stepper needs of a Runge-Kutta method.
-
-    slopes: rows of SLOPES.  last: row of the slope at the step's end.  dense: rows of DENSE.
-    extra: evaluations that the dense output costs.  gap: middle of the widest gap between the stages, as share of
-    the step.
-    """
-
-    slopes: int
-    last: int
-    dense: int
-    extra: int
-    error_order: int
-    compose: Callable
-    error: Callable
-    interpolate: Callable
-    gap: float = 0.5
-
-
-METHOD = Method(EXTENDED + 1, STAGES, 8, EXTENDED - STAGES - 1, ERROR_ORDER, compose, error, interpolate, 0.467)
+METHOD = Method(EXTENDED + 1, STAGES, 8, ERROR_ORDER, compose, interpolate, gap=0.467)

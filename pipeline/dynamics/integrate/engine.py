@@ -14,10 +14,13 @@ from pipeline.dynamics.assembly.mobility import Mobility, analyse
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import observe as observing
 from pipeline.dynamics.integrate import singular
-from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, OK, TOUCH_SIZE
+from pipeline.dynamics.integrate.method import scheme_of
+from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, LOAD_SIZE, OK, TOUCH_SIZE
 
 Progress = Callable[[float | None, str], None]
 
+#: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
+SHORTEST_SEGMENT = 1e-12
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14
 
@@ -42,16 +45,21 @@ class Engine:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Start, drive breaks in between, end."""
+        """Start, breaks of drives and loads in between, end; breaks that only rounding sets apart are one."""
         starts, found = self.built.packed.table("PIECES")[:, 0], set()
-        for first, count in self.built.packed.table("DRIVES"):
-            found |= {float(t) for t in starts[first + 1 : first + count] if self.start < t < self.end}
-        return np.array([self.start, *sorted(found), self.end])
+        for first, count in self.built.packed.table("LAWS"):
+            found |= {float(t) for t in starts[first + 1 : first + count]}
+        shortest = SHORTEST_SEGMENT * (self.end - self.start)
+        times = [self.start]
+        for t in sorted(found):
+            if t - times[-1] > shortest and self.end - t > shortest:
+                times.append(t)
+        return np.array([*times, self.end])
 
     def select_pieces(self, inside: float) -> None:
-        """Put the pieces of the drive laws in force that hold at `inside`, which is no break."""
+        """Put the pieces of the laws in force that hold at `inside`, which is no break."""
         first = self.n[ACTIVE]
-        self.n[first : first + self.built.layout.known] = pieces_at(self.built, inside)
+        self.n[first : first + self.built.packed.sizes["N_LAWS"]] = pieces_at(self.built, inside)
 
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
@@ -83,9 +91,9 @@ class Engine:
 
 
 def pieces_at(built: Tables, inside: float) -> np.ndarray:
-    """Piece of every drive law that holds at a time which is no break."""
+    """Piece of every law that holds at a time which is no break."""
     starts, found = built.packed.table("PIECES")[:, 0], []
-    for first, count in built.packed.table("DRIVES"):
+    for first, count in built.packed.table("LAWS"):
         found.append(first + max(int(np.searchsorted(starts[first : first + count], inside, side="right")) - 1, 0))
     return np.array(found, dtype=np.int64)
 
@@ -94,14 +102,14 @@ def prepare(built: Tables, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
     scene, mobility = built.system.scene, analyse(built)
     progress(None, mobility.text())
-    integrator = scene.solver.integrator
+    scheme = scheme_of(scene.solver)
     w, n = built.packed.work_space()
-    entry = fuse.entry(built.kinds, integrator)
+    entry = fuse.entry(built.kinds, scheme)
     h, kept = built.packed.h.copy(), np.ones(built.packed.sizes["N_CLOSURE_ROWS"], dtype=bool)
     engine = Engine(built, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
-    if not fuse.is_compiled(built.kinds, integrator):
+    if not fuse.is_compiled(built.kinds, scheme):
         progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
-        with fuse.compiling(built.kinds, integrator):
+        with fuse.compiling(built.kinds, scheme):
             entry.evaluate(h, built.packed.f, w, n, engine.start, 0)
     return engine
 
@@ -120,8 +128,17 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
         return engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
 
     y = project(engine, initial.given_velocities(built, frames, y))
+    if built.kinds.loads:
+        y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, built.system.start_residual
+
+
+def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Y with the angles that loads follow as they are at the start; InputError for a spring without direction."""
+    engine.evaluate(y, engine.start)
+    loads = engine.view("LOAD", LOAD_SIZE * engine.built.packed.sizes["N_LOADS"]).reshape(-1, LOAD_SIZE)
+    return initial.start_loads(engine.built, y, loads.copy())
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -149,17 +166,20 @@ def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
             )
 
 
-def observe(engine: Engine, rows: np.ndarray) -> dict[str, np.ndarray]:
+def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> dict[str, np.ndarray]:
     """What is recorded of rows (time, modes, impact rates, state), whose states are projected first.
 
+    On a break the laws hold as before it, or as after it.
     Fields and widths: `pipeline.dynamics.integrate.observe`; shape (rows, width) each.
     """
     built = engine.built
     packed, segments = built.packed, engine.breaks
-    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="left"), 1, len(segments) - 1)
+    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
     per_segment = {x: pieces_at(built, x) for x in set(middles.tolist())}
-    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(len(rows), built.layout.known)
+    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(
+        len(rows), packed.sizes["N_LAWS"]
+    )
     widths = observing.widths(packed.sizes)
     out = np.zeros((len(rows), sum(widths.values())))
     tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * built.system.length

@@ -129,7 +129,7 @@ def switch(h, w, n, events, c, t):
 
 def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
     """The kernel settle(h, f, w, n, step, t_new, events) -> (event?, dense output ready?, end, step)."""
-    interpolate, last, extra = method.interpolate, method.last, method.extra
+    interpolate, last = method.interpolate, method.last
     spare = method.slopes - 1  # row of SLOPES that no stage uses
 
     @kernel
@@ -217,7 +217,7 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
         """Repeat the step so that it ends on the event; its length, or -1 when it cannot be done."""
         o, slope = h[CONTROL], h[SLOPES] + h[NY] * last
         for _ in range(3):
-            n[EVALUATIONS] += last
+            n[EVALUATIONS] += 1
             if not attempt(h, f, w, n, step):
                 return -1.0
             t = w[o + TIME] + step
@@ -242,7 +242,6 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
             change, peak = suspicious(h, w, n, c), peaking(h, w, n, c)
             if (change or peak) and not ready:
                 extend(h, f, w, n, step)
-                n[EVALUATIONS] += extra
                 ready = True
             if change:
                 theta = find(h, f, w, n, step, c)
@@ -287,7 +286,6 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
             return -1, ready, t_new, step
         w[watch(h, which) + RATE1] = w[touch(h, which) + RATE]
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
-        n[EVALUATIONS] += extra
         switch(h, w, n, events, which, t + length)
         return 1, True, t + length, length
 

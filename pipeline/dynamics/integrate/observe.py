@@ -19,6 +19,9 @@ from pipeline.dynamics.tables import (
     KEPT0,
     LATCHED,
     LINK_FRAMES,
+    LOAD,
+    LOAD_SIZE,
+    LOAD_STORED,
     MODE,
     MULTIPLIER,
     N_CLOSURE_ROWS,
@@ -27,7 +30,9 @@ from pipeline.dynamics.tables import (
     N_DRIVES,
     N_FLEX,
     N_KEPT,
+    N_LAWS,
     N_LINKS,
+    N_LOADS,
     N_SITES,
     NOT_CLOSED,
     NQ,
@@ -72,6 +77,7 @@ def widths(sizes: dict[str, int]) -> dict[str, int]:
         "link_wrench": 6 * sizes["N_LINKS"],
         "closure_wrench": 6 * sizes["N_CLOSURES"],
         "touch": TOUCH_SIZE * sizes["N_CONTACTS"],
+        "load": LOAD_SIZE * sizes["N_LOADS"],
         "drive_force": drives,
         "energy": 3,  # kinetic, potential of gravity, elastic
         "jacobian": sizes["JACOBIAN_SIZE"],
@@ -181,6 +187,8 @@ def compose(
             potential -= dot(at(f, h[GRAVITY]), at(w, h[OWN] + INERTIA_SIZE * i + 1))
         for c in range(h[N_CONTACTS]):
             elastic += w[touch(h, c) + STORED]
+        for k in range(h[N_LOADS]):
+            elastic += w[h[LOAD] + LOAD_SIZE * k + LOAD_STORED]
         out[column], out[column + 1], out[column + 2] = kinetic, potential, elastic
         return column + 3
 
@@ -201,8 +209,8 @@ def compose(
                 w[h[LATCHED] + c] = row[1 + contacts_count + c]
             for k in range(h[NY]):
                 w[h[Y] + k] = row[1 + 2 * contacts_count + k]
-            for d in range(h[N_DRIVES]):
-                n[n[ACTIVE] + d] = pieces[r, d]
+            for k in range(h[N_LAWS]):
+                n[n[ACTIVE] + k] = pieces[r, k]
             settle(h, f, w, n, row[0], tolerance)
             status, residual = n[EVALUATION], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS])
             o = _copy(w, h[Y], h[NY], line, 0)
@@ -214,6 +222,7 @@ def compose(
             frames = _copy(w, h[LINK_FRAMES], FRAME_SIZE * h[N_LINKS], line, frames)
             _copy(w, h[SITE_FRAMES], FRAME_SIZE * h[N_SITES], line, frames)
             o = _copy(w, h[TOUCH], TOUCH_SIZE * contacts_count, line, o)
+            o = _copy(w, h[LOAD], LOAD_SIZE * h[N_LOADS], line, o)
             o = _copy(w, h[DRIVE_FORCE], h[N_DRIVES], line, o)
             o = energies(h, f, w, line, o)
             o = _copy(w, h[JACOBIAN], h[JACOBIAN_SIZE], line, o)

@@ -8,9 +8,9 @@ import numpy as np
 
 from pipeline.dynamics import tables
 from pipeline.dynamics.assembly import selection
+from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.layout import Layout
 from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.assembly.tree import joint_class
 
 if TYPE_CHECKING:
     from pipeline.dynamics.integrate.engine import Engine

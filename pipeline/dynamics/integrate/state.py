@@ -11,11 +11,11 @@ from pipeline.dynamics.tables import MODE
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
-# accepted step, largest growth of the next (1 after a rejection); then what `straddle` keeps: independence of
-# the closure rows at the end of the step and at its start, its start, time of the next singular pose, whether
-# the present step is laid over it
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH = range(9)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, N_CONTROLS = range(9, 15)
+# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter;
+# then what `straddle` keeps: independence of the closure rows at the end of the step and at its start, its start,
+# time of the next singular pose, whether the present step is laid over it
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER = range(11)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, N_CONTROLS = range(11, 17)
 # integers
 (
     STATUS,
@@ -30,11 +30,14 @@ SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, N_CONTROLS = range(9, 15)
     FRESH,
     IMMEDIATE,
     PROJECTIONS,
+    PROJECTION_EVALUATIONS,
+    JACOBIANS,
     CULPRIT,
     INTEGERS,
-) = range(MODE + 1, MODE + 15)
+) = range(MODE + 1, MODE + 17)
 # values of n[STATUS]
-SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE, WORN_ROWS = range(9)
+SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
+NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS = 8, 9, 10
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING = 0, 1

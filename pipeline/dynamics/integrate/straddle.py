@@ -102,11 +102,11 @@ def steer(h, w, t, step, gap):
 
 
 @kernel
-def plan_next(h, w, step, growth):
+def plan(h, w, step, following):
     """The step to try next; one that was cut short for a singular pose says little about how long it may be."""
     planned = h[CONTROL] + STEP
     least = w[index(planned)] if step < CUT * w[index(planned)] else 0.0
-    w[index(planned)] = max(step * growth, least)
+    w[index(planned)] = max(following, least)
 
 
 @kernel

@@ -10,6 +10,7 @@ from pipeline.core.errors import SolverError
 from pipeline.dynamics import tables
 from pipeline.dynamics.integrate import singular, state
 from pipeline.dynamics.integrate.engine import Engine, Progress
+from pipeline.dynamics.tables import MODE
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -40,7 +41,7 @@ class Trajectory:
     def parts(self) -> list[tuple[slice, np.ndarray]]:
         """Stretches of rows, each with the closure rows that were solved for to reach them."""
         starts = [start for start, _ in self.selections]
-        firsts = np.maximum(np.searchsorted(self.time, starts, side="right"), 0)
+        firsts = np.searchsorted(self.time, starts, side="right")
         firsts[0] = 0
         ends = [*firsts[1:], len(self.rows)]
         return [(slice(a, b), kept) for a, b, (_, kept) in zip(firsts, ends, self.selections, strict=True)]
@@ -66,7 +67,8 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     """Regular output times and all breaks, increasing; times nearer than rounding are one."""
     span = breaks[-1] - breaks[0]
     regular = breaks[0] + interval * np.arange(int(np.floor(span / interval * (1 + 1e-12))) + 1)
-    apart = np.min(np.abs(regular[:, None] - breaks[None, :]), axis=1) > 1e-9 * interval
+    after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
+    apart = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
     return np.union1d(regular[apart], breaks)
 
 
@@ -88,8 +90,9 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     control[:] = 0.0
     control[state.TIME], control[state.SPAN] = engine.start, engine.end - engine.start
     control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length
+    control[state.FIXED], control[state.PARAMETER] = scene.solver.step or 0.0, built.method.parameter(scene.solver)
     n[state.STATUS : state.INTEGERS] = 0
-    n[state.INTEGERS + built.layout.known :] = 0
+    n[n[MODE] :] = 0
     n[state.CAP] = scene.solver.evaluations
     engine.view("Y", len(y))[:] = y
     engine.view("LATCHED", contacts)[:] = 0.0
@@ -139,6 +142,9 @@ def _refusal(engine: Engine, run: _Run) -> str:
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than an explicit method can follow ({where})",
         state.NO_START: f"the equations are singular here ({where})",
+        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero",
+        state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
+        "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
         state.LOST_CLOSURE: "the loops cannot be kept closed: a singular pose in which they can go on in several ways "
         f"({where})",
@@ -155,5 +161,7 @@ def _collect(run: _Run, drift: float) -> Trajectory:
         "steps": int(n[state.STEPS]),
         "rejected_steps": int(n[state.REJECTED]),
         "projections": int(n[state.PROJECTIONS]),
+        "projection_evaluations": int(n[state.PROJECTION_EVALUATIONS]),
+        "jacobians": int(n[state.JACOBIANS]),
     }
     return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift, tuple(run.selections))

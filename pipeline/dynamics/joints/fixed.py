@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.tables import J_COLUMNS
 from pipeline.dynamics.vectors import kernel
 
@@ -22,6 +23,7 @@ class Fixed:
     POSITIONS, SPEEDS = "", ""  #: r: rotation [rad or -], t: translation [m]
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
+    COORDINATES: tuple[Coordinate, ...] = ()
     motion = staticmethod(motion)
 
     @staticmethod

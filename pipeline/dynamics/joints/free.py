@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.tables import J_ACCELERATION, J_ALPHA, J_COLUMNS, J_OMEGA, J_POSITION, J_ROTATION, J_VELOCITY
 from pipeline.dynamics.vectors import from_quaternion, kernel, put9, quaternion_rate
 
@@ -36,6 +37,7 @@ class Free:
     POSITIONS, SPEEDS = "rrrrttt", "rrrttt"  #: r: rotation [rad or -], t: translation [m]
     TRANSLATIONS: tuple[int, ...] = ()
     ROTATIONS: tuple[tuple[int, int], ...] = ()
+    COORDINATES: tuple[Coordinate, ...] = ()
     motion = staticmethod(motion)
 
     @staticmethod

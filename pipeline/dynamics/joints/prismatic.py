@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics.joints.coordinate import TRANSLATION
 from pipeline.dynamics.tables import J_ACCELERATION, J_COLUMNS, J_POSITION, J_VELOCITY
 from pipeline.dynamics.vectors import kernel
 
@@ -27,6 +28,7 @@ class Prismatic:
     POSITIONS, SPEEDS = "t", "t"  #: r: rotation [rad or -], t: translation [m]
     TRANSLATIONS: tuple[int, ...] = (0, 1)
     ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
+    COORDINATES = (TRANSLATION,)
     motion = staticmethod(motion)
 
     @staticmethod

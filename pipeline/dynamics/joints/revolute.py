@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics.joints.coordinate import ROTATION
 from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA
 from pipeline.dynamics.vectors import kernel
 
@@ -27,6 +28,7 @@ class Revolute:
     POSITIONS, SPEEDS = "r", "r"  #: r: rotation [rad or -], t: translation [m]
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
+    COORDINATES = (ROTATION,)
     motion = staticmethod(motion)
 
     @staticmethod

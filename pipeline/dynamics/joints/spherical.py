@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA, J_ROTATION
 from pipeline.dynamics.vectors import from_quaternion, kernel, put9, quaternion_rate
 
@@ -33,6 +34,7 @@ class Spherical:
     POSITIONS, SPEEDS = "rrrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ()
+    COORDINATES: tuple[Coordinate, ...] = ()
     motion = staticmethod(motion)
 
     @staticmethod

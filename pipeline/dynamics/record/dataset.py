@@ -11,13 +11,15 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly.loading import LEDGER, order
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
-from pipeline.dynamics.integrate.engine import Engine
 from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
+from pipeline.dynamics.run import Run
 from pipeline.dynamics.tables import (
     CONTACT_LOSS,
     FRICTION_POWER,
@@ -33,21 +35,28 @@ Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
-def dataset(engine: Engine, trajectory: Trajectory, seen: Seen, start_residual: float) -> xr.Dataset:
-    """All that DESIGN promises of a run; `seen` holds the observed rows of the trajectory."""
-    built, scene = engine.built, engine.built.system.scene
+def dataset(run: Run) -> xr.Dataset:
+    """All that is recorded of a run (schema RUN)."""
+    built, trajectory, seen = run.engine.built, run.trajectory, run.observed
     variables: Variables = {}
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
     _modes(built, seen, variables, coordinates)
     _drives(built, seen, variables, coordinates)
+    _joint_coordinates(built, seen, variables, coordinates)
+    if built.system.scene.forces():
+        _loads(built, seen, variables, coordinates)
     if built.system.contacts:
         _contacts(built, seen, variables, coordinates)
         _events(trajectory, variables)
+    if run.twin is not None:
+        coordinates["twin_time"] = run.twin.time
+        variables["twin_separation"] = (("twin_time",), run.twin.separation)
+        variables["horizon"] = ((), np.array(run.twin.horizon))
     _ledger(built, seen, variables)
-    topological, named = topology(engine, trajectory, seen, list(scene.joint))
+    topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
     made = xr.Dataset(variables | topological, coords=coordinates | named)
-    result = conform(made, RUN, **attributes(scene), **_report(trajectory, start_residual), **_counts(engine))
+    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.array([0, 1], dtype=np.int8),
@@ -70,18 +79,20 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
-def _report(trajectory: Trajectory, start_residual: float) -> dict[str, float | int]:
-    return {
-        **trajectory.counters,
-        "largest_drift_before_projection": trajectory.drift,
-        "closure_residual_of_given_start": start_residual,
+def _report(run: Run) -> dict[str, float | int]:
+    found: dict[str, float | int] = {
+        **run.trajectory.counters,
+        "largest_drift_before_projection": run.trajectory.drift,
+        "closure_residual_of_given_start": run.start_residual,
     }
+    return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
 
 
-def _counts(engine: Engine) -> dict[str, str | int]:
+def _counts(run: Run) -> dict[str, str | int]:
     """Redundancy, in words for the attributes."""
-    found: dict[str, str | int] = {"redundant_closure_rows": engine.mobility.redundant}
-    if engine.mobility.redundant:
+    redundant = run.engine.mobility.redundant
+    found: dict[str, str | int] = {"redundant_closure_rows": redundant}
+    if redundant:
         found["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
     return found
 
@@ -134,11 +145,26 @@ def _drives(built: Tables, seen: Seen, variables: Variables, coordinates: dict[s
     names = built.system.drives
     if not names:
         return
-    branches = {b.edge.name: b for b in (link.branch for link in built.system.links) if b.edge is not None}
-    signs = np.array([-1.0 if branches[built.system.scene.drive[n].joint].reverse else 1.0 for n in names])
+    sign_of = {name: link.stage.sign for link in built.system.links if link.stage for name in link.drives}
+    signs = np.array([sign_of[name] for name in names])
     coordinates["drive"] = names
     variables["drive_force"] = (("time", "drive"), signs * seen["drive_force"])
     variables["drive_position"] = (("time", "drive"), signs * seen["coordinate"][:, built.layout.nq :])
+
+
+def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+    found = joint_coordinates(built, seen)
+    if found:
+        coordinates["coordinate"] = list(found)
+        for k, name in enumerate(("joint_position", "joint_velocity", "joint_acceleration")):
+            variables[name] = (("time", "coordinate"), np.stack([series[k] for series in found.values()], axis=1))
+
+
+def _loads(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+    from pipeline.dynamics.record.loads import load_series
+
+    coordinates["load"] = order(built.system.scene)
+    variables.update(load_series(built, seen))
 
 
 def _contacts(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
@@ -171,12 +197,19 @@ def _events(trajectory: Trajectory, variables: Variables) -> None:
 
 
 def _ledger(built: Tables, seen: Seen, variables: Variables) -> None:
+    names = built.system.scene.forces()
     ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
     kinetic, potential, elastic = seen["energy"].T
-    # ledger: work of the drives, loss of modal damping, then per contact its normal and friction losses
-    assert ledger.shape[1] == CONTACT_LOSS + 2 * len(built.system.contacts)
-    work, dissipated = ledger[:, 0], ledger[:, 1:].sum(axis=1)
-    balance = kinetic + potential + elastic + dissipated - work
+    # ledger: work of the drives, loss of modal damping, per contact its normal and friction losses; then, where
+    # there are loads, their work, their losses, and the angles that some of them follow
+    losses = CONTACT_LOSS + 2 * len(built.system.contacts)
+    assert ledger.shape[1] == losses + (LEDGER + built.packed.sizes["N_TURNS"] if names else 0)
+    work, dissipated = ledger[:, 0], ledger[:, 1:losses].sum(axis=1)
+    load_work = ledger[:, losses] if names else np.zeros(len(ledger))
+    if names:
+        dissipated = dissipated + ledger[:, losses + 1]
+        variables["load_work"] = (("time",), load_work)
+    balance = kinetic + potential + elastic + dissipated - work - load_work
     series = {
         "kinetic": kinetic,
         "potential": potential,

@@ -14,17 +14,16 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import ENSEMBLE, conform
 from pipeline.core.errors import InputError
+from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
 from pipeline.dynamics.integrate import state
-from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, project
+from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
+from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.record.dataset import attributes
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run import engine_of, observed
-from pipeline.dynamics.tables import BALL, FRAME_SIZE, NORMAL_FORCE, SOCKET, TOUCH_OFFSET, TOUCH_SIZE, VELOCITY
-
-#: approach speed above which a closing counts as an impact [m/s]
-IMPACT = 1e-4
+from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -63,42 +62,6 @@ def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
         if name not in known:
             raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
     return list(wanted.bodies)
-
-
-def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
-    """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
-
-    From the velocities that unit speeds give, so that no step width enters.
-    """
-    layout = engine.built.layout
-    columns = []
-    for k in range(layout.nv):
-        moved = y.copy()
-        moved[layout.nq : layout.nq + layout.nv] = 0.0
-        moved[layout.nq + k] = 1.0
-        columns.append(_offset_rates(engine, project(engine, moved)))
-    return np.array(columns).T
-
-
-def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
-    engine.evaluate(y, engine.start)
-    sites = engine.view("SITE_FRAMES", FRAME_SIZE * engine.built.packed.sizes["N_SITES"]).reshape(-1, FRAME_SIZE)
-    table = engine.built.packed.table("CONTACTS")
-    return np.concatenate(
-        [sites[b, VELOCITY : VELOCITY + 3] - sites[s, VELOCITY : VELOCITY + 3] for s, b in table[:, [SOCKET, BALL]]]
-    )
-
-
-def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """The start with the balls moved by `offsets` (3 per contact) as nearly as the joints allow."""
-    layout = engine.built.layout
-    speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
-    moving = y.copy()
-    moving[layout.nq : layout.nq + layout.nv] = speeds
-    rates = engine.evaluate(project(engine, moving), engine.start)[: layout.nq]
-    moved = y.copy()
-    moved[: layout.nq] += rates  # rates per unit time, for one unit: a displacement of 1e-8 m is linear
-    return project(engine, moved)
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:

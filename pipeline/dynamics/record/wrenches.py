@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.parts import RigidBody
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.record.motion import Motion
@@ -22,7 +23,7 @@ def joint_wrenches(
     Returned as (moment, force).
     """
     found = _tree(built, seen) | _closures(built, seen) | _contacts(built, seen)
-    found |= _inside_groups(built, bodies, found)
+    found |= _inside_groups(built, seen, bodies, found)
     result = {}
     for name, joint in built.system.scene.joint.items():
         moment, force = found[name]
@@ -58,13 +59,15 @@ def _contacts(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
     return found
 
 
-def _inside_groups(built: Tables, bodies: Mapping[str, Motion], known: Mapping[str, Wrench]) -> dict[str, Wrench]:
+def _inside_groups(
+    built: Tables, seen: dict[str, np.ndarray], bodies: Mapping[str, Motion], known: Mapping[str, Wrench]
+) -> dict[str, Wrench]:
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
     scene, system = built.system.scene, built.system
     found: dict[str, Wrench] = {}
     for link in system.links:
         inner = [n for n, j in scene.joint.items() if _is_inside(built, j.between, link.places) and n not in known]
-        demand = {b: _demand(built, b, bodies, known) for b in link.places}
+        demand = {b: _demand(built, seen, b, bodies, known) for b in link.places}
         tree = _forest(built, inner, list(link.places))
         for name in inner:
             if name not in tree:
@@ -82,9 +85,15 @@ def _is_inside(built: Tables, between: tuple[str, str], places: Mapping[str, obj
     return all(built.system.frames[f].body in places for f in between)
 
 
-def _demand(built: Tables, name: str, bodies: Mapping[str, Motion], known: Mapping[str, Wrench]) -> Wrench:
-    """What the fixed joints must supply to a body: its inertia less gravity and all other joints."""
-    scene, frames = built.system.scene, built.system.frames
+def _demand(
+    built: Tables,
+    seen: dict[str, np.ndarray],
+    name: str,
+    bodies: Mapping[str, Motion],
+    known: Mapping[str, Wrench],
+) -> Wrench:
+    """What the fixed joints must supply to a body: its inertia less gravity, loads, paths and all other joints."""
+    scene = built.system.scene
     times = len(next(iter(bodies.values())).p)
     moment, force = np.zeros((times, 3)), np.zeros((times, 3))
     body = scene.body[name]
@@ -95,11 +104,27 @@ def _demand(built: Tables, name: str, bodies: Mapping[str, Motion], known: Mappi
         spin = np.einsum("tij,tj->ti", J, motion.omega)
         moment = np.einsum("tij,tj->ti", J, motion.alpha) + np.cross(motion.omega, spin) + np.cross(motion.p, force)
     for joint_name, (n, f) in known.items():
-        a, b = (frames[x].body for x in scene.joint[joint_name].between)
+        a, b = _joined(built, joint_name)
         if name in (a, b):
             sign = 1.0 if name == b else -1.0
             moment, force = moment - sign * n, force - sign * f
+    if scene.forces():
+        from pipeline.dynamics.record.loads import on_body
+
+        n, f = on_body(built, seen, name)
+        moment, force = moment - n, force - f
     return moment, force
+
+
+def _joined(built: Tables, name: str) -> tuple[str, str]:
+    """Bodies of a joint; of a path, which holds against the world, its body alone."""
+    scene, frames = built.system.scene, built.system.frames
+    if name in scene.joint:
+        a, b = scene.joint[name].between
+        return frames[a].body, frames[b].body
+    path = scene.drive[name.partition(".")[2]]
+    assert isinstance(path, PathDrive)
+    return "", frames[path.frame].body
 
 
 def _forest(built: Tables, names: list[str], bodies: list[str]) -> list[str]:

@@ -11,7 +11,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.post.errors import common_times
+from pipeline.core.quantities import common_times
 from pipeline.post.models import PLATFORM, Motion
 from pipeline.post.plotting import style
 

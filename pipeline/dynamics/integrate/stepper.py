@@ -1,7 +1,8 @@
-"""Adaptive steps of an explicit Runge-Kutta method, with projection, events and a record.
+"""Steps of an integration method from event to event, with projection and a record.
 
 One call advances to the end of a segment between two drive breaks, or until its budget of
-evaluations is used, so that the caller can report progress and be interrupted.
+evaluations is used, so that the caller can report progress and be interrupted. How long a step is
+`adaptive` or `fixed` says; what a step is, the method.
 """
 
 from __future__ import annotations
@@ -21,15 +22,14 @@ from pipeline.dynamics.integrate.state import (
     EVALUATIONS,
     FRESH,
     FULL,
-    LAST_NORM,
     LENGTH,
     LOST_CLOSURE,
-    MOST_GROWTH,
     N_EVENTS,
     N_RECORDED,
     NEXT_OUTPUT,
-    NO_START,
+    NOT_A_NUMBER,
     PAUSED,
+    PROJECTION_EVALUATIONS,
     PROJECTIONS,
     REJECTED,
     ROOM,
@@ -37,15 +37,13 @@ from pipeline.dynamics.integrate.state import (
     SEGMENT_END,
     SPAN,
     STATUS,
-    STEP,
     STEP_TOO_SMALL,
     STEPS,
     STRADDLING,
     TIME,
     WORN_ROWS,
 )
-from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan_next, steer
-from pipeline.dynamics.integrate.straddle import compose as compose_foresee
+from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -58,6 +56,7 @@ from pipeline.dynamics.tables import (
     N_CLOSURE_ROWS,
     N_CONTACTS,
     N_GROUPS,
+    NOT_FINITE,
     NY,
     OK,
     PIVOT,
@@ -70,10 +69,8 @@ from pipeline.dynamics.tables import (
 )
 from pipeline.dynamics.vectors import index, kernel
 
-# step control with memory: the factor is SAFETY norm^(-exponent) last_norm^MEMORY (Hairer et al., sec. IV.2);
-# the memory keeps steps quiet where stability, not accuracy, limits them
-SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
-LEAST_NORM = 1e-4
+#: what settle returns for an event after which integration starts afresh; another positive number only records it
+RESTART = 1
 #: share of the mechanism's size to which closures are closed before a singular pose
 TIGHTLY = 1e-15
 #: a step below this share of the time reached cannot be told from rounding
@@ -119,6 +116,15 @@ def scaled_norm(h, w, a):
 
 
 @kernel
+def finite(h, w, a):
+    """Whether the stretch of w from a holds numbers only."""
+    result = True
+    for c in range(h[NY]):
+        result &= abs(w[index(a + c)]) <= 1e300
+    return result
+
+
+@kernel
 def watch_nothing(h, w):
     """No contact to watch."""
 
@@ -133,58 +139,24 @@ def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, proj
     return settle
 
 
-def compose_start(evaluate: Callable, start_watch: Callable, order: int) -> Callable:
-    """The kernel first_step(h, f, w, n): slope at the start of a segment, and a first step."""
-
-    @kernel
-    def first_step(h, f, w, n):
-        """False when the equations have no solution here. Source: Hairer et al., sec. II.4."""
-        c, y, slope = h[CONTROL], h[Y], h[SLOPES]
-        other = slope + h[NY]
-        evaluate(h, f, w, n, w[index(c + TIME)], y, slope)
-        n[EVALUATIONS] += 2
-        if n[EVALUATION] != OK:
-            n[STATUS] = NO_START
-            return False
-        start_watch(h, w)
-        note(h, w)
-        set_magnitudes(h, f, w, y)
-        size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
-        step = 1e-6 * w[index(c + SPAN)]
-        if size > 0.0 and steepness > 0.0:
-            step = min(0.01 * size / steepness, 0.01 * w[index(c + SPAN)])
-        step = min(step, w[index(c + END)] - w[index(c + TIME)])
-        for k in range(h[NY]):
-            w[index(h[Y_STAGE] + k)] = w[index(y + k)] + step * w[index(slope + k)]
-        evaluate(h, f, w, n, w[index(c + TIME)] + step, h[Y_STAGE], other)
-        if n[EVALUATION] == OK:
-            for k in range(h[NY]):
-                w[index(other + k)] -= w[index(slope + k)]
-            steepness = max(steepness, scaled_norm(h, w, other) / step)
-            if steepness > 0.0:
-                step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        w[index(c + STEP)] = step
-        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = LEAST_NORM, GROW
-        forget(h, w, w[index(c + TIME)])
-        n[FRESH] = 0
-        return True
-
-    return first_step
-
-
-def compose(evaluate: Callable, project: Callable, method: Any, contact_events: tuple[Callable, Callable]) -> Callable:
+def compose(
+    evaluate: Callable,
+    project: Callable,
+    displace: Callable,
+    method: Any,
+    stepping: Callable,
+    contact_events: tuple[Callable, Callable],
+) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
-    contact_events: start_watch and make_settle of `events`, or those that do nothing.
+    stepping: `compose` of `adaptive` or `fixed`.
+    contact_events: start_watch and make_settle of `events` or `step_ends`, or those that do nothing.
     """
-    attempt, extend = method.compose(evaluate)
-    error, interpolate, last, extra, gap = method.error, method.interpolate, method.last, method.extra, method.gap
-    exponent = -1.0 / (method.error_order + 1)
-    remembering = exponent + 0.2 * MEMORY
+    begin, attempt, error, extend, keep = method.compose(evaluate, displace)
+    interpolate, last, ends = method.interpolate, method.last, method.ends
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
-    foresee = compose_foresee(evaluate)
-    first_step = compose_start(evaluate, start_watch, method.error_order + 1)
+    first_step, judge, after_rejection, next_step, lay, foresee = stepping(evaluate, start_watch, begin, error, method)
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
@@ -213,7 +185,6 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
             if wanted > t:
                 if not ready:
                     extend(h, f, w, n, step)
-                    n[EVALUATIONS] += extra
                     ready = True
                 interpolate(h, w, (wanted - t) / step, h[Y_STAGE])
                 snapshot(h, w, n, rows, wanted, h[Y_STAGE])
@@ -223,9 +194,13 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
     def finish(h, f, w, n, t_new):
         """Slope at Y_NEW with the loops closed; False when they cannot be."""
         c, slope = h[CONTROL], h[SLOPES] + h[NY] * last
-        evaluate(h, f, w, n, t_new, h[Y_NEW], slope)
-        n[EVALUATIONS] += 1
+        if not ends:
+            evaluate(h, f, w, n, t_new, h[Y_NEW], slope)
+            n[EVALUATIONS] += 1
         if n[EVALUATION] != OK:
+            return False
+        if not (finite(h, w, slope) and finite(h, w, h[Y_NEW])):
+            n[EVALUATION] = NOT_FINITE
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
         share = TIGHTLY if near(h, w, t_new) else w[index(c + RTOL)]
@@ -233,19 +208,21 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         note(h, w)
         if used > 0:
             n[EVALUATIONS] += used
+            n[PROJECTION_EVALUATIONS] += used
             n[PROJECTIONS] += 1
         return used >= 0
 
     @kernel
     def try_step(h, f, w, n, step, t_new):
         """Error norm of the step to Y_NEW, 1 at the tolerance; at least 1e9 when it failed."""
-        n[EVALUATIONS] += last - 1
         if not attempt(h, f, w, n, step):
             return 1e9
-        set_magnitudes(h, f, w, h[Y_NEW])
-        norm = error(h, w, step)
-        if not norm <= allowed(h, w):
-            return min(norm, 1e9) if norm == norm else 1e9
+        norm = judge(h, f, w, n, step)
+        if norm != norm:
+            n[EVALUATION] = NOT_FINITE
+            return 1e9
+        if norm > allowed(h, w):
+            return min(norm, 1e9)
         return norm if finish(h, f, w, n, t_new) else 1e9
 
     @kernel
@@ -259,38 +236,34 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
         w[index(h[CONTROL] + TIME)] = t_new
 
     @kernel
-    def next_growth(h, w, norm):
-        """Factor from the step that has just been accepted to the next one."""
-        c = h[CONTROL]
-        norm = max(norm, LEAST_NORM)
-        growth = SAFETY * norm**remembering * w[index(c + LAST_NORM)] ** MEMORY
-        growth = min(w[index(c + MOST_GROWTH)], max(SHRINK, growth))
-        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = norm, GROW
-        return growth
-
-    @kernel
     def advance(h, f, w, n, outputs, rows, events):
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
         c = h[CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
-            if n[FRESH] and not first_step(h, f, w, n):
-                return
             t = w[index(c + TIME)]
-            step = steer(h, w, t, w[index(c + STEP)], gap)
+            if n[FRESH]:
+                if not first_step(h, f, w, n):
+                    return
+                note(h, w)
+                forget(h, w, t)
+            step = lay(h, w, t)
             final = t + 1.0001 * step >= w[index(c + END)]
             if final:
                 step = w[index(c + END)] - t
             if not step > SMALLEST_STEP * max(abs(t), w[index(c + SPAN)]):
-                n[STATUS] = LOST_CLOSURE if n[EVALUATION] != OK else STEP_TOO_SMALL
+                if n[EVALUATION] == NOT_FINITE:
+                    n[STATUS] = NOT_A_NUMBER
+                else:
+                    n[STATUS] = LOST_CLOSURE if n[EVALUATION] != OK else STEP_TOO_SMALL
                 return
             t_new = w[index(c + END)] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
             if norm > allowed(h, w):
                 n[REJECTED] += 1
-                w[index(c + STEP)] = step * max(SHRINK, SAFETY * norm**exponent)
-                w[index(c + MOST_GROWTH)] = 1.0
+                if not after_rejection(h, w, n, step, norm):
+                    return
                 continue
-            growth = next_growth(h, w, norm)
+            following = next_step(h, w, step, norm)
             happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
@@ -299,12 +272,13 @@ def compose(evaluate: Callable, project: Callable, method: Any, contact_events: 
             if straddling:
                 snapshot(h, w, n, rows, t, h[Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
+            keep(h, f, w, n, step)
             accept(h, w, t_new)
-            plan_next(h, w, step, growth)
+            plan(h, w, step, following)
             foresee(h, f, w, n, t_new)
             if happened > 0 or straddling:
                 snapshot(h, w, n, rows, t_new, h[Y])
             if happened > 0:
-                n[FRESH] = 1
+                n[FRESH] = 1 if happened == RESTART else 0
 
     return advance

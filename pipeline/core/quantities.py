@@ -1,0 +1,183 @@
+"""Quantities of interest: what `[accuracy]` may name, read from a run, and compared between two runs.
+
+A quantity is ``<owner>.<kind>``, e.g. ``platform.position`` or ``A1.peak_force``. Series are compared
+at the regular output times that both runs have, never interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.algebra import rotation_between
+from pipeline.core.registry import suggestion
+
+#: two output times are the same when they agree after rounding to this many decimals [s]; outputs are
+#: 1e-4 s apart and event times fall anywhere, so a nanosecond separates what is equal from what is not
+DECIMALS = 9
+#: closings with an approach above this count as impacts [m/s]
+IMPACT = 1e-4
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What may own such a quantity, its physical dimensions, and the variable of the run that holds it."""
+
+    owner: str
+    dimensions: tuple[str, ...]
+    unit: str
+    variable: str
+
+
+KINDS: dict[str, Kind] = {
+    "position": Kind("body", ("length",), "m", "position"),
+    "orientation": Kind("body", ("angle",), "rad", "quaternion"),
+    "velocity": Kind("body", ("velocity",), "m/s", "velocity"),
+    "angular_velocity": Kind("body", ("angular velocity",), "rad/s", "angular_velocity"),
+    "force": Kind("joint", ("force",), "N", "joint_force"),
+    "moment": Kind("joint", ("torque",), "N m", "joint_moment"),
+    "drive_force": Kind("drive", ("force", "torque"), "N or N m", "drive_force"),
+    "peak_force": Kind("contact", ("force",), "N", "event_peak_force"),
+    "impulse": Kind("contact", ("impulse",), "N s", "contact_impulse"),
+    "impact_times": Kind("contact", ("time",), "s", "event_time"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One quantity of one part of a scene."""
+
+    owner: str
+    kind: str
+
+    @property
+    def name(self) -> str:
+        """As `[accuracy]` writes it."""
+        return f"{self.owner}.{self.kind}"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its values and errors."""
+        return KINDS[self.kind].unit
+
+
+def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
+    """The quantity called `text`.
+
+    owners: names of the scene's parts by what they are (body, joint, drive, contact).
+    Raises ValueError that names what could have been meant.
+    """
+    owner, _, kind = text.rpartition(".")
+    if kind not in KINDS:
+        raise ValueError(f"there is no quantity '{kind}' ({suggestion(kind, list(KINDS))})")
+    known = owners.get(KINDS[kind].owner, ())
+    if owner not in known:
+        raise ValueError(
+            f"'{kind}' belongs to a {KINDS[kind].owner}, and none is called '{owner}' "
+            f"({suggestion(owner, sorted(known)) if known else 'the scene has none'})"
+        )
+    return Quantity(owner, kind)
+
+
+def series(run: xr.Dataset, quantity: Quantity) -> np.ndarray:
+    """Values over time, shape (time, components); only of quantities that have a value at every time."""
+    kind = KINDS[quantity.kind]
+    values: np.ndarray = run[kind.variable].sel({kind.owner: quantity.owner}).values
+    return values.reshape(len(values), -1)
+
+
+def events(run: xr.Dataset, quantity: Quantity) -> np.ndarray:
+    """Impact times [s], the largest contact force [N] or the total normal impulse [N s], shape (n,)."""
+    if quantity.kind == "impulse":
+        return series(run, quantity)[-1]
+    contacts = [str(name) for name in run["contact"].values]
+    mine = (run["event_contact"].values == contacts.index(quantity.owner)) & (run["event_kind"].values == 1)
+    if quantity.kind == "peak_force":
+        return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])
+    impact = mine & (run["event_approach_speed"].values > IMPACT)
+    times: np.ndarray = run["event_time"].values[impact]
+    return times
+
+
+def is_series(quantity: Quantity) -> bool:
+    """Whether it has a value at every time."""
+    return KINDS[quantity.kind].owner != "contact"
+
+
+def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into a and into b of the times that both have, ascending, each time once."""
+    _, first, second = np.intersect1d(np.round(a, DECIMALS), np.round(b, DECIMALS), return_indices=True)
+    return first, second
+
+
+def deviation(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
+    """Common times [s] and the distance of the two runs at each, shape (n,); of a series."""
+    i, j = common_times(run["time"].values, reference["time"].values)
+    a, b = series(run, quantity)[i], series(reference, quantity)[j]
+    distance = rotation_between(a, b) if quantity.kind == "orientation" else np.linalg.norm(a - b, axis=1)
+    return run["time"].values[i], distance
+
+
+def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: float = np.inf) -> float:
+    """Largest distance between two runs up to a time [s], in the quantity's unit.
+
+    Infinite when the runs differ in the number of impacts before `until`.
+    """
+    if is_series(quantity):
+        time, distance = deviation(run, reference, quantity)
+        return float(distance[time <= until].max(initial=0.0))
+    a, b = events(run, quantity), events(reference, quantity)
+    if quantity.kind == "impact_times":
+        a, b = a[a <= until], b[b <= until]
+    return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
+
+
+def scale(run: xr.Dataset, quantity: Quantity) -> float:
+    """What a relative error is relative to: the largest change from the start; of forces the largest value.
+
+    For impact times it is the time from the start to the last one.
+    """
+    if quantity.kind == "impact_times":
+        times = events(run, quantity)
+        return float(times[-1] - run["time"].values[0]) if len(times) else 0.0
+    if not is_series(quantity):
+        return float(np.abs(events(run, quantity)).max(initial=0.0))
+    values = series(run, quantity)
+    if quantity.kind == "orientation":
+        return float(rotation_between(values[:1], values).max())
+    start = values[:1] if quantity.kind == "position" else 0.0
+    return float(np.linalg.norm(values - start, axis=1).max())
+
+
+def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
+    """The part of a run that `error` and `scale` need for these quantities."""
+    found: dict[str, xr.DataArray] = {}
+    for owner in ("body", "joint", "drive"):
+        mine = [q for q in chosen if KINDS[q.kind].owner == owner]
+        names = sorted({q.owner for q in mine})
+        found |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
+    if any(KINDS[q.kind].owner == "contact" for q in chosen):
+        found |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
+        found |= {name: run[name] for name in ("contact_impulse",) if name in run}
+    if "horizon" in run:
+        found["horizon"] = run["horizon"]
+    kept = xr.Dataset(found)
+    return kept.assign_coords(contact=run["contact"]) if "contact" in run.coords else kept
+
+
+def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:
+    """What is asked of a scene that names nothing: motion of the body with most joints, a reaction, the contacts.
+
+    joints: the bodies that each joint connects, in the scene's order; contacts: those with clearance.
+    """
+    bodies = [body for pair in joints.values() for body in pair]
+    if not bodies:
+        return []
+    central = max(dict.fromkeys(bodies), key=bodies.count)
+    chosen = [Quantity(central, kind) for kind in ("position", "orientation", "velocity")]
+    ideal = [name for name, pair in joints.items() if central in pair and name not in contacts]
+    chosen += [Quantity(name, "force") for name in ideal[:1]]
+    return chosen + [Quantity(name, kind) for name in contacts for kind in ("peak_force", "impulse", "impact_times")]

@@ -1,0 +1,76 @@
+"""Drives: what prescribes a motion. Either a coordinate of a joint, or the pose of a frame in the world."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from pipeline.core.scene.fields import FrameName, Part
+from pipeline.core.scene.laws import Law
+
+
+class JointDrive(Part):
+    """Prescribes one coordinate of a joint; joints with several freedoms need its name."""
+
+    joint: str
+    coordinate: str | None = None
+    law: Law
+
+
+class Components(Part):
+    """Laws along, or about, the axes; a component without a law stays free."""
+
+    x: Law | None = None
+    y: Law | None = None
+    z: Law | None = None
+
+    def laws(self) -> dict[str, Any]:
+        """The laws that there are, by axis."""
+        return {axis: getattr(self, axis) for axis in "xyz" if getattr(self, axis) is not None}
+
+
+class PathDrive(Part):
+    """Prescribes the pose of a frame in the world, or some components of it.
+
+    position: its origin [m].  rotation: from the world's axes to the frame's, by `angles`: 'cardan' is
+    about x, then about y of the turned frame, then about z of the frame so turned; 'rotation-vector'
+    takes all three components.
+    actuators: joints (``P1``, or ``C.rotation`` where a joint has several freedoms) whose forces shall
+    produce this motion; without them the drive itself acts on the frame.
+    """
+
+    frame: FrameName
+    position: Components | None = None
+    rotation: Components | None = None
+    angles: Literal["cardan", "rotation-vector"] = "cardan"
+    actuators: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _prescribes(self) -> PathDrive:
+        if not list(self.components()):
+            raise ValueError("a path prescribes at least one component of position or rotation")
+        turning = self.rotation.laws() if self.rotation is not None else {}
+        if self.angles == "rotation-vector" and 0 < len(turning) < 3:
+            raise ValueError("a rotation vector has three components: give rotation.x, rotation.y and rotation.z")
+        if self.actuators is not None and len(set(self.actuators)) < len(self.actuators):
+            raise ValueError("an actuator is named twice")
+        return self
+
+    def components(self) -> Iterator[tuple[str, Any]]:
+        """Prescribed components, as ``position.x``, and their laws."""
+        for kind in ("position", "rotation"):
+            part = getattr(self, kind)
+            for axis, law in (part.laws() if part is not None else {}).items():
+                yield f"{kind}.{axis}", law
+
+
+def _which(data: Any) -> str:
+    frame = "frame" in data if isinstance(data, dict) else isinstance(data, PathDrive)
+    return "path-drive" if frame else "joint-drive"
+
+
+Drive = Annotated[
+    Annotated[JointDrive, Tag("joint-drive")] | Annotated[PathDrive, Tag("path-drive")], Discriminator(_which)
+]

@@ -1,0 +1,243 @@
+"""Laws of time: what a prescribed coordinate, or the size of a load, does. One language for drives and loads.
+
+The values of a law are lengths, angles, forces or torques, as the place where it stands demands;
+a bare number is in SI units.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeAlias
+
+from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
+
+from pipeline.core.scene.fields import Angle, Part, Rate, Time
+from pipeline.core.units import UNITS, any_quantity, quantity
+
+_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law stands"}
+Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
+
+#: most coefficients of a polynomial law
+COEFFICIENTS = 8
+Ends = Literal["not-a-knot", "natural", "clamped", "periodic"]
+
+
+class Constant(Part):
+    """It keeps a value."""
+
+    type: Literal["constant"]
+    value: Value = 0.0
+
+
+class Step(Part):
+    """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35)."""
+
+    type: Literal["step"]
+    start: tuple[Time, ...]
+    end: tuple[Time, ...]
+    change: tuple[Value, ...]
+
+    @field_validator("change")
+    @classmethod
+    def _not_empty(cls, value: tuple[float | str, ...]) -> tuple[float | str, ...]:
+        if not value:
+            raise ValueError("a step law has at least one step")
+        return value
+
+    @model_validator(mode="after")
+    def _same_length(self) -> Step:
+        if not len(self.start) == len(self.end) == len(self.change):
+            raise ValueError("start, end and change have one entry per step each")
+        if any(not a < b for a, b in zip(self.start, self.end, strict=True)):
+            raise ValueError("each step ends after it starts")
+        return self
+
+
+class Polynomial(Part):
+    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; coefficients in SI units, the constant first."""
+
+    type: Literal["polynomial"]
+    coefficients: Annotated[tuple[float, ...], Field(min_length=1, max_length=COEFFICIENTS)]
+    origin: Time = 0.0
+
+
+class Harmonic(Part):
+    """Offset plus the sum of amplitude sin(frequency t + phase); phase 90 deg is a cosine."""
+
+    type: Literal["harmonic"]
+    amplitude: Annotated[tuple[Value, ...], Field(min_length=1)]
+    frequency: tuple[Rate, ...]
+    phase: tuple[Angle, ...] | None = None
+    offset: Value = 0.0
+
+    @model_validator(mode="after")
+    def _same_length(self) -> Harmonic:
+        phases = self.frequency if self.phase is None else self.phase
+        if not len(self.amplitude) == len(self.frequency) == len(phases):
+            raise ValueError("amplitude, frequency and phase have one entry per harmonic each")
+        return self
+
+
+class Spline(Part):
+    """Interpolating spline: degree 3 with continuous second derivatives, degree 5 with continuous fourth ones.
+
+    ends: 'not-a-knot'; 'natural' (second derivative zero; of degree 5 third and fourth); 'clamped'
+    (first derivative zero; of degree 5 second too); 'periodic'. It must cover the run.
+    """
+
+    type: Literal["spline"]
+    time: tuple[Time, ...]
+    value: tuple[Value, ...]
+    degree: Literal[3, 5] = 3
+    ends: Ends = "not-a-knot"
+
+    @model_validator(mode="after")
+    def _drawable(self) -> Spline:
+        if len(self.time) != len(self.value):
+            raise ValueError(f"there are {len(self.time)} times, but {len(self.value)} values")
+        _check_points(self.time, self.degree, self.ends)
+        return self
+
+
+class Column(Part):
+    """A column of a table: its header, or its number from 1, and the unit of what stands there."""
+
+    column: str | Annotated[int, Field(ge=1)]
+    unit: str
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, unit: str) -> str:
+        if unit not in (*UNITS, "1"):
+            raise ValueError(f"unknown unit '{unit}'; known: {', '.join(UNITS)}, and 1 for a pure number")
+        return unit
+
+
+class Table(Part):
+    """A spline through the rows of a CSV file, looked for beside the scene and in the folders above it.
+
+    The file is read with the scene: `points` are its numbers, time in seconds, values in their column's unit.
+    """
+
+    type: Literal["table"]
+    file: str
+    time: Column
+    value: Column
+    degree: Literal[3, 5] = 3
+    ends: Ends = "not-a-knot"
+    points: tuple[tuple[float, float], ...]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read(cls, data: Any) -> Any:
+        """Read the file unless its numbers are there; afterwards only its name is kept."""
+        if not isinstance(data, dict) or "points" in data or not isinstance(data.get("file"), str):
+            return data
+        if not isinstance(data.get("time"), dict) or not isinstance(data.get("value"), dict):
+            return data
+        path = Path(data["file"])
+        return {**data, "file": path.name, "points": read_points(path, data["time"], data["value"])}
+
+    @model_validator(mode="after")
+    def _drawable(self) -> Table:
+        _check_points([t for t, _ in self.points], self.degree, self.ends)
+        if self.ends == "periodic" and self.points[0][1] != self.points[-1][1]:
+            raise ValueError("a periodic table ends with the value that it starts with")
+        return self
+
+
+class Sum(Part):
+    """Sum of laws."""
+
+    type: Literal["sum"]
+    laws: Annotated[tuple[Law, ...], Field(min_length=1)]
+
+
+class Section(Part):
+    """From this time on the law holds, until the next section starts."""
+
+    start: Time
+    law: Law
+
+
+class Piecewise(Part):
+    """Laws one after the other; the first also holds before it starts."""
+
+    type: Literal["piecewise"]
+    sections: Annotated[tuple[Section, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Piecewise:
+        starts = [s.start for s in self.sections]
+        if any(not a < b for a, b in zip(starts[:-1], starts[1:], strict=True)):
+            raise ValueError(f"the sections start one after the other, not at {starts}")
+        return self
+
+
+Law = Annotated[
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise, Field(discriminator="type")
+]
+Sum.model_rebuild()
+Section.model_rebuild()
+Piecewise.model_rebuild()
+
+
+def law_types(node: object) -> Iterator[str]:
+    """Types of all laws anywhere in a part, those inside sums and sections included."""
+    if isinstance(node, (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise)):
+        yield node.type
+    if isinstance(node, Part):
+        for name in type(node).model_fields:
+            yield from law_types(getattr(node, name))
+    elif isinstance(node, (tuple, list)):
+        for item in node:
+            yield from law_types(item)
+
+
+def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list[tuple[float, float]]:
+    """Rows of two columns of a CSV file, time in seconds; ValueError, in words, when it cannot be read."""
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = [row for row in csv.reader(file) if row and not row[0].lstrip().startswith("#")]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ValueError(f"the table {path.name} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    header = [] if not rows or _is_number(rows[0][0]) else [cell.strip() for cell in rows[0]]
+    columns = [_column(path, header, rows, part.get("column")) for part in (time, value)]
+    unit = time.get("unit", "s")
+    points = []
+    for number, row in enumerate(rows[1:] if header else rows, start=2 if header else 1):
+        cells = [row[c].strip() if c < len(row) else "" for c in columns]
+        if not all(_is_number(cell) for cell in cells):
+            raise ValueError(f"row {number} of {path.name} holds {cells}, not two numbers")
+        points.append((quantity(f"{float(cells[0])!r} {unit}", "time"), quantity(float(cells[1]), "number")))
+    return points
+
+
+def _column(path: Path, header: list[str], rows: list[list[str]], wanted: object) -> int:
+    if isinstance(wanted, int) and not isinstance(wanted, bool):
+        if rows and wanted > len(rows[0]):
+            raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {wanted}")
+        return wanted - 1
+    if wanted not in header:
+        known = ", ".join(header) or "it has no header; give the column's number"
+        raise ValueError(f"{path.name} has no column '{wanted}'; known: {known}")
+    return header.index(str(wanted))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+def _check_points(time: tuple[float, ...] | list[float], degree: int, ends: str) -> None:
+    fewest = 2 if degree == 3 and ends != "periodic" else 3 if degree == 3 else 6
+    if len(time) < fewest:
+        raise ValueError(f"a spline of degree {degree} with {ends} ends takes at least {fewest} points, not {len(time)}")
+    for k, (a, b) in enumerate(zip(time[:-1], time[1:], strict=True), start=2):
+        if not a < b:
+            raise ValueError(f"times increase from point to point, but point {k} at {b} s follows one at {a} s")

@@ -1,0 +1,116 @@
+"""Loads: gravity, forces and torques on frames, springs and dampers, and what acts along joint coordinates."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness
+from pipeline.core.scene.laws import Law, Value
+
+
+def _law(component: Any) -> Any:
+    """A bare value is a constant."""
+    return component if isinstance(component, (dict, Part)) else {"type": "constant", "value": component}
+
+
+Component = Annotated[Law, BeforeValidator(_law)]
+Components = tuple[Component, Component, Component]
+
+
+class Gravity(Part):
+    """Uniform acceleration field, world axes."""
+
+    type: Literal["gravity"]
+    acceleration: Acceleration
+
+
+class PointForce(Part):
+    """Force [N] at the origin of a frame; each component a value or a law of time.
+
+    axes: those of the world, or those of the frame, with which the force then turns.
+    """
+
+    type: Literal["point-force"]
+    frame: FrameName
+    force: Components
+    axes: Literal["world", "frame"] = "world"
+
+
+class PointTorque(Part):
+    """Torque [N m] on the body of a frame; as `PointForce`."""
+
+    type: Literal["point-torque"]
+    frame: FrameName
+    torque: Components
+    axes: Literal["world", "frame"] = "world"
+
+
+class SpringDamper(Part):
+    """Acts between the origins of two frames, along the line between them.
+
+    Tension: stiffness (length - free_length) + damping (rate of the length).
+    """
+
+    type: Literal["spring-damper"]
+    between: tuple[FrameName, FrameName]
+    stiffness: Annotated[Stiffness, Field(ge=0.0)] = 0.0
+    damping: Annotated[Damping, Field(ge=0.0)] = 0.0
+    free_length: Annotated[Length, Field(ge=0.0)] | None = None
+
+    @model_validator(mode="after")
+    def _acts(self) -> SpringDamper:
+        if self.stiffness == 0.0 and self.damping == 0.0:
+            raise ValueError("a spring-damper has a stiffness, a damping, or both")
+        if self.stiffness > 0.0 and self.free_length is None:
+            raise ValueError("a spring has a free_length, at which it pulls and pushes nothing")
+        return self
+
+
+class JointForce(Part):
+    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body: a motor of given strength."""
+
+    type: Literal["joint-force"]
+    joint: str
+    coordinate: str | None = None
+    force: Component
+
+
+class JointSpring(Part):
+    """Spring and damper along a joint coordinate: -stiffness (coordinate - rest) - damping (its rate).
+
+    Turns are counted: an angle may grow beyond 180 deg.
+    """
+
+    type: Literal["joint-spring"]
+    joint: str
+    coordinate: str | None = None
+    stiffness: Value = 0.0
+    damping: Value = 0.0
+    rest: Value = 0.0
+
+
+class Coulomb(Part):
+    """Friction force [N] or torque [N m] over the speed: rises to `static` at v_static, falls to `dynamic`."""
+
+    static: Value
+    dynamic: Value
+    v_static: Value
+    v_dynamic: Value
+
+
+class JointFriction(Part):
+    """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength."""
+
+    type: Literal["joint-friction"]
+    joint: str
+    coordinate: str | None = None
+    viscous: Value = 0.0
+    coulomb: Coulomb | None = None
+
+
+Load = Annotated[
+    Gravity | PointForce | PointTorque | SpringDamper | JointForce | JointSpring | JointFriction,
+    Field(discriminator="type"),
+]

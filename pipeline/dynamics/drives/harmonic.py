@@ -1,0 +1,15 @@
+"""Offset and sines."""
+
+from __future__ import annotations
+
+from pipeline.core.scene.laws import Harmonic
+from pipeline.core.units import quantity
+from pipeline.dynamics.drives.pieces import Piece, Pieces
+
+
+def pieces(law: Harmonic, dimension: str) -> Pieces:
+    """One piece."""
+    phases = law.phase or (0.0,) * len(law.amplitude)
+    amplitudes = (quantity(a, dimension) for a in law.amplitude)
+    terms = tuple(zip(amplitudes, law.frequency, phases, strict=True))
+    return Pieces((Piece(0.0, (quantity(law.offset, dimension),), terms),))

@@ -1,0 +1,118 @@
+r"""What every law of time becomes: pieces, each a polynomial plus harmonics in the time since its start.
+
+.. math:: x(t) = \sum_k c_k s^k + \sum_j A_j \sin(\omega_j s + \varphi_j), \quad s = t - t_{start}
+
+so that value, rate and second rate are exact, and every place where a derivative may jump is the
+start of a piece, where integration stops and starts anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import comb, inf
+
+import numpy as np
+
+from pipeline.core.registry import lookup
+from pipeline.core.scene.laws import COEFFICIENTS
+
+PACKAGE = "pipeline.dynamics.drives"
+Terms = tuple[tuple[float, float, float], ...]  #: amplitude, angular frequency [rad/s], phase at the start [rad]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """From `start` [s] on. coefficients: of rising order, at most 8."""
+
+    start: float
+    coefficients: tuple[float, ...]
+    terms: Terms = ()
+
+    def moved(self, start: float) -> Piece:
+        """The same function, written from another time on."""
+        d, c = start - self.start, self.coefficients
+        shifted = tuple(sum(comb(n, k) * c[n] * d ** (n - k) for n in range(k, len(c))) for k in range(len(c)))
+        return Piece(start, shifted, tuple((a, w, phase + w * d) for a, w, phase in self.terms))
+
+    def value(self, t: float, order: int = 0) -> float:
+        """A derivative at time t."""
+        s = t - self.start
+        smooth = float(np.polynomial.Polynomial(self.coefficients).deriv(order)(s))
+        return smooth + sum(a * w**order * np.sin(w * s + phase + 0.5 * np.pi * order) for a, w, phase in self.terms)
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Pieces in order; the first also holds before it starts. span: where the law is known at all [s]."""
+
+    pieces: tuple[Piece, ...]
+    span: tuple[float, float] = (-inf, inf)
+
+    @property
+    def starts(self) -> np.ndarray:
+        """Start of each piece [s], shape (n,); all but the first are breaks."""
+        return np.array([p.start for p in self.pieces])
+
+    @property
+    def harmonic(self) -> bool:
+        """Whether a piece has more than a polynomial."""
+        return any(p.terms for p in self.pieces)
+
+    def at(self, t: float, side: str = "right") -> Piece:
+        """The piece that holds just right (or left) of t."""
+        return self.pieces[max(int(np.searchsorted(self.starts, t, side=side)) - 1, 0)]  # type: ignore[call-overload]
+
+    def value(self, t: float, order: int = 0, side: str = "right") -> float:
+        """A derivative at t, from its right or its left."""
+        return self.at(t, side).value(t, order)
+
+    def times(self, factor: float) -> Pieces:
+        """The law multiplied by a factor."""
+        scaled = (
+            Piece(
+                p.start,
+                tuple(factor * c for c in p.coefficients),
+                tuple((factor * a, w, phase) for a, w, phase in p.terms),
+            )
+            for p in self.pieces
+        )
+        return Pieces(tuple(scaled), self.span)
+
+    def table(self) -> tuple[np.ndarray, list[Terms]]:
+        """Rows (start, eight coefficients), shape (n, 9), and the harmonics of each piece."""
+        rows = np.zeros((len(self.pieces), 1 + COEFFICIENTS))
+        for row, p in zip(rows, self.pieces, strict=True):
+            row[0], row[1 : 1 + len(p.coefficients)] = p.start, p.coefficients
+        return rows, [p.terms for p in self.pieces]
+
+
+def pieces_of(law: object, dimension: str) -> Pieces:
+    """The pieces of any law; ValueError, in words, for values of another dimension."""
+    made: Pieces = lookup(PACKAGE, law.type, where="law")(law, dimension)  # type: ignore[attr-defined]
+    return made
+
+
+def polynomials(starts: Iterable[float], coefficients: Iterable[Sequence[float]]) -> tuple[Piece, ...]:
+    """Pieces without harmonics."""
+    return tuple(
+        Piece(float(t), tuple(float(c) for c in row)) for t, row in zip(starts, coefficients, strict=True)
+    )
+
+
+def covers(law: Pieces, start: float, end: float) -> bool:
+    """Whether the law is known from start to end, but for rounding of the times."""
+    slack = 1e-9 * (end - start)
+    return law.span[0] <= start + slack and end - slack <= law.span[1]
+
+
+def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
+    """Time of the first break between start and end where value or rate jumps, and which of them does."""
+    inside = [float(t) for t in law.starts[1:] if start < t < end]
+    grid = np.linspace(start, end, 65)
+    for order, word in ((0, "value"), (1, "rate")):
+        size = max(abs(law.value(float(t), order)) for t in (*grid, *inside))
+        for t in inside:
+            if abs(law.value(t, order, "right") - law.value(t, order, "left")) > 1e-7 * size:
+                return t, word
+    return None

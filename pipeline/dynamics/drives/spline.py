@@ -1,0 +1,42 @@
+"""Interpolating splines of degree 3 and 5.
+
+Source: de Boor (1978), A Practical Guide to Splines, ch. IV and XIII (by SciPy).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
+
+from pipeline.core.scene.laws import Spline
+from pipeline.core.units import quantity
+from pipeline.dynamics.drives.pieces import Pieces, polynomials
+
+
+def pieces(law: Spline, dimension: str) -> Pieces:
+    """A piece between each two points."""
+    return through(law.time, [quantity(v, dimension) for v in law.value], law.degree, law.ends)
+
+
+def through(time: Sequence[float], value: Sequence[float], degree: int, ends: str) -> Pieces:
+    """The spline through the points; ValueError when they are not periodic though they should be."""
+    if ends == "periodic" and value[0] != value[-1]:
+        raise ValueError("a periodic spline ends with the value that it starts with")
+    t, x = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
+    if degree == 3:
+        drawn = CubicSpline(t, x, bc_type=ends)
+        starts, rows = t[:-1], drawn.c[::-1].T
+    else:
+        drawn = PPoly.from_spline(make_interp_spline(t, x, k=5, bc_type=_ends(ends)))
+        keep = np.diff(drawn.x) > 0.0  # the knots at both ends are repeated
+        starts, rows = drawn.x[:-1][keep], drawn.c[::-1].T[keep]
+    return Pieces(polynomials(starts, rows), (float(t[0]), float(t[-1])))
+
+
+def _ends(ends: str) -> object:
+    both = {"natural": [(3, 0.0), (4, 0.0)], "clamped": [(1, 0.0), (2, 0.0)]}
+    if ends in both:
+        return both[ends], both[ends]
+    return "periodic" if ends == "periodic" else None

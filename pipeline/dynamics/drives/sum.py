@@ -1,0 +1,22 @@
+"""Sum of laws."""
+
+from __future__ import annotations
+
+from itertools import zip_longest
+
+from pipeline.core.scene.laws import Sum
+from pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
+
+
+def pieces(law: Sum, dimension: str) -> Pieces:
+    """Pieces between all breaks of all laws."""
+    laws = [pieces_of(part, dimension) for part in law.laws]
+    starts = sorted({float(t) for one in laws for t in one.starts[1:]})
+    first = starts[0] - 1.0 if starts else 0.0
+    parts = tuple(_added([one.at(t).moved(t) for one in laws]) for t in [first, *starts])
+    return Pieces(parts, (max(one.span[0] for one in laws), min(one.span[1] for one in laws)))
+
+
+def _added(parts: list[Piece]) -> Piece:
+    columns = zip_longest(*(p.coefficients for p in parts), fillvalue=0.0)
+    return Piece(parts[0].start, tuple(sum(c) for c in columns), tuple(t for p in parts for t in p.terms))

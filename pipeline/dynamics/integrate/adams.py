@@ -1,0 +1,86 @@
+"""Predictor-corrector of Adams, Bashforth and Moulton, order 4, with fixed steps: what the paper integrates with.
+
+The paper says "a predictor-corrector method" with a step of 1e-5 s and neither its order nor its start (Wang & Wang
+2019, sec. 6.1, step 8). Assumed: the pair of order 4, predicted, evaluated, corrected once, evaluated (PECE), with
+three steps of the classical Runge-Kutta method of order 4 as its start. It starts again where integration does (drive
+breaks, located events); a step that is shortened to end on one of these is a Runge-Kutta step.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. III.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.dynamics.integrate import hermite, rk4, stages
+from pipeline.dynamics.integrate.method import Method
+from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
+from pipeline.dynamics.tables import CONTROL, EVALUATION, MEMORY, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
+from pipeline.dynamics.vectors import index, kernel
+
+ORDER, LAST = 4, rk4.STAGES
+# memory: number of slopes kept, their distance, then the slopes themselves, the latest first
+COUNT, DISTANCE, KEPT = range(3)
+MOST = 3
+#: steps whose lengths differ by less than this share are alike: rounding of times
+ALIKE = 1e-8
+
+
+def memory(nq: int, nv: int, ny: int) -> int:
+    """Floats kept between steps."""
+    return KEPT + MOST * ny
+
+
+@kernel
+def begin(h, f, w, n):
+    """Forget all earlier slopes."""
+    w[index(h[MEMORY] + COUNT)] = 0.0
+
+
+@kernel
+def alike(h, w, step):
+    """Whether a step is as long as those between the slopes that are kept."""
+    distance = w[index(h[MEMORY] + DISTANCE)]
+    return abs(step - distance) <= ALIKE * distance
+
+
+@kernel
+def keep(h, f, w, n, step):
+    """Remember the slope where an accepted step started."""
+    o, size = h[MEMORY], h[NY]
+    if w[index(o + COUNT)] == 0.0 or not alike(h, w, step):
+        w[index(o + COUNT)], w[index(o + DISTANCE)] = 0.0, step
+    for c in range(size):
+        w[index(o + KEPT + 2 * size + c)] = w[index(o + KEPT + size + c)]
+        w[index(o + KEPT + size + c)] = w[index(o + KEPT + c)]
+        w[index(o + KEPT + c)] = w[index(h[SLOPES] + c)]
+    w[index(o + COUNT)] = min(w[index(o + COUNT)] + 1.0, MOST)
+
+
+def compose(evaluate: Callable, displace: Callable) -> tuple:
+    """The method's kernels; it has no error estimate."""
+    _, start = stages.compose(evaluate, rk4.A, rk4.B, rk4.C)
+
+    @kernel
+    def attempt(h, f, w, n, step):
+        """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
+        o, size, slope = h[MEMORY], h[NY], h[SLOPES]
+        if w[index(o + COUNT)] < MOST or not alike(h, w, step):
+            return start(h, f, w, n, step)
+        one, two, three = o + KEPT, o + KEPT + size, o + KEPT + 2 * size
+        for c in range(size):
+            ahead = 55.0 * w[index(slope + c)] - 59.0 * w[index(one + c)]
+            ahead += 37.0 * w[index(two + c)] - 9.0 * w[index(three + c)]
+            w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + step / 24.0 * ahead
+        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_STAGE], slope + size)
+        n[EVALUATIONS] += 1
+        for c in range(size):
+            ahead = 9.0 * w[index(slope + size + c)] + 19.0 * w[index(slope + c)]
+            ahead += w[index(two + c)] - 5.0 * w[index(one + c)]
+            w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + step / 24.0 * ahead
+        return n[EVALUATION] == OK
+
+    return begin, attempt, None, hermite.make_extend(LAST), keep
+
+
+METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, memory=memory)

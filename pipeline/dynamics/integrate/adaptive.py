@@ -1,0 +1,104 @@
+"""Steps whose length the estimated error chooses.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.4;
+step control with memory: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pipeline.dynamics.integrate import straddle
+from pipeline.dynamics.integrate.state import (
+    END,
+    EVALUATIONS,
+    FRESH,
+    LAST_NORM,
+    MOST_GROWTH,
+    NO_START,
+    NOT_A_NUMBER,
+    SPAN,
+    STATUS,
+    STEP,
+    TIME,
+)
+from pipeline.dynamics.integrate.stepper import finite, scaled_norm, set_magnitudes
+from pipeline.dynamics.integrate.straddle import steer
+from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
+from pipeline.dynamics.vectors import index, kernel
+
+# the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
+# the memory keeps steps quiet where stability, not accuracy, limits them
+SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
+LEAST_NORM = 1e-4
+
+
+def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
+    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
+    order = method.error_order + 1
+    exponent = -1.0 / order
+    remembering = exponent + 0.2 * MEMORY
+    steady, gap = method.steady, method.gap
+
+    @kernel
+    def first_step(h, f, w, n):
+        """Slope at the start of a segment, and a first step; False when the equations have no solution here."""
+        c, y, slope = h[CONTROL], h[Y], h[SLOPES]
+        other = slope + h[NY]
+        evaluate(h, f, w, n, w[index(c + TIME)], y, slope)
+        n[EVALUATIONS] += 2
+        if n[EVALUATION] != OK or not finite(h, w, slope):
+            n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == OK else NO_START
+            return False
+        start_watch(h, w)
+        set_magnitudes(h, f, w, y)
+        size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
+        step = 1e-6 * w[index(c + SPAN)]
+        if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
+            step = min(0.01 * size / steepness, 0.01 * w[index(c + SPAN)])
+        step = min(step, w[index(c + END)] - w[index(c + TIME)])
+        for k in range(h[NY]):
+            w[index(h[Y_STAGE] + k)] = w[index(y + k)] + step * w[index(slope + k)]
+        evaluate(h, f, w, n, w[index(c + TIME)] + step, h[Y_STAGE], other)
+        if n[EVALUATION] == OK:
+            for k in range(h[NY]):
+                w[index(other + k)] -= w[index(slope + k)]
+            steepness = max(steepness, scaled_norm(h, w, other) / step)
+            if steepness > 0.0:
+                step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
+        w[index(c + STEP)] = step
+        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = LEAST_NORM, GROW
+        n[FRESH] = 0
+        begin(h, f, w, n)
+        return True
+
+    @kernel
+    def judge(h, f, w, n, step):
+        """Error norm of the step to Y_NEW, 1 at the tolerance."""
+        set_magnitudes(h, f, w, h[Y_NEW])
+        return error(h, f, w, n, step)
+
+    @kernel
+    def after_rejection(h, w, n, step, norm):
+        """Try again with a shorter step."""
+        w[index(h[CONTROL] + STEP)] = step * max(SHRINK, SAFETY * norm**exponent)
+        w[index(h[CONTROL] + MOST_GROWTH)] = 1.0
+        return True
+
+    @kernel
+    def next_step(h, w, step, norm):
+        """Length of the step after the one that has just been accepted."""
+        c = h[CONTROL]
+        norm = max(norm, LEAST_NORM)
+        growth = SAFETY * norm**remembering * w[index(c + LAST_NORM)] ** MEMORY
+        growth = min(w[index(c + MOST_GROWTH)], max(SHRINK, growth))
+        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = norm, GROW
+        return step if 1.0 <= growth < steady else step * growth
+
+    @kernel
+    def lay(h, w, t):
+        """Length of the step to try from t: as planned, unless a singular pose is ahead."""
+        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap)
+
+    return first_step, judge, after_rejection, next_step, lay, straddle.compose(evaluate)

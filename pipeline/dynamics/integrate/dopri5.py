@@ -1,0 +1,102 @@
+"""Explicit Runge-Kutta method of order 5 by Dormand and Prince, dense output of order 4; for loose tolerances.
+
+Source: Dormand & Prince (1980), *J. Comput. Appl. Math.* 6, 19-26; dense output: Hairer, Norsett & Wanner,
+*Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.5 and II.6 (Shampine's formula in dopri5.f).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.dynamics.integrate import stages
+from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
+from pipeline.dynamics.integrate.stages import slope
+from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
+from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y_NEW, Y
+from pipeline.dynamics.vectors import index, kernel
+
+STAGES, ERROR_ORDER = 6, 4
+A = np.zeros((STAGES, STAGES))
+A[1, :1] = [1 / 5]
+A[2, :2] = [3 / 40, 9 / 40]
+A[3, :3] = [44 / 45, -56 / 15, 32 / 9]
+A[4, :4] = [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729]
+A[5, :5] = [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656]
+B = np.array([35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84])
+C = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
+#: weights of the slopes, that at the end included, in the error estimate and in the dense output
+E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+D = np.array(
+    [
+        -12715105075 / 11282082432,
+        0.0,
+        87487479700 / 32700410799,
+        -10690763975 / 1880347072,
+        701980252875 / 199316789632,
+        -1453857185 / 822651844,
+        69997945 / 29380423,
+    ]
+)
+
+
+@kernel
+def weighted(h, w, weights, c):
+    """Weighted sum of the slopes of state variable c."""
+    total = 0.0
+    for j in range(STAGES + 1):
+        total += weights[j] * w[index(h[SLOPES] + h[NY] * j + c)]
+    return total
+
+
+@kernel
+def error(h, f, w, n, step):
+    """Norm of the local error, 1 at the tolerance; MAGNITUDE holds each group's scale."""
+    total = 0.0
+    for c in range(h[NY]):
+        total += (step * weighted(h, w, E, c) / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+    return np.sqrt(total / h[NY])
+
+
+@kernel
+def extend(h, f, w, n, step):
+    """Prepare the dense output of the step to Y_NEW."""
+    size, F = h[NY], h[DENSE]
+    for c in range(size):
+        delta = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
+        bend = step * w[index(h[SLOPES] + c)] - delta
+        w[index(F + c)] = w[index(h[Y] + c)]
+        w[index(F + size + c)] = delta
+        w[index(F + 2 * size + c)] = bend
+        w[index(F + 3 * size + c)] = delta - step * w[index(slope(h, STAGES) + c)] - bend
+        w[index(F + 4 * size + c)] = step * weighted(h, w, D, c)
+
+
+@kernel
+def interpolate(h, w, theta, out):
+    """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
+    size, F, s = h[NY], h[DENSE], 1.0 - theta
+    for c in range(size):
+        v = w[index(F + 3 * size + c)] + s * w[index(F + 4 * size + c)]
+        v = w[index(F + size + c)] + s * (w[index(F + 2 * size + c)] + theta * v)
+        w[index(out + c)] = w[index(F + c)] + theta * v
+
+
+def compose(evaluate: Callable, displace: Callable) -> tuple:
+    """The method's kernels."""
+    _, advance = stages.compose(evaluate, A, B, C)
+
+    @kernel
+    def attempt(h, f, w, n, step):
+        """A step with the slope at its end, which the error estimate needs."""
+        if not advance(h, f, w, n, step):
+            return False
+        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope(h, STAGES))
+        n[EVALUATIONS] += 1
+        return n[EVALUATION] == OK
+
+    return begin_afresh, attempt, error, extend, keep_nothing
+
+
+METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True)

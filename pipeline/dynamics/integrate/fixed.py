@@ -1,0 +1,71 @@
+"""Steps of the length that the scene gives, shortened only to end on events, drive breaks and the run's end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pipeline.dynamics.integrate.state import (
+    EVALUATIONS,
+    FIXED,
+    FRESH,
+    LOST_CLOSURE,
+    NO_CONVERGENCE,
+    NO_START,
+    NOT_A_NUMBER,
+    STATUS,
+    STEP,
+    TIME,
+)
+from pipeline.dynamics.integrate.stepper import finite
+from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y
+from pipeline.dynamics.vectors import index, kernel
+
+
+def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
+    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
+
+    @kernel
+    def first_step(h, f, w, n):
+        """Slope at the start of a segment; False when the equations have no solution here."""
+        c, slope = h[CONTROL], h[SLOPES]
+        evaluate(h, f, w, n, w[index(c + TIME)], h[Y], slope)
+        n[EVALUATIONS] += 1
+        if n[EVALUATION] != OK or not finite(h, w, slope):
+            n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == OK else NO_START
+            return False
+        start_watch(h, w)
+        w[index(c + STEP)] = w[index(c + FIXED)]
+        n[FRESH] = 0
+        begin(h, f, w, n)
+        return True
+
+    @kernel
+    def judge(h, f, w, n, step):
+        """Every step that could be made is good."""
+        return 0.0
+
+    @kernel
+    def after_rejection(h, w, n, step, norm):
+        """There is no shorter step to try."""
+        if n[EVALUATION] == OK:
+            n[STATUS] = NO_CONVERGENCE
+        else:
+            n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == NOT_FINITE else LOST_CLOSURE
+        return False
+
+    @kernel
+    def next_step(h, w, step, norm):
+        """All steps are alike."""
+        return w[index(h[CONTROL] + FIXED)]
+
+    @kernel
+    def lay(h, w, t):
+        """Singular poses are stepped over as they come."""
+        return w[index(h[CONTROL] + STEP)]
+
+    @kernel
+    def foresee(h, f, w, n, t):
+        """No step could be changed for it."""
+
+    return first_step, judge, after_rejection, next_step, lay, foresee

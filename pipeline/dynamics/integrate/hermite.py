@@ -1,0 +1,40 @@
+"""Cubic dense output from the states and slopes at both ends of a step: error of fourth order in the step.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.dynamics.tables import DENSE, NY, SLOPES, Y_NEW, Y
+from pipeline.dynamics.vectors import index, kernel
+
+ROWS = 4
+
+
+def make_extend(last: int) -> Callable:
+    """The kernel extend(h, f, w, n, step) of a method whose slope at the end is in row `last`."""
+
+    @kernel
+    def extend(h, f, w, n, step):
+        size, F, first = h[NY], h[DENSE], h[SLOPES]
+        final = first + size * last
+        for c in range(size):
+            y, delta = w[index(h[Y] + c)], w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
+            start, end = step * w[index(first + c)], step * w[index(final + c)]
+            w[index(F + c)] = y
+            w[index(F + size + c)] = start
+            w[index(F + 2 * size + c)] = 3.0 * delta - 2.0 * start - end
+            w[index(F + 3 * size + c)] = start + end - 2.0 * delta
+
+    return extend
+
+
+@kernel
+def interpolate(h, w, theta, out):
+    """State at the share `theta` of the step, stored in w from `out` (after `extend`); any cubic in DENSE."""
+    size, F = h[NY], h[DENSE]
+    for c in range(size):
+        v = w[index(F + 3 * size + c)] * theta + w[index(F + 2 * size + c)]
+        w[index(out + c)] = (v * theta + w[index(F + size + c)]) * theta + w[index(F + c)]

@@ -1,0 +1,288 @@
+r"""Radau IIA of order 5: implicit, L-stable, for stiff friction, stiff contacts and stiff modes.
+
+The three stages are found by a simplified Newton iteration whose linear systems are parted into a real and a complex
+one; the Jacobian, of the positions and speeds, is made by finite differences and kept while iterations converge fast.
+Ledger variables influence nothing, so that they stay out of the systems. The error estimate is filtered by the real
+system; dense output is the collocation polynomial.
+
+Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.5 (table 5.6) and IV.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.dynamics.integrate import hermite
+from pipeline.dynamics.integrate.method import Method
+from pipeline.dynamics.integrate.newton import converged
+from pipeline.dynamics.integrate.radau_systems import (
+    CORRECTION,
+    LU_STEP,
+    MU_IMAG,
+    MU_REAL,
+    MU_REST,
+    OLD_STEP,
+    TRANSFORMED,
+    VALID,
+    Z,
+    dynamic,
+    factorise,
+    jacobian_entry,
+    memory,
+    old,
+    solve_pair,
+    solve_real,
+    stage_vector,
+)
+from pipeline.dynamics.integrate.state import EVALUATIONS, JACOBIANS, RTOL, TIME
+from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
+from pipeline.dynamics.tables import (
+    CONTROL,
+    DENSE,
+    EVALUATION,
+    FLOORS,
+    GROUPS,
+    MAGNITUDE,
+    MEMORY,
+    NY,
+    OK,
+    SLOPES,
+    Y_NEW,
+    Y_STAGE,
+    Y,
+)
+from pipeline.dynamics.vectors import index, kernel
+
+# rows of SLOPES: start of the step, three stages, its end, error estimate, events
+LAST, ESTIMATE, ROWS, ERROR_ORDER = 4, 5, 7, 3
+S6 = np.sqrt(6.0)
+C = np.array([(4.0 - S6) / 10.0, (4.0 + S6) / 10.0, 1.0])
+E = np.array([-13.0 - 7.0 * S6, -13.0 + 7.0 * S6, -1.0]) / 3.0
+T = np.array(
+    [
+        [0.09443876248897524, -0.14125529502095421, 0.03002919410514742],
+        [0.25021312296533332, 0.20412935229379994, -0.38294211275726192],
+        [1.0, 1.0, 0.0],
+    ]
+)
+T_INVERSE = np.array(
+    [
+        [4.17871859155190428, 0.32768282076106237, 0.52337644549944951],
+        [-4.17871859155190428, -0.32768282076106237, 0.47662355450055044],
+        [0.50287263494578682, -2.57192694985560522, 0.59603920482822492],
+    ]
+)
+#: coefficients of theta, theta^2, theta^3 in the collocation polynomial, per stage
+P = np.array(
+    [
+        [13.0 / 3.0 + 7.0 * S6 / 3.0, -23.0 / 3.0 - 22.0 * S6 / 3.0, 10.0 / 3.0 + 5.0 * S6],
+        [13.0 / 3.0 - 7.0 * S6 / 3.0, -23.0 / 3.0 + 22.0 * S6 / 3.0, 10.0 / 3.0 - 5.0 * S6],
+        [1.0 / 3.0, -8.0 / 3.0, 10.0 / 3.0],
+    ]
+)
+MOST_ITERATIONS = 7
+#: corrections that fall slower than this ask for a new Jacobian at the next step
+SLOW = 0.05
+#: perturbation of a Jacobian's column, relative to the variable's size: root of the rounding error
+NUDGE = 1e-8
+
+
+@kernel
+def polynomial(h, w, c, k):
+    """Coefficient of theta^(k + 1) for state variable c."""
+    return (
+        P[0, k] * w[index(stage_vector(h, Z, 0) + c)]
+        + P[1, k] * w[index(stage_vector(h, Z, 1) + c)]
+        + P[2, k] * w[index(stage_vector(h, Z, 2) + c)]
+    )
+
+
+@kernel
+def begin(h, f, w, n):
+    """Nothing is known."""
+    w[index(h[MEMORY] + VALID)] = w[index(h[MEMORY] + OLD_STEP)] = 0.0
+
+
+@kernel
+def keep(h, f, w, n, step):
+    """The polynomial of an accepted step predicts the next one's stages."""
+    for c in range(h[NY]):
+        w[index(old(h) + c)] = w[index(h[Y] + c)]
+        for k in range(3):
+            w[index(old(h) + h[NY] * (k + 1) + c)] = polynomial(h, w, c, k)
+    w[index(h[MEMORY] + OLD_STEP)] = step
+
+
+@kernel
+def extend(h, f, w, n, step):
+    """Prepare the dense output: the collocation polynomial, a cubic."""
+    for c in range(h[NY]):
+        w[index(h[DENSE] + c)] = w[index(h[Y] + c)]
+        for k in range(3):
+            w[index(h[DENSE] + h[NY] * (k + 1) + c)] = polynomial(h, w, c, k)
+
+
+@kernel
+def mix(h, w, matrix, source, target):
+    """Three vectors as combinations of three others."""
+    for c in range(h[NY]):
+        a = w[index(stage_vector(h, source, 0) + c)]
+        b = w[index(stage_vector(h, source, 1) + c)]
+        d = w[index(stage_vector(h, source, 2) + c)]
+        for i in range(3):
+            w[index(stage_vector(h, target, i) + c)] = matrix[i, 0] * a + matrix[i, 1] * b + matrix[i, 2] * d
+
+
+@kernel
+def predict(h, w, step):
+    """Stages from the polynomial of the step before, or none."""
+    length, o, size = w[index(h[MEMORY] + OLD_STEP)], old(h), h[NY]
+    for i in range(3):
+        x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
+        for c in range(size):
+            rise = (w[index(o + 3 * size + c)] * x + w[index(o + 2 * size + c)]) * x + w[index(o + size + c)]
+            ahead = w[index(o + c)] + rise * x - w[index(h[Y] + c)]
+            w[index(stage_vector(h, Z, i) + c)] = ahead if length > 0.0 else 0.0
+    mix(h, w, T_INVERSE, Z, TRANSFORMED)
+
+
+@kernel
+def residuals(h, w, step):
+    """Right-hand sides of Newton's two systems."""
+    size, first = h[NY], h[SLOPES] + h[NY]
+    for c in range(size):
+        a, b, d = w[index(first + c)], w[index(first + size + c)], w[index(first + 2 * size + c)]
+        one = w[index(stage_vector(h, TRANSFORMED, 0) + c)] / step
+        two = w[index(stage_vector(h, TRANSFORMED, 1) + c)] / step
+        three = w[index(stage_vector(h, TRANSFORMED, 2) + c)] / step
+        for i in range(3):
+            total = T_INVERSE[i, 0] * a + T_INVERSE[i, 1] * b + T_INVERSE[i, 2] * d
+            if i == 0:
+                total -= MU_REAL * one
+            elif i == 1:
+                total -= MU_REST * two - MU_IMAG * three
+            else:
+                total -= MU_REST * three + MU_IMAG * two
+            w[index(stage_vector(h, CORRECTION, i) + c)] = total
+
+
+@kernel
+def correct(h, w):
+    """Add the corrections; their norm in units of the tolerance."""
+    total = 0.0
+    for c in range(h[NY]):
+        scale = w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]
+        for i in range(3):
+            change = w[index(stage_vector(h, CORRECTION, i) + c)]
+            w[index(stage_vector(h, TRANSFORMED, i) + c)] += change
+            total += (change / scale) ** 2
+    mix(h, w, T, TRANSFORMED, Z)
+    return np.sqrt(total / (3.0 * h[NY]))
+
+
+def compose(evaluate: Callable, displace: Callable) -> tuple:
+    """The method's kernels."""
+
+    @kernel
+    def jacobian(h, f, w, n):
+        """Change of all rates with positions and speeds, at the start of the step."""
+        size, near = h[NY], h[SLOPES] + h[NY]
+        for c in range(size):
+            w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)]
+        for k in range(dynamic(h)):
+            y = w[index(h[Y] + k)]
+            w[index(h[Y_STAGE] + k)] = y + NUDGE * (f[index(h[FLOORS] + h[index(h[GROUPS] + k)])] + abs(y))
+            nudge = w[index(h[Y_STAGE] + k)] - y
+            evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)], h[Y_STAGE], near)
+            n[EVALUATIONS] += 1
+            if n[EVALUATION] != OK:
+                return False
+            for i in range(size):
+                difference = w[index(near + i)] - w[index(h[SLOPES] + i)]
+                w[index(jacobian_entry(h, i, k))] = difference / nudge
+            w[index(h[Y_STAGE] + k)] = y
+        n[JACOBIANS] += 1
+        w[index(h[MEMORY] + VALID)], w[index(h[MEMORY] + LU_STEP)] = 1.0, 0.0
+        return True
+
+    @kernel
+    def iterate(h, f, w, n, step):
+        """Newton's iterations: speed at which the corrections fell, or -1 when they did not."""
+        size, last_norm, rate = h[NY], 0.0, 0.0
+        for k in range(MOST_ITERATIONS):
+            for i in range(3):
+                for c in range(size):
+                    w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + w[index(stage_vector(h, Z, i) + c)]
+                t = w[index(h[CONTROL] + TIME)] + C[i] * step
+                evaluate(h, f, w, n, t, h[Y_STAGE], h[SLOPES] + size * (i + 1))
+                n[EVALUATIONS] += 1
+                if n[EVALUATION] != OK:
+                    return -1.0
+            residuals(h, w, step)
+            solve_real(h, w, step, stage_vector(h, CORRECTION, 0))
+            solve_pair(h, w, step, stage_vector(h, CORRECTION, 1), stage_vector(h, CORRECTION, 2))
+            norm = correct(h, w)
+            rate = norm / last_norm if k > 0 else 0.0
+            verdict = converged(k, norm, last_norm, w[index(h[CONTROL] + RTOL)])
+            if verdict != 0:
+                return rate if verdict > 0 else -1.0
+            last_norm = norm
+        return -1.0
+
+    @kernel
+    def attempt(h, f, w, n, step):
+        """State Y_NEW after a step from Y; False when Newton's iteration fails with a fresh Jacobian too."""
+        o = h[MEMORY]
+        set_magnitudes(h, f, w, h[Y])
+        for _ in range(2):
+            fresh = w[index(o + VALID)] == 0.0
+            if fresh and not jacobian(h, f, w, n):
+                return False
+            if w[index(o + LU_STEP)] != step and not factorise(h, w, step):
+                return False
+            predict(h, w, step)
+            rate = iterate(h, f, w, n, step)
+            if rate >= 0.0:
+                w[index(o + VALID)] = 1.0 if rate <= SLOW else 0.0
+                for c in range(h[NY]):
+                    w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + w[index(stage_vector(h, Z, 2) + c)]
+                return True
+            w[index(o + VALID)] = 0.0
+            if fresh:
+                return False
+        return False
+
+    @kernel
+    def estimate(h, w, step, slope):
+        """The filtered error from a slope at (or near) the start of the step; its norm."""
+        out, total = h[SLOPES] + h[NY] * ESTIMATE, 0.0
+        for c in range(h[NY]):
+            bent = 0.0
+            for i in range(3):
+                bent += E[i] * w[index(stage_vector(h, Z, i) + c)]
+            w[index(out + c)] = w[index(slope + c)] + bent / step
+        solve_real(h, w, step, out)
+        for c in range(h[NY]):
+            total += (w[index(out + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+        return np.sqrt(total / h[NY])
+
+    @kernel
+    def error(h, f, w, n, step):
+        """Norm of the local error, 1 at the tolerance; what is too large is filtered twice."""
+        norm, out, near = estimate(h, w, step, h[SLOPES]), h[SLOPES] + h[NY] * ESTIMATE, h[SLOPES] + h[NY]
+        if norm > 1.0:
+            for c in range(h[NY]):
+                w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + w[index(out + c)]
+            evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)], h[Y_STAGE], near)
+            n[EVALUATIONS] += 1
+            if n[EVALUATION] == OK and finite(h, w, near):
+                norm = estimate(h, w, step, near)
+            n[EVALUATION] = OK
+        return norm
+
+    return begin, attempt, error, extend, keep
+
+
+METHOD = Method(ROWS, LAST, hermite.ROWS, ERROR_ORDER, compose, hermite.interpolate, steady=1.2, memory=memory)

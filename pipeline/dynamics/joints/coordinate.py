@@ -1,0 +1,47 @@
+"""The single motions that a joint leaves free, as drives, loads and records name them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """One freedom of a joint between the frames F and G.
+
+    axis: 0, 1, 2 for x, y, z of F (side 0) or of G (side 1), along or about which it moves.
+    sine, cosine: entries of R_FG that are the sine and cosine of an angle.
+    """
+
+    name: str
+    turning: bool
+    axis: int = 2
+    side: int = 0
+    sine: tuple[int, int] = (1, 0)
+    cosine: tuple[int, int] = (0, 0)
+
+    @property
+    def dimension(self) -> str:
+        """Of its values, as scenes write them."""
+        return "angle" if self.turning else "length"
+
+    @property
+    def force(self) -> str:
+        """Dimension of what acts along it."""
+        return "torque" if self.turning else "force"
+
+    @property
+    def part(self) -> str:
+        """Joint type with this freedom alone, about or along its z axis."""
+        return "revolute" if self.turning else "prismatic"
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Axes of a frame whose z is this freedom's axis, as columns in F, shape (3, 3)."""
+        return np.roll(np.eye(3), self.axis + 1, axis=0)
+
+
+ROTATION = Coordinate("rotation", True)
+TRANSLATION = Coordinate("translation", False)

@@ -1,0 +1,45 @@
+"""Turning about and sliding along z of the first frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.joints.coordinate import ROTATION, TRANSLATION
+from pipeline.dynamics.tables import (
+    J_ACCELERATION,
+    J_ALPHA,
+    J_COLUMNS,
+    J_OMEGA,
+    J_POSITION,
+    J_VELOCITY,
+)
+from pipeline.dynamics.vectors import kernel
+
+
+@kernel
+def motion(w, x, u, du, joint, rate):
+    """Motion of frame G in frame F: x radians about z, then metres along z (see `spherical.motion`)."""
+    for k in range(J_COLUMNS + 12):
+        w[joint + k] = 0.0
+    cosine, sine = np.cos(w[x]), np.sin(w[x])
+    w[joint], w[joint + 1], w[joint + 3], w[joint + 4], w[joint + 8] = cosine, -sine, sine, cosine, 1.0
+    w[joint + J_POSITION + 2] = w[x + 1]
+    w[joint + J_OMEGA + 2], w[joint + J_VELOCITY + 2] = w[u], w[u + 1]
+    w[joint + J_ALPHA + 2], w[joint + J_ACCELERATION + 2] = w[du], w[du + 1]
+    w[joint + J_COLUMNS + 2] = w[joint + J_COLUMNS + 6 + 5] = 1.0
+    w[rate], w[rate + 1] = w[u], w[u + 1]
+
+
+class Cylindrical:
+    """One rotation and the displacement along its axis are free."""
+
+    POSITIONS, SPEEDS = "rt", "rt"  #: r: rotation [rad or -], t: translation [m]
+    TRANSLATIONS: tuple[int, ...] = (0, 1)
+    ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
+    COORDINATES = (ROTATION, TRANSLATION)
+    motion = staticmethod(motion)
+
+    @staticmethod
+    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Angle about z [rad] in (-pi, pi], displacement along z [m], shape (2,)."""
+        return np.array([np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]), p[2]])

@@ -1,0 +1,88 @@
+r"""Rotation by a vector, as a prescribed path may give it: R_FG = exp(x~), its rate being dx/dt.
+
+.. math:: \omega = T(x)\dot x, \quad T = 1 + a\,\tilde x + b\,\tilde x\tilde x, \quad
+          a = \frac{1 - \cos\phi}{\phi^2},\; b = \frac{\phi - \sin\phi}{\phi^3}
+
+Singular at angles of 2 pi.  Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA
+from pipeline.dynamics.vectors import add, at, cross, dot, kernel, put, put9, scale
+
+#: angle^2 below which the functions are taken from their series; their next terms are below rounding there
+SMALL = 1e-2
+
+
+@kernel
+def _functions(s):
+    """sin/angle, a, b and the derivatives of a and b by s = angle^2."""
+    if s < SMALL:
+        c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)))
+        a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
+        b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0
+        da = -(1.0 - s / 15.0 * (1.0 - s * 3.0 / 112.0 * (1.0 - s * 2.0 / 135.0))) / 24.0
+        db = -(1.0 - s / 21.0 * (1.0 - s / 48.0 * (1.0 - s * 2.0 / 165.0))) / 120.0
+        return c, a, b, da, db
+    angle = np.sqrt(s)
+    c = np.sin(angle) / angle
+    a = 2.0 * np.sin(0.5 * angle) ** 2 / s
+    b = (1.0 - c) / s
+    return c, a, b, (0.5 * c - a) / s, (0.5 * a - 1.5 * b) / s
+
+
+@kernel
+def motion(w, x, u, du, joint, rate):
+    """Motion of frame G in frame F: the rotation vector stored from x (see `spherical.motion`)."""
+    for k in range(9, J_COLUMNS + 18):
+        w[joint + k] = 0.0
+    v, r, second = at(w, x), at(w, u), at(w, du)
+    c, a, b, da, db = _functions(dot(v, v))
+    put9(
+        w,
+        joint,
+        (
+            1.0 - a * (v[1] * v[1] + v[2] * v[2]),
+            a * v[0] * v[1] - c * v[2],
+            a * v[0] * v[2] + c * v[1],
+            a * v[0] * v[1] + c * v[2],
+            1.0 - a * (v[0] * v[0] + v[2] * v[2]),
+            a * v[1] * v[2] - c * v[0],
+            a * v[0] * v[2] - c * v[1],
+            a * v[1] * v[2] + c * v[0],
+            1.0 - a * (v[0] * v[0] + v[1] * v[1]),
+        ),
+    )
+    vr, vs, ds = cross(v, r), cross(v, second), 2.0 * dot(v, r)
+    vvr = cross(v, vr)
+    put(w, joint + J_OMEGA, add(r, add(scale(a, vr), scale(b, vvr))))
+    own = add(second, add(scale(a, vs), scale(b, cross(v, vs))))
+    bias = add(add(scale(da * ds, vr), scale(db * ds, vvr)), scale(b, cross(r, vr)))
+    put(w, joint + J_ALPHA, add(own, bias))
+    for k in range(3):
+        unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
+        vu = cross(v, unit)
+        put(w, joint + J_COLUMNS + 6 * k, add(unit, add(scale(a, vu), scale(b, cross(v, vu)))))
+        w[rate + k] = w[u + k]
+
+
+class RotationVector:
+    """Three rotations, held by a path; a joint of this type in a scene is `spherical`."""
+
+    POSITIONS, SPEEDS = "rrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
+    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+    ROTATIONS: tuple[tuple[int, int], ...] = ()
+    COORDINATES: tuple[Coordinate, ...] = ()
+    motion = staticmethod(motion)
+
+    @staticmethod
+    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Rotation vector [rad] of an angle up to pi, shape (3,)."""
+        q = matrix_to_quaternion(R)
+        half = np.linalg.norm(q[1:])
+        return q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)

@@ -1,0 +1,28 @@
+"""Force or torque of a given law along a joint coordinate."""
+
+from __future__ import annotations
+
+from pipeline.core.scene.loads import JointForce as Declared
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.loads.fields import act, law, measure
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.vectors import kernel, scale
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    value, rate, moment, force = measure(h, w, k)
+    size = law(h, w, k, 0)
+    act(h, w, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * rate, 0.0)
+
+
+class JointForce:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str, coordinate: Coordinate) -> Row:
+        """One law [N or N m]."""
+        return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{place[:-1]}.force]"),))

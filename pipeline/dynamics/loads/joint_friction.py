@@ -1,0 +1,49 @@
+"""Friction along a joint coordinate: viscous, and Coulomb's of given strength, regularised as in contacts.
+
+Its strength does not follow the joint's reaction.  Source: Wang & Wang (2019), eqs. (27)-(29), for the
+regularised coefficient.
+"""
+
+from __future__ import annotations
+
+from pipeline.core.scene.loads import JointFriction as Declared
+from pipeline.core.units import quantity
+from pipeline.dynamics.contact.friction.modified_coulomb import coefficient
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.loads.fields import act, measure, number
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.vectors import kernel, scale
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    value, rate, moment, force = measure(h, w, k)
+    speed = abs(rate)
+    p = (number(h, f, k, 1), number(h, f, k, 2), number(h, f, k, 3), number(h, f, k, 4))
+    dry = coefficient(speed, p)
+    size = -number(h, f, k, 0) * rate - (dry if rate >= 0.0 else -dry)
+    act(h, w, k, scale(size, moment), scale(size, force), value, rate, 0.0, 0.0, -size * rate)
+
+
+class JointFriction:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str, coordinate: Coordinate) -> Row:
+        """Viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], their speeds."""
+        viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
+        if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
+            raise ValueError(f"viscous = {viscous:.6g} is not negative; without coulomb it is not zero either")
+        dry = (0.0, 0.0, 1.0, 2.0)
+        if load.coulomb is not None:
+            speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
+            forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
+            dry = (*forces, quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
+            if not 0.0 <= dry[1] <= dry[0]:
+                raise ValueError(f"coulomb: 0 <= dynamic <= static, but dynamic = {dry[1]:.6g}, static = {dry[0]:.6g}")
+            if not 0.0 < dry[2] < dry[3]:
+                raise ValueError(f"coulomb: 0 < v_static < v_dynamic, but they are {dry[2]:.6g} and {dry[3]:.6g}")
+        return Row(joint=load.joint, numbers=(viscous, *dry))

@@ -1,0 +1,40 @@
+"""Spring and damper along a joint coordinate; full turns of an angle count."""
+
+from __future__ import annotations
+
+from pipeline.core.scene.loads import JointSpring as Declared
+from pipeline.core.units import quantity
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.loads.fields import TURNS, act, field, measure, number, unwound
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.vectors import kernel, scale
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    value, rate, moment, force = measure(h, w, k)
+    if field(h, k, TURNS) >= 0:
+        value = unwound(h, w, k, value, rate)
+    stretch, damped = value - number(h, f, k, 2), number(h, f, k, 1) * rate
+    size = -(number(h, f, k, 0) * stretch + damped)
+    stored = 0.5 * number(h, f, k, 0) * stretch * stretch
+    act(h, w, k, scale(size, moment), scale(size, force), value, rate, stored, 0.0, damped * rate)
+
+
+class JointSpring:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str, coordinate: Coordinate) -> Row:
+        """Stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
+        kind = "torsional " if coordinate.turning else ""
+        stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
+        if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:
+            raise ValueError(
+                f"stiffness {stiffness:.6g} and damping {damping:.6g} are not negative, and one of them is not zero"
+            )
+        numbers = (stiffness, damping, quantity(load.rest, coordinate.dimension))
+        return Row(joint=load.joint, numbers=numbers, counts_turns=coordinate.turning)

@@ -1,0 +1,32 @@
+"""Force at the origin of a frame, fixed in the world or turning with the frame."""
+
+from __future__ import annotations
+
+from pipeline.core.scene.loads import PointForce as Declared
+from pipeline.dynamics.loads.fields import FOLLOWS, B, act, field, law
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.tables import AXES, ORIGIN, VELOCITY, site_frame
+from pipeline.dynamics.vectors import at, at9, cross, dot, kernel, turn
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    o = site_frame(h, field(h, k, B))
+    force = (law(h, w, k, 0), law(h, w, k, 1), law(h, w, k, 2))
+    if field(h, k, FOLLOWS):
+        force = turn(at9(w, o + AXES), force)
+    power = dot(force, at(w, o + VELOCITY))
+    act(h, w, k, cross(at(w, o + ORIGIN), force), force, 0.0, 0.0, 0.0, power, 0.0)
+
+
+class PointForce:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str) -> Row:
+        """Three laws [N]."""
+        laws = tuple((c, "force", f"{place[:-1]}.force]") for c in load.force)
+        return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

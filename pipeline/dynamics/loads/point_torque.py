@@ -1,0 +1,31 @@
+"""Torque on the body of a frame, fixed in the world or turning with the frame."""
+
+from __future__ import annotations
+
+from pipeline.core.scene.loads import PointTorque as Declared
+from pipeline.dynamics.loads.fields import FOLLOWS, ZERO, B, act, field, law
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.tables import AXES, OMEGA, site_frame
+from pipeline.dynamics.vectors import at, at9, dot, kernel, turn
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    o = site_frame(h, field(h, k, B))
+    torque = (law(h, w, k, 0), law(h, w, k, 1), law(h, w, k, 2))
+    if field(h, k, FOLLOWS):
+        torque = turn(at9(w, o + AXES), torque)
+    act(h, w, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, at(w, o + OMEGA)), 0.0)
+
+
+class PointTorque:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str) -> Row:
+        """Three laws [N m]."""
+        laws = tuple((c, "torque", f"{place[:-1]}.torque]") for c in load.torque)
+        return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

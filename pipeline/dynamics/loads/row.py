@@ -1,0 +1,22 @@
+"""What a load acts on and with, as its module reads it from the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Row:
+    """frames: the frame acted on, or the two between which it acts; or `joint`: that joint's frames.
+
+    laws: law, dimension and place of each.  numbers: at most five.  follows: whether it turns with
+    its frame.  counts_turns: whether it needs its angle beyond half a turn.
+    """
+
+    frames: tuple[str, ...] = ()
+    joint: str | None = None
+    laws: tuple[tuple[Any, str, str], ...] = ()
+    numbers: tuple[float, ...] = ()
+    follows: bool = False
+    counts_turns: bool = False

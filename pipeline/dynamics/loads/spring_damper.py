@@ -1,0 +1,43 @@
+r"""Spring and damper on the line between two origins.
+
+.. math:: F = k\,(l - l_0) + c\,\dot l
+
+pulling the ends together. Where the ends meet the line has no direction: there the force is zero,
+which is its limit when :math:`l_0 = 0` and :math:`c = 0`; otherwise a start there is refused.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.scene.loads import SpringDamper as Declared
+from pipeline.dynamics.loads.fields import A, B, act, field, number
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.tables import ORIGIN, VELOCITY, site_frame
+from pipeline.dynamics.vectors import at, cross, dot, kernel, scale, sub
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    a, b = site_frame(h, field(h, k, A)), site_frame(h, field(h, k, B))
+    p = at(w, b + ORIGIN)
+    r = sub(p, at(w, a + ORIGIN))
+    length = np.sqrt(dot(r, r))
+    along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
+    rate = dot(along, sub(at(w, b + VELOCITY), at(w, a + VELOCITY)))
+    stretch, damped = length - number(h, f, k, 2), number(h, f, k, 1) * rate
+    force = scale(-(number(h, f, k, 0) * stretch + damped), along)
+    stored = 0.5 * number(h, f, k, 0) * stretch * stretch
+    act(h, w, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
+
+
+class SpringDamper:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str) -> Row:
+        """Stiffness [N/m], damping [N s/m], free length [m]."""
+        return Row(frames=load.between, numbers=(load.stiffness, load.damping, load.free_length or 0.0))

@@ -1,0 +1,76 @@
+"""Which cause dominates: the error of the scene as it stands, split by what would have to be refined."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from pipeline.post.plotting.style import INK, files, grid, heading, style
+from pipeline.post.plotting.table import Table
+
+#: the causes in the order of the stages that make them, each with what a user would refine
+CAUSES = {
+    "mesh": "more elements",
+    "beam theory": "another theory, or a solid",
+    "modal truncation": "more modes, or another mode set",
+    "time integration": "a tighter tolerance",
+    "event location": "(bounded by the root finder)",
+    "sampling of the output": "a shorter output interval",
+    "ensemble spread": "more members",
+}
+COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
+
+
+def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:
+    """Causes as rows, quantities as columns; '–' where a cause does not exist in the scene."""
+    quantities = list(split)
+    rows = []
+    for cause, remedy in CAUSES.items():
+        values = [split[q].get(cause, np.nan) for q in quantities]
+        if any(np.isfinite(values)):
+            rows.append((cause, *(f"{v:.1e}" if np.isfinite(v) else "–" for v in values), remedy))
+    largest = ("dominated by", *(dominant(split[q]) for q in quantities), "")
+    return Table(title, ("cause", *quantities, "to refine"), (*rows, largest))
+
+
+def dominant(causes: Mapping[str, float]) -> str:
+    """The cause with the largest error."""
+    known = {cause: error for cause, error in causes.items() if np.isfinite(error)}
+    return max(known, key=lambda cause: known[cause]) if known else "–"
+
+
+def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``: per quantity the causes stacked, as shares of their sum.
+
+    Shares show what to refine; the magnitudes stand beside the bars, since causes span many decades.
+    """
+    with style():
+        figure, axes = grid(1, 1, (9.5, 1.6 + 0.55 * len(split)))
+        ax = axes[0, 0]
+        for row, causes in enumerate(split.values()):
+            _bar(ax, row, causes)
+        ax.set_yticks(range(len(split)), list(split))
+        ax.invert_yaxis()
+        ax.set_xlim(0.0, 1.9)
+        ax.grid(visible=False, axis="y")
+        ax.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
+        ax.set_xlabel("share of the sum of all errors")
+        handles, labels = ax.get_legend_handles_labels()
+        unique = dict(zip(labels, handles, strict=True))
+        figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=4, fontsize=8.2)
+        heading(figure, title, "errors of the scene as it stands, relative to each quantity's size, by their cause")
+        return files(name, figure)
+
+
+def _bar(ax: Axes, row: int, causes: Mapping[str, float]) -> None:
+    known = {cause: e for cause, e in causes.items() if np.isfinite(e) and e > 0.0}
+    total, left = sum(known.values()), 0.0
+    for color, cause in zip(COLORS, CAUSES, strict=True):
+        if cause in known:
+            ax.barh(row, known[cause] / total, left=left, color=color, label=cause, height=0.7)
+            left += known[cause] / total
+    first = sorted(known, key=lambda cause: -known[cause])[:2]
+    text = ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
+    ax.text(1.02, row, text or "no error to be seen", va="center", fontsize=7.5, color=INK)

@@ -1,0 +1,93 @@
+"""The price list: the cheapest way to three accuracies, and what each cause contributes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.post.cost.study import GROUPS, resolved
+from pipeline.post.plotting.table import Table
+
+TARGETS = (1e-3, 1e-6, 1e-9)
+#: groups that say how a run is integrated, and the factor that is a setting
+INTEGRATION = {"tolerance": "rtol", "step": "step"}
+COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
+
+
+def price_list(study: xr.Dataset, title: str) -> Table:
+    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting."""
+    rows = []
+    for target in TARGETS:
+        found = cheapest(study, target)
+        if found is None:
+            best = min(_choices(study), key=lambda c: c.error)
+            rows.append((f"{target:g}", "cannot be had", "–", "–", f"{best.error:.1e} at best", best.worst))
+        else:
+            seconds = f"{found.seconds:.3f}"
+            rows.append(
+                (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
+            )
+    return Table(title, COLUMNS, tuple(rows), tuple(_notes(study)))
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """One way to integrate: its name, cost, largest relative error and the quantity that has it."""
+
+    name: str
+    evaluations: float
+    seconds: float
+    error: float
+    worst: str
+
+
+def cheapest(study: xr.Dataset, target: float) -> Choice | None:
+    """The choice with the fewest evaluations whose largest error is at most `target`; None if there is none."""
+    good = [choice for choice in _choices(study) if choice.error <= target]
+    return min(good, key=lambda choice: choice.evaluations, default=None)
+
+
+def _choices(study: xr.Dataset) -> list[Choice]:
+    found = []
+    for group, word in INTEGRATION.items():
+        if f"error_by_{group}" not in study:
+            continue
+        method, setting = GROUPS[group]
+        for m in study[method].values:
+            for s in study[setting].values:
+                one = study.sel({method: m, setting: s})
+                error = one[f"error_by_{group}"]
+                if not np.isfinite(error).all():
+                    continue
+                worst = str(study["quantity"].values[int(np.argmax(error.values))])
+                evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
+                unit = " s" if word == "step" else ""
+                found.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    return found
+
+
+def _notes(study: xr.Dataset) -> list[str]:
+    uncertain = float(study["reference_uncertainty"].max())
+    notes = [
+        "The error is the largest of all quantities: "
+        + ", ".join(str(q) for q in study["quantity"].values)
+        + "; each as a share of its own size.",
+        f"Reference: {study.attrs['reference']}. Confirmed by {study.attrs['confirmation']}, "
+        f"which differs by at most {uncertain:.1e}.",
+    ]
+    hidden = sum(int((~resolved(study, g) & np.isfinite(study[f"error_by_{g}"])).sum()) for g in _present(study))
+    if hidden:
+        notes.append(
+            f"{hidden} errors are too near to the reference's own uncertainty to be told; they are drawn hollow."
+        )
+    if study.attrs["horizon"] != "none":
+        notes.append(f"Pointwise errors count up to the horizon of the reference, t = {study.attrs['horizon']:.4g} s.")
+    if study.attrs["refused"]:
+        notes.append(f"Refused: {study.attrs['refused']}.")
+    return notes
+
+
+def _present(study: xr.Dataset) -> list[str]:
+    return [group for group in INTEGRATION if f"error_by_{group}" in study]

@@ -1,0 +1,163 @@
+"""From the runs of a study to one dataset: error and cost over the factors, and how good the reference is.
+
+Errors are pointwise up to the horizon of the reference; beyond it only statistics mean anything
+(`pipeline.post.cost.statistics`). They are relative to the size of each quantity (`quantities.scale`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core import quantities
+from pipeline.core.quantities import Quantity
+
+#: groups of points and the factors that span each
+GROUPS: dict[str, tuple[str, ...]] = {
+    "tolerance": ("adaptive_integrator", "tolerance"),
+    "step": ("fixed_integrator", "step"),
+    "model": ("theory", "mode_set", "modes", "elements"),
+    "sampling": ("interval",),
+}
+#: the reference must agree with its independent confirmation this many times better than an error it measures
+MARGIN = 10.0
+LONG_NAMES = {
+    "error": "largest error up to the horizon, as a share of the quantity's size",
+    "cpu_seconds": "processor time of one warm run, median of the repeats",
+    "cpu_spread": "largest minus smallest processor time of the repeats",
+    "evaluations": "right-hand sides evaluated",
+    "peak_memory": "largest resident memory of the process that made the run",
+    "compile_seconds": "time to build and fetch or compile the kernels, not part of the run",
+}
+UNITS = {
+    "error": "1",
+    "cpu_seconds": "s",
+    "cpu_spread": "s",
+    "evaluations": "1",
+    "peak_memory": "B",
+    "compile_seconds": "s",
+}
+COSTS = ("cpu_seconds", "cpu_spread", "evaluations", "peak_memory", "compile_seconds")
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One run of a study. group: of GROUPS, or 'reference' or 'confirmation'; factors: their values."""
+
+    key: str
+    group: str
+    factors: Mapping[str, Any]
+
+
+def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
+    """The study's dataset; `runs` holds what each point left, by key.
+
+    A run that was refused has no values: its place is NaN and its reason stands in `refused`.
+    """
+    reference = runs[next(p.key for p in points if p.group == "reference")]
+    until = horizon_of(reference)
+    scales = {q: quantities.scale(reference, q) for q in chosen}
+    data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
+    coordinates: dict[str, Any] = {
+        "quantity": [q.name for q in chosen],
+        "unit": ("quantity", [q.unit for q in chosen]),
+    }
+
+    def errors(run: xr.Dataset) -> np.ndarray:
+        return np.array(list(relative_errors(run, reference, chosen).values()))
+
+    confirmations = [runs[p.key] for p in points if p.group == "confirmation"]
+    confirmed = [errors(run) for run in confirmations if "refused" not in run.attrs]
+    floor = np.max(confirmed, axis=0) if confirmed else np.full(len(chosen), np.nan)
+    data["reference_uncertainty"] = (("quantity",), floor)
+    for group, factors in GROUPS.items():
+        mine = [p for p in points if p.group == group]
+        if mine:
+            _span(group, factors, mine, runs, errors, data, coordinates)
+    attributes = {
+        "reference": _described(points, "reference"),
+        "confirmation": _described(points, "confirmation"),
+        "horizon": until if np.isfinite(until) else "none",
+        "refused": "; ".join(
+            f"{p.key}: {runs[p.key].attrs['refused']}" for p in points if "refused" in runs[p.key].attrs
+        ),
+        "Conventions": "CF-1.11",
+    }
+    result = xr.Dataset(data, coords=coordinates, attrs=attributes)
+    for name in result.data_vars:
+        kind = str(name).rpartition("_by_")[0] or str(name)
+        result[name].attrs = {"units": UNITS.get(kind, "1"), "long_name": LONG_NAMES.get(kind, kind.replace("_", " "))}
+    return result
+
+
+def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
+    """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
+    found: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
+    return found
+
+
+def _span(
+    group: str,
+    factors: tuple[str, ...],
+    points: list[Point],
+    runs: Mapping[str, xr.Dataset],
+    errors: Any,
+    data: dict[str, Any],
+    coordinates: dict[str, Any],
+) -> None:
+    """Error and cost over the factors of one group."""
+    values = {factor: _sorted({p.factors[factor] for p in points}) for factor in factors}
+    shape = tuple(len(v) for v in values.values())
+    error = np.full((*shape, len(coordinates["quantity"])), np.nan)
+    costs = {name: np.full(shape, np.nan) for name in COSTS}
+    for point in points:
+        run = runs[point.key]
+        place = tuple(values[factor].index(point.factors[factor]) for factor in factors)
+        if "refused" in run.attrs:
+            continue
+        error[place] = errors(run)
+        for name in COSTS:
+            costs[name][place] = cost(run, name)
+    coordinates |= values
+    data[f"error_by_{group}"] = ((*factors, "quantity"), error)
+    data |= {f"{name}_by_{group}": (factors, array) for name, array in costs.items()}
+
+
+def cost(run: xr.Dataset, name: str) -> float:
+    """One of COSTS of a point's run."""
+    seconds = run["cpu_repeat"].values
+    if name == "cpu_seconds":
+        return float(np.median(seconds))
+    if name == "cpu_spread":
+        return float(seconds.max() - seconds.min())
+    return float(run.attrs[name])
+
+
+def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity]) -> dict[str, float]:
+    """Largest error up to the horizon as a share of the quantity's size, by name."""
+    until = horizon_of(reference)
+    return {
+        q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
+    }
+
+
+def horizon_of(run: xr.Dataset) -> float:
+    """Time up to which pointwise errors mean something [s]; infinite for runs that say nothing of it."""
+    return float(run["horizon"]) if "horizon" in run else np.inf
+
+
+def relative(error: float, scale: float) -> float:
+    """An error as a share of a size; the error itself where there is no size."""
+    return error / scale if scale > 0.0 else error
+
+
+def _sorted(values: set[Any]) -> list[Any]:
+    return sorted(values, reverse=all(isinstance(v, float) for v in values))
+
+
+def _described(points: Sequence[Point], group: str) -> str:
+    return "; ".join(p.key for p in points if p.group == group)

@@ -1,0 +1,129 @@
+"""Work-precision diagrams: error against cost for every quantity, with the Pareto front."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+from pipeline.post.cost.study import GROUPS, resolved
+from pipeline.post.plotting.style import INK, SOFT, files, grid, heading, style
+
+#: one colour and mark per integrator, the same in every figure
+LOOKS = {
+    "dop853": ("#0072B2", "o"),
+    "dopri5": ("#56B4E9", "s"),
+    "radau": ("#009E73", "^"),
+    "generalized-alpha": ("#D55E00", "v"),
+    "rk4": ("#CC79A7", "D"),
+    "adams-bashforth-moulton": ("#E69F00", "P"),
+}
+COLUMNS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be told."""
+
+    name: str
+    seconds: np.ndarray
+    error: np.ndarray
+    told: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A single point with a name: the paper's own choice, or another program. error: by quantity."""
+
+    name: str
+    seconds: float
+    error: dict[str, float]
+
+
+def make(name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = ()) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``."""
+    chosen = [str(q) for q in study["quantity"].values]
+    found = curves(study)
+    rows = -(-len(chosen) // COLUMNS)
+    with style():
+        figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
+        for k, ax in enumerate(axes.ravel()):
+            if k < len(chosen):
+                _panel(ax, chosen[k], k, found, marks)
+            else:
+                ax.set_visible(False)
+        _legend(figure, found, marks)
+        heading(figure, title, _subtitle(study))
+        return files(name, figure)
+
+
+def curves(study: xr.Dataset) -> list[Curve]:
+    """All integrators of a study, those with a tolerance and those with a step."""
+    found = []
+    for group in ("tolerance", "step"):
+        if f"error_by_{group}" not in study:
+            continue
+        method = GROUPS[group][0]
+        told = resolved(study, group)
+        for m in study[method].values:
+            seconds = study[f"cpu_seconds_by_{group}"].sel({method: m}).values
+            error = study[f"error_by_{group}"].sel({method: m}).values
+            found.append(Curve(str(m), seconds, error, told.sel({method: m}).values))
+    return found
+
+
+def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Indices of the points that no other beats in both cost and error, by rising cost; NaN never wins."""
+    best, kept = np.inf, []
+    for k in np.lexsort((error, seconds)):
+        if np.isfinite(seconds[k]) and np.isfinite(error[k]) and error[k] < best:
+            best = error[k]
+            kept.append(int(k))
+    return np.array(kept, dtype=int)
+
+
+def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, ...]) -> None:
+    for curve in found:
+        color, mark = LOOKS.get(curve.name, (SOFT, "x"))
+        there = np.isfinite(curve.error[:, k]) & (curve.error[:, k] > 0.0)
+        ax.plot(curve.seconds[there], curve.error[there, k], color=color, linewidth=1.0)
+        for told, face in ((True, color), (False, "white")):
+            pick = there & (curve.told[:, k] == told)
+            ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, markerfacecolor=face, markersize=4.5)
+    seconds = np.concatenate([c.seconds for c in found])
+    error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in found])
+    front = pareto(seconds, error)
+    ax.plot(seconds[front], error[front], color=INK, linewidth=3.0, alpha=0.18, zorder=0)
+    for m in marks:
+        if np.isfinite(m.error.get(name, np.nan)):
+            ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
+            ax.annotate(m.name, (m.seconds, m.error[name]), xytext=(4, 4), textcoords="offset points", fontsize=6.8)
+    ax.set(xscale="log", yscale="log", title=name)
+    # plain numbers at 1, 2 and 5: a range of less than a decade has hardly any power of ten
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    ax.set_xlabel("CPU time of one run (s)")
+    ax.set_ylabel("relative error")
+
+
+def _legend(figure: object, found: list[Curve], marks: tuple[Mark, ...]) -> None:
+    handles = [
+        Line2D([], [], color=LOOKS.get(c.name, (SOFT, "x"))[0], marker=LOOKS.get(c.name, (SOFT, "x"))[1], label=c.name)
+        for c in found
+    ]
+    handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
+    if marks:
+        handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5), fontsize=8.4)  # type: ignore[attr-defined]
+
+
+def _subtitle(study: xr.Dataset) -> str:
+    horizon = study.attrs["horizon"]
+    span = "over the whole run" if horizon == "none" else f"up to the horizon of the reference, t = {horizon:.4g} s"
+    uncertain = float(study["reference_uncertainty"].max())
+    return f"errors {span}, relative to each quantity's size; hollow: nearer to the reference than 10 x {uncertain:.0e}"

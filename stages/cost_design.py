@@ -1,0 +1,105 @@
+"""Which runs a cost study makes of a scene: the factors, the reference and its confirmation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pipeline.core.scene.load import edited, read_toml
+from pipeline.core.scene.schema import Scene
+
+#: tolerances of the methods that choose their steps, and steps [s] of those that do not
+TOLERANCES: Mapping[str, tuple[int, int]] = {"dop853": (-3, -13), "dopri5": (-3, -13), "radau": (-3, -9)}
+STEPS: Mapping[str, tuple[float, ...]] = {
+    "rk4": (1e-4, 3e-5, 1e-5, 3e-6, 1e-6),
+    "adams-bashforth-moulton": (1e-4, 3e-5, 1e-5, 3e-6, 1e-6),
+    "generalized-alpha": (1e-4, 3e-5, 1e-5, 3e-6),
+}
+REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
+#: another family of methods, and SciPy's own steps
+CONFIRMATION: Mapping[str, Any] = {"integrator": "radau", "rtol": 1e-12}
+#: Wang & Wang (2019), sec. 5: predictor-corrector, 1e-5 s, contacts noticed at the ends of steps
+PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5, "events": "at step ends"}
+#: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
+MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
+LIMITS = (0.5, 1.0, 2.0, 4.0)
+REFINEMENTS = (1, 2, 4)
+FINER_OUTPUT = 10.0
+
+
+@dataclass(frozen=True)
+class Design:
+    """One run: its group and factors (see `pipeline.post.cost.study`), the edited scene and edits of its recipes."""
+
+    key: str
+    group: str
+    factors: Mapping[str, Any]
+    scene: Scene
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+
+
+def runs(scene: Scene, highest: float | None) -> list[Design]:
+    """All runs of a study; highest: the highest frequency that the scene's bundles hold [Hz], None if all is rigid."""
+    found = [*_integration(scene), *_sampling(scene)]
+    return found + (list(_models(scene, highest)) if highest is not None else [])
+
+
+def _integration(scene: Scene) -> Iterator[Design]:
+    def design(group: str, solver: Mapping[str, Any], **factors: Any) -> Design:
+        setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
+        located = ", unlocated contacts" if "events" in solver else ""
+        key = f"{solver['integrator']}, {setting}{located}"
+        return Design(key, group, factors, edited(scene, {"solver": dict(solver), "accuracy": None, "ensemble": None}))
+
+    yield design("reference", REFERENCE)
+    yield design("confirmation", CONFIRMATION)
+    for method, (loosest, tightest) in TOLERANCES.items():
+        for power in range(loosest, tightest - 1, -1):
+            rtol = 10.0**power
+            solver = {"integrator": method, "rtol": rtol}
+            yield design("tolerance", solver, adaptive_integrator=method, tolerance=rtol)
+    for method, steps in STEPS.items():
+        for step in steps:
+            yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)
+    if scene.contacts():
+        yield design("paper", PAPER)
+
+
+def _sampling(scene: Scene) -> Iterator[Design]:
+    """The scene as it stands, and with denser output."""
+    interval = scene.output.interval
+    plain = {"accuracy": None, "ensemble": None}
+    yield Design("as it stands", "sampling", {"interval": interval}, edited(scene, plain))
+    finer = edited(scene, {**plain, "output": {"interval": interval / FINER_OUTPUT}})
+    yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
+
+
+def _models(scene: Scene, highest: float) -> Iterator[Design]:
+    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory."""
+    recipes = [read_toml(Path(body.mesh)) for body in scene.flexible().values()]
+    own_theory = str(recipes[0].get("theory", "rayleigh"))
+    own = next(iter(scene.flexible().values())).modes.reference
+
+    def design(reference: str, limit: float, refinement: int, theory: str) -> Design:
+        modes = {"reference": reference, "up_to": limit * highest}
+        bodies = {f"body.{name}.modes": modes for name in scene.flexible()}
+        solver = {"integrator": "dop853", "rtol": 1e-12}
+        change = edited(scene, {**bodies, "solver": solver, "accuracy": None, "ensemble": None})
+        elements = refinement * int(recipes[0].get("elements", 1))
+        key = f"{reference} up to {limit * highest:.4g} Hz, {elements} elements, {theory}"
+        own_one = (reference, limit, refinement, theory) == (own, 1.0, 1, own_theory)
+        factors = {"theory": theory, "mode_set": reference, "modes": limit * highest, "elements": elements}
+        factors |= {"own": own_one}
+        return Design(key, "model", factors, change, {"elements": refinement, "theory": theory})
+
+    for reference in dict.fromkeys((own, *MODE_SETS)):
+        for limit in LIMITS:
+            yield design(reference, limit, 1, own_theory)
+    if all("elements" in recipe for recipe in recipes):
+        for refinement in REFINEMENTS[1:]:
+            yield design(own, 1.0, refinement, own_theory)
+        for other in ("euler-bernoulli", "rayleigh", "timoshenko"):
+            if other != own_theory:
+                yield design(own, 1.0, 1, other)

@@ -1,0 +1,64 @@
+"""All points of a cost study -> its dataset, the price list, the work-precision figure and the causes of the error."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.workflow.execute import Progress
+
+#: contact events are located to this share of the clearance (pipeline.dynamics.integrate.events)
+LOCATED = 1e-12
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """``cost.nc`` and its tables and figures.
+
+    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`.
+    """
+    from pipeline.core.quantities import Quantity
+    from pipeline.post.cost import causes, price, statistics, work_precision
+    from pipeline.post.cost.study import Point, assemble
+    from pipeline.post.plotting.table import files
+
+    points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
+    runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
+    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    study = assemble(points, runs, chosen)
+    split = split_of(points, runs, chosen, study)
+    title = params["title"]
+    result: dict[str, Any] = {"nc": study}
+    result |= files("price", price.price_list(study, f"What accuracy costs: {title}"))
+    result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
+    result |= causes.make("causes", split, f"Where the error comes from: {title}")
+    marks = tuple(m for m in (_paper(points, runs, chosen),) if m is not None)
+    result |= work_precision.make("work_precision", study, f"Error against cost: {title}", marks)
+    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    if ensembles:
+        result |= files("statistics", statistics.table(ensembles, f"Beyond the horizon: {title}"))
+    return result
+
+
+def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:
+    """The paper's own choice of method and step, as a marked point."""
+    from pipeline.post.cost.study import cost, relative_errors
+    from pipeline.post.cost.work_precision import Mark
+
+    mine = [p for p in points if p.group == "paper" and "refused" not in runs[p.key].attrs]
+    if not mine:
+        return None
+    reference = runs[next(p.key for p in points if p.group == "reference")]
+    errors = relative_errors(runs[mine[0].key], reference, chosen)
+    return Mark("paper's choice", cost(runs[mine[0].key], "cpu_seconds"), errors)
+
+
+def split_of(
+    points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], study: xr.Dataset
+) -> dict[str, dict[str, float]]:
+    """Relative error of the scene as it stands, by quantity and cause."""
+    from pipeline.post.cost.split import causes_of
+
+    return {q.name: causes_of(q, points, runs, LOCATED) for q in chosen}

@@ -1,0 +1,76 @@
+"""Runs whose accuracy the scene asks for: what is delivered, against a run at the tightest tolerance."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from pipeline import dynamics, load_scene
+from pipeline.core import quantities
+from pipeline.core.errors import InputError
+from tests.analytic.mechanism_runs import TREE
+
+CSJ = TREE / "scenes" / "sps4" / "csj.toml"
+IDEAL = TREE / "scenes" / "sps4" / "ideal.toml"
+
+
+def quiet(share, text):
+    """Nobody watches."""
+
+
+@pytest.fixture(scope="module")
+def reference():
+    return dynamics.simulate(load_scene(CSJ, {"solver.rtol": 1e-14}), {}, quiet)
+
+
+@pytest.mark.parametrize("wanted", [10.0**-k for k in range(2, 10)])
+def test_the_delivered_error_is_the_wanted_one(reference, wanted):
+    scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": wanted}}}})
+    run = dynamics.simulate(scene, {}, quiet)
+    velocity = quantities.parse("platform.velocity", scene.owners())
+    delivered = quantities.error(run, reference, velocity) / quantities.scale(reference, velocity)
+    assert run.attrs["accuracy_verdict"] == "met"
+    # estimates are good to a factor: neither three times too bad, nor much dearer than asked
+    assert wanted / 4.0 < delivered < 3.0 * wanted
+
+
+def test_several_quantities_are_met_together(reference):
+    asked = {"A1.impact_times": "1 us", "platform.position": "0.1 um"}
+    scene = load_scene(CSJ, {"accuracy": asked})
+    run = dynamics.simulate(scene, {}, quiet)
+    for name, limit in (("A1.impact_times", 1e-6), ("platform.position", 1e-7)):
+        quantity = quantities.parse(name, scene.owners())
+        assert quantities.error(run, reference, quantity) < 3.0 * limit
+    assert float(json.loads(run.attrs["accuracy_estimated"])["A1.impact_times"]) <= 1e-6
+
+
+def test_what_cannot_be_had_is_said_with_the_best_there_is(reference):
+    scene = load_scene(CSJ, {"accuracy": {"platform.velocity": {"relative": 1e-15}}})
+    run = dynamics.simulate(scene, {}, quiet)
+    assert "times what is wanted" in run.attrs["accuracy_verdict"]
+    velocity = quantities.parse("platform.velocity", scene.owners())
+    assert quantities.error(run, reference, velocity) < 1e-8 * quantities.scale(reference, velocity)
+
+
+@pytest.mark.parametrize(
+    "asked, told",
+    [
+        ({"platfrm.position": "1 um"}, "did you mean 'platform'"),
+        ({"platform.positon": "1 um"}, "did you mean 'position'"),
+        ({"platform.position": "1 N"}, "is a force, but a length belongs here"),
+        ({"platform.peak_force": "1 N"}, "belongs to a contact"),
+        ({"platform.position": {"relative": 2.0}}, "less than 1"),
+        ({"platform.position": -1.0}, "greater than 0"),
+    ],
+)
+def test_wrong_wishes_are_refused_before_any_work(asked, told):
+    with pytest.raises(InputError, match=told):
+        load_scene(CSJ, {"accuracy": asked})
+
+
+def test_a_share_of_nothing_is_refused():
+    still = {"drive.P1.law": {"type": "constant"}, "drive.P2.law": {"type": "constant"}}
+    scene = load_scene(IDEAL, {"accuracy": {"platform.velocity": "1 %"}, **still})
+    with pytest.raises(InputError, match="never changes"):
+        dynamics.simulate(scene, {}, quiet)

@@ -1,0 +1,65 @@
+"""Small mechanisms for tests, as scenes in tables of SI numbers."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline import dynamics
+from pipeline.core.algebra import rotation_vector_to_matrix
+from pipeline.core.scene.schema import Scene
+
+Table = dict[str, Any]
+GRAVITY = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}}
+
+
+def simulate(table: Table) -> xr.Dataset:
+    return dynamics.simulate(Scene.model_validate(table), {}, lambda share, text: None)
+
+
+def body(position: Any, mass: float = 1.0, frames: Table | None = None, **more: Any) -> Table:
+    """A body of unequal moments of inertia whose frame starts parallel to the world's."""
+    return {
+        "type": "rigid",
+        "mass": mass,
+        "inertia": [0.012 * mass, 0.02 * mass, 0.015 * mass],
+        "com": [0.01, -0.02, 0.015],
+        "pose": {"position": list(position)},
+        "frames": frames or {},
+        **more,
+    }
+
+
+def ground(**frames: Any) -> Table:
+    return {"type": "ground", "frames": {name: {"position": list(p)} for name, p in frames.items()}}
+
+
+def frame(position: Any, turn: Any = (0.0, 0.0, 0.0)) -> Table:
+    return {"position": list(position), "rotation_vector": list(turn)}
+
+
+def scene(bodies: Table, joints: Table, end: float = 0.2, rtol: float = 1e-12, **more: Any) -> Table:
+    """A scene that is recorded twenty times."""
+    return {
+        "title": "test",
+        "body": bodies,
+        "joint": joints,
+        "time": {"end": end},
+        "output": {"interval": end / 20.0},
+        "solver": {"rtol": rtol},
+        **more,
+    }
+
+
+def joint(kind: str, first: str, second: str) -> Table:
+    return {"type": kind, "between": [first, second]}
+
+
+def turned(R: np.ndarray, vector: Any) -> list[float]:
+    return [float(x) for x in R @ np.asarray(vector)]
+
+
+def matrix(vector: Any) -> np.ndarray:
+    return rotation_vector_to_matrix(np.asarray(vector, dtype=float))
