@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
+from scipy.optimize import minimize_scalar
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.assembly import selection
@@ -19,8 +21,8 @@ Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 ZERO = 1e-9
 #: a least singular value that has a minimum below this share of its median may reach zero beside that row
 LOW = 0.5
-#: bisections for the time of a pass
-HALVINGS = 40
+#: share of the time between two rows to which a pass is located
+WITHIN = 1e-9
 #: a pass with less than this share of the run's largest kinetic energy does not choose its branch
 AT_REST = 1e-10
 
@@ -96,43 +98,52 @@ def _pass_after(engine: Engine, trajectory: Trajectory, k: int) -> Pass | None:
     jacobian = _between(engine, trajectory, k)
     U, _, Vt = np.linalg.svd(jacobian(0.0), full_matrices=False)
 
-    def signed(share: float) -> np.ndarray:
-        B = U.T @ jacobian(share) @ Vt.T
-        return np.asarray(np.linalg.eigvalsh(0.5 * (B + B.T)))
-
-    lost = int(np.sum(signed(1.0) < 0.0))
+    B = U.T @ jacobian(1.0) @ Vt.T
+    lost = int(np.sum(np.linalg.eigvalsh(0.5 * (B + B.T)) < 0.0))
     if not lost:
         return None
-    low, high = 0.0, 1.0
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if signed(middle)[0] < 0.0 else (middle, high)
+
+    def least(share: float) -> float:
+        return float(np.linalg.svd(jacobian(share), compute_uv=False)[-1])
+
+    share = float(minimize_scalar(least, bounds=(0.0, 1.0), method="bounded", options={"xatol": WITHIN}).x)
     times = trajectory.time
-    there = np.linalg.svd(jacobian(low))
+    there = np.linalg.svd(jacobian(share))
     joint = singular.worst_joint(engine, there[0][:, -1])
-    return Pass(float(times[k] + low * (times[k + 1] - times[k])), singular.condition(there[1]), lost, joint)
+    return Pass(float(times[k] + share * (times[k + 1] - times[k])), singular.condition(there[1]), lost, joint)
 
 
 def _between(engine: Engine, trajectory: Trajectory, k: int) -> Callable[[float], np.ndarray]:
-    """Scaled closure Jacobian at a share of the way from row k to k + 1, on the states' cubic Hermite interpolant."""
-    start, end = trajectory.time[k], trajectory.time[k + 1]
+    """Scaled closure Jacobian at a share of the way from row k to k + 1.
+
+    On the polynomial that has the states and their rates at these rows and, where the motion is smooth, at their
+    neighbours.
+    """
+    times, first = trajectory.time, 1 + 2 * len(engine.built.system.contacts)
+    start, end = float(times[k]), float(times[k + 1])
     engine.keep(trajectory.selection(k + 1))
     engine.select_pieces(0.5 * (start + end))
-    first = 1 + 2 * len(engine.built.system.contacts)
-    states, step = trajectory.rows[k : k + 2, first:], end - start
-    rates = []
-    for t, y in zip((start, end), states, strict=True):
-        engine.attempt(y, t)
+    nodes = [k, k + 1] if engine.built.system.contacts else _smooth(engine, times, k)
+    states, rates = trajectory.rows[nodes, first:], []
+    for t, y in zip(times[nodes], states, strict=True):
+        engine.attempt(y, float(t))
         rates.append(engine.view("SLOPES", len(y)).copy())
+    values = np.stack([states, np.array(rates) * (end - start)], axis=1).reshape(-1, states.shape[1])
+    path = KroghInterpolator(np.repeat((times[nodes] - start) / (end - start), 2), values)
 
     def jacobian(share: float) -> np.ndarray:
-        s = share
-        weights = (1 + 2 * s) * (1 - s) ** 2, s * s * (3 - 2 * s), s * (1 - s) ** 2 * step, s * s * (s - 1) * step
-        y = weights[0] * states[0] + weights[1] * states[1] + weights[2] * rates[0] + weights[3] * rates[1]
-        engine.attempt(y, float(start + s * step))
+        engine.attempt(path(share), start + share * (end - start))
         return singular.scaled(engine.built, engine.h, engine.rows("JACOBIAN"))
 
     return jacobian
+
+
+def _smooth(engine: Engine, times: np.ndarray, k: int) -> list[int]:
+    """Rows from k - 1 to k + 2 with no break of a law between them."""
+    breaks = engine.breaks
+    low, high = np.searchsorted(breaks, times[k], side="right") - 1, np.searchsorted(breaks, times[k + 1])
+    rows = range(max(k - 1, 0), min(k + 3, len(times)))
+    return [j for j in rows if breaks[low] <= times[j] <= breaks[min(high, len(breaks) - 1)]]
 
 
 def _refuse_rest(found: list[Pass], trajectory: Trajectory, kinetic: np.ndarray) -> None:
