@@ -18,7 +18,8 @@ FAMILIES = ("body", "joint", "drive", "load")
 #: types of parts, by which their models are chosen
 TYPES = (
     *("ground", "rigid", "flexible"),
-    *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "clearance-spherical"),
+    *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"),
+    "clearance-spherical",
     *("joint-drive", "path-drive"),
     *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise"),
     *("gravity", "point-force", "point-torque", "spring-damper", "joint-force", "joint-spring", "joint-friction"),

@@ -218,6 +218,22 @@ def _length(links: list[Link], frames: Mapping[str, Frame]) -> float:
 
 
 def require_bodies(scene: Scene) -> None:
-    """InputError when nothing can move."""
-    if not scene.rigid() and not scene.flexible():
+    """InputError when nothing can move, and for a body that has been left out of a mechanism."""
+    moving = [*scene.rigid(), *scene.flexible()]
+    if not moving:
         raise InputError("[body]", "the scene has no body that could move", "add a rigid or flexible body")
+    frames = [f for part in (scene.joint, scene.load, scene.drive) for p in part.values() for f in _named_frames(p)]
+    held = {f.partition(".")[0] for f in frames}
+    for name in moving:
+        if scene.joint and name not in held:
+            raise InputError(
+                f"[body.{name}]",
+                f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
+                'join it; that a body shall fly freely is said by a joint of type "free"',
+            )
+
+
+def _named_frames(part: object) -> tuple[str, ...]:
+    between = getattr(part, "between", None)
+    frame = getattr(part, "frame", None)
+    return tuple(between) if between is not None else (frame,) if frame is not None else ()
