@@ -14,9 +14,11 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate.beside import beside
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
+from pipeline.dynamics.tables import SINGULAR
 
 if TYPE_CHECKING:
     from pipeline.dynamics.sensitivity import Twin
@@ -81,5 +83,9 @@ def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarr
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
-        parts.append(observe(engine, trajectory.rows[part]))
+        seen = observe(engine, trajectory.rows[part])
+        for k in np.flatnonzero(seen["status"][:, 0] == SINGULAR):
+            for name, value in (beside(engine, trajectory.rows[part][k]) or {}).items():
+                seen[name][k] = value[0]
+        parts.append(seen)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -23,7 +23,8 @@ from pipeline.dynamics.vectors import index, kernel
 #: header of h: sizes
 SIZES = (
     "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_KEPT_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS "
-    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE JACOBIAN_SIZE MOST_MODES N_LAWS N_LOADS N_TURNS LOAD_SLOT"
+    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE JACOBIAN_SIZE MOST_MODES N_LAWS "
+    "N_LOADS N_TURNS LOAD_SLOT"
 ).split()
 #: wiring tables in h: name -> columns
 WIRING = {
@@ -39,8 +40,7 @@ WIRING = {
     "PAIRS": 3,  # momentum, column, place in the mass matrix's envelope
     "KNOWN_PAIRS": 4,  # momentum, column, prescribed coordinate, free coordinate
     "ENVELOPE": 2,  # first column, start of each row of the mass matrix
-    # site a, site b, first row, rows, first of support, its length, first of Jacobian, first entry, entries,
-    # first and number of the rows that are solved for: the first ones of the closure, those left over follow from them
+    # sites a and b, first row, rows, support, its length, Jacobian, first entry, entries, first and number of kept rows
     "CLOSURES": 11,
     "CLOSURE_ROWS": 3,  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
     "SUPPORT": 1,  # coordinates on which a closure depends
@@ -82,7 +82,8 @@ WORK = (
 _PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK])}
 HEADER = len(_PLACE)
 #: places that only the kernels of some effects need, which name them themselves
-ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT".split()
+ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT ROW_SCALE PIVOT".split()
+ELSEWHERE += "N_KEPT_ROWS JACOBIAN_SIZE N_CLOSURE_PAIRS".split()
 
 
 def place(name: str) -> int:
@@ -96,7 +97,6 @@ def place(name: str) -> int:
     N_FLEX,
     N_CLOSURES,
     N_CLOSURE_ROWS,
-    N_KEPT_ROWS,
     N_CONTACTS,
     N_DRIVES,
     NQ,
@@ -106,11 +106,9 @@ def place(name: str) -> int:
     N_PAIRS,
     N_KNOWN_PAIRS,
     N_KNOWN_ENTRIES,
-    N_CLOSURE_PAIRS,
     N_GROUPS,
     MASS_SIZE,
     SCHUR_SIZE,
-    JACOBIAN_SIZE,
     MOST_MODES,
     N_LAWS,
     N_LOADS,
@@ -175,8 +173,6 @@ def place(name: str) -> int:
     JACOBIAN,
     SPREAD,
     SCHUR,
-    ROW_SCALE,
-    PIVOT,
     MULTIPLIER,
     TOUCH,
     LAW,
@@ -196,7 +192,7 @@ def place(name: str) -> int:
     LATCHED,
     WATCH,
     CONTROL,
-) = (place(name) for name in WORK)
+) = (place(name) for name in WORK if name not in ELSEWHERE)
 
 # fields of a link, a flexible body, a port, a closure, a contact
 PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)
@@ -219,9 +215,6 @@ GAP, RATE, NORMAL_FORCE, FRICTION_POWER, DAMPING_POWER, STORED = range(6)
 TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 6, 9, 12, 15
 # ledger before the contacts' slots (normal, friction each): work of drives, loss of modal damping
 DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
-# smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry so far (1: rows at right angles, 0:
-# dependent or nothing): of the last evaluation; below which the stepper asks for other rows
-LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
 # what evaluate reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 #: first entries of n, the integers that change: report of the last evaluation; then the laws' active pieces

@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.errors import SolverError
 from pipeline.core.scene.load import load_scene
 from tests.analytic import four_bars
 from tests.analytic.mechanism_runs import TREE, run
@@ -184,3 +185,38 @@ def test_rows_are_chosen_anew_where_the_first_choice_fails() -> None:
     """Bricard's loop turns far enough to make any four of its five rows nearly dependent; its answer shows nothing of it."""
     dataset = run("checks/bricard", (("time.end", 10.0), *TIGHT))
     assert dataset.condition.values.max() < 1e4
+
+
+# Singular poses ------------------------------------------------------------------------------------------------------
+
+
+def driven(**law: object) -> Table:
+    """A parallelogram whose crank is turned by a law."""
+    found = table("four_bars_1", **{"solver": {"rtol": 1e-12}, "time.end": 1.0, "output.interval": 0.25})
+    for body in found["body"].values():
+        body.pop("velocity", None)
+        body.pop("angular_velocity", None)
+    return {**found, "drive": {"crank": {"joint": "foot0", "law": law}}}
+
+
+def test_a_row_in_a_singular_pose_itself_is_the_limit_of_its_neighbours() -> None:
+    """The crank turns steadily and lies exactly at an output time; the parallelogram goes on as one."""
+    with np.errstate(all="ignore"):
+        dataset = simulate(driven(type="polynomial", coefficients=(0.0, -np.pi)))
+    at = dataset.sel(time=0.5)
+    assert 0.5 in dataset.time.values
+    assert dataset.pass_time.values == pytest.approx([0.5], abs=1e-6)
+    # the mean of both sides of the pose, some 1e-4 s away
+    assert at.angular_velocity.sel(body="rod1").values == pytest.approx([0.0, 0.0, -np.pi], abs=1e-6)
+    assert at.acceleration.sel(body="rod1").values == pytest.approx([-0.5 * np.pi**2, 0.0, 0.0], abs=1e-4)
+    assert dataset.position.sel(body="rod1").values[-1] == pytest.approx([1.0, -0.5, 0.0], abs=1e-9)
+
+
+def test_a_mechanism_that_comes_to_rest_in_a_singular_pose_is_refused() -> None:
+    """Where the bars lie in one line and nothing moves, nothing says how the loop goes on."""
+    law = {"type": "step", "start": (0.0,), "end": (0.5,), "change": (-0.5 * np.pi,)}
+    with pytest.raises(SolverError) as caught:
+        simulate(driven(**law))
+    assert caught.value.exit_code == 3
+    for part in ("t = 0.", "singular", "condition number", "joint right1"):
+        assert part in str(caught.value), part

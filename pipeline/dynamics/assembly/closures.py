@@ -15,6 +15,7 @@ rows of a closure come first among its rows, the residuals of all are known (`as
 from __future__ import annotations
 
 from pipeline.dynamics.assembly.envelope import backward, base, factor, forward
+from pipeline.dynamics.assembly.pivots import LAST_PIVOT, N_CLOSURE_PAIRS, N_KEPT_ROWS, PIVOT, ROW_SCALE
 from pipeline.dynamics.tables import (
     ACCELERATION,
     ALPHA,
@@ -34,14 +35,11 @@ from pipeline.dynamics.tables import (
     JACOBIAN0,
     KEPT0,
     KNOWN_ENTRIES,
-    LAST_PIVOT,
     MASS,
     MULTIPLIER,
-    N_CLOSURE_PAIRS,
     N_CLOSURES,
     N_ENTRIES,
     N_KEPT,
-    N_KEPT_ROWS,
     N_KNOWN_ENTRIES,
     N_ROWS,
     N_SUPPORT,
@@ -49,11 +47,9 @@ from pipeline.dynamics.tables import (
     OK,
     OMEGA,
     ORIGIN,
-    PIVOT,
     RESIDUAL,
     RESIDUAL_RATE,
     ROW0,
-    ROW_SCALE,
     ROWS,
     SCHUR,
     SCHUR_SIZE,
@@ -175,8 +171,9 @@ def prepare(h, w, n):
         size = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)]
         w[index(h[ROW_SCALE] + r)] = max(w[index(h[ROW_SCALE] + r)], size)
     ratio = factor(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_KEPT_ROWS], SINGULAR_PIVOT)
-    w[index(h[PIVOT] + LAST_PIVOT)] = independence(h, w) if ratio > SINGULAR_PIVOT else 0.0
-    n[EVALUATION] = OK if ratio > SINGULAR_PIVOT else SINGULAR
+    pivot = independence(h, w) if ratio > SINGULAR_PIVOT else 0.0
+    w[index(h[PIVOT] + LAST_PIVOT)] = pivot
+    n[EVALUATION] = OK if pivot > SINGULAR_PIVOT else SINGULAR
 
 
 @kernel

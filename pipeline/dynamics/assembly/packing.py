@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics import tables
+from pipeline.dynamics.assembly.pivots import PIVOT_SIZE
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.method import Method
 
@@ -146,7 +147,7 @@ def _work_lengths(s: Mapping[str, int], method: Method, columns: int) -> dict[st
         "SPREAD": jacobian,
         "SCHUR": s["SCHUR_SIZE"],
         "ROW_SCALE": rows,
-        "PIVOT": tables.PIVOT_SIZE,
+        "PIVOT": PIVOT_SIZE,
         "MULTIPLIER": rows,
         "TOUCH": tables.TOUCH_SIZE * contacts,
         "LAW": tables.LAW_SIZE * s["N_LAWS"],

@@ -13,7 +13,11 @@ from scipy.linalg import qr
 from pipeline.dynamics import tables
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.packing import Packed, envelope_size
+from pipeline.dynamics.assembly.pivots import N_KEPT_ROWS
 from pipeline.dynamics.assembly.wiring import closure_envelope
+
+#: rows below this share of the longest are rounding
+NOTHING = 1e-6
 
 
 def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray, float]:
@@ -33,15 +37,20 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
 
 
 def row_scales(built: Tables, spread: np.ndarray) -> np.ndarray:
-    """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,)."""
-    lengths = np.linalg.norm(spread, axis=1)
+    """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
+
+    Not less than a small share of the longest of all, a length of the mechanism's size counting like a radian: rows
+    that are nothing but rounding must stay small.
+    """
     kinds, scales = built.packed.table("CLOSURE_ROWS")[:, 0], np.ones(len(spread))
+    units = np.where(kinds == 0, built.system.length, 1.0)
+    lengths = np.linalg.norm(spread, axis=1)
+    floor = NOTHING * units * float(np.max(lengths / units, initial=0.0))
     for line in built.packed.table("CLOSURES"):
         span = slice(line[tables.ROW0], line[tables.ROW0] + line[tables.N_ROWS])
         for kind in (0, 1):
             mine = np.flatnonzero(kinds[span] == kind) + span.start
-            longest = float(np.max(lengths[mine], initial=0.0))
-            scales[mine] = longest if longest > 0.0 else 1.0
+            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), floor[mine])
     return scales
 
 
@@ -62,7 +71,7 @@ def write(built: Tables, h: np.ndarray, kept: np.ndarray) -> None:
         start += int(closure[tables.N_KEPT])
     envelope = view(built.packed, h, "CLOSURE_ENVELOPE")
     envelope[:start] = closure_envelope(closures, built.packed.table("CLOSURE_PAIRS"))
-    h[tables.N_KEPT_ROWS], h[tables.SCHUR_SIZE] = start, envelope_size(envelope[:start])
+    h[N_KEPT_ROWS], h[tables.SCHUR_SIZE] = start, envelope_size(envelope[:start])
 
 
 def dense(built: Tables, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
@@ -71,7 +80,7 @@ def dense(built: Tables, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).
     """
     support = built.packed.table("SUPPORT")[:, 0]
-    full = np.zeros((*stored.shape[:-1], int(h[tables.N_KEPT_ROWS]), built.layout.nv))
+    full = np.zeros((*stored.shape[:-1], int(h[N_KEPT_ROWS]), built.layout.nv))
     for c in view(built.packed, h, "CLOSURES"):
         count, slots = int(c[tables.N_KEPT]), int(c[tables.N_SUPPORT])
         columns = support[c[tables.SUPPORT0] : c[tables.SUPPORT0] + slots]

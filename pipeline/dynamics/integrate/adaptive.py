@@ -101,4 +101,6 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         """Length of the step to try from t: as planned, unless a singular pose is ahead."""
         return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap)
 
-    return first_step, judge, after_rejection, next_step, lay, straddle.compose(evaluate)
+    # a method whose work space is part of its step must not have it disturbed
+    foresee = straddle.foresee_nothing if method.ends else straddle.compose(evaluate)
+    return first_step, judge, after_rejection, next_step, lay, foresee

@@ -18,6 +18,7 @@ from pipeline.dynamics.integrate.state import (
     TIME,
 )
 from pipeline.dynamics.integrate.stepper import finite
+from pipeline.dynamics.integrate.straddle import foresee_nothing
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y
 from pipeline.dynamics.vectors import index, kernel
 
@@ -64,8 +65,4 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         """Singular poses are stepped over as they come."""
         return w[index(h[CONTROL] + STEP)]
 
-    @kernel
-    def foresee(h, f, w, n, t):
-        """No step could be changed for it."""
-
-    return first_step, judge, after_rejection, next_step, lay, foresee
+    return first_step, judge, after_rejection, next_step, lay, foresee_nothing

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.integrate.project import largest
+from pipeline.dynamics.assembly.pivots import JACOBIAN_SIZE, LAST_PIVOT, N_KEPT_ROWS, PIVOT
+from pipeline.dynamics.integrate.project import BLIND, largest
 from pipeline.dynamics.tables import (
     ACTIVE,
     DRIVE_FORCE,
@@ -15,7 +16,6 @@ from pipeline.dynamics.tables import (
     GRAVITY,
     INERTIA_SIZE,
     JACOBIAN,
-    JACOBIAN_SIZE,
     KEPT0,
     LATCHED,
     LINK_FRAMES,
@@ -44,6 +44,7 @@ from pipeline.dynamics.tables import (
     RESIDUAL,
     ROW0,
     ROWS,
+    SINGULAR,
     SITE_A,
     SITE_B,
     SITE_FRAMES,
@@ -198,6 +199,8 @@ def compose(
         evaluate(h, f, w, n, t, h[Y], h[SLOPES])
         if n[EVALUATION] == OK and project(h, f, w, n, t, h[Y], h[SLOPES], tolerance) < 0:
             n[EVALUATION] = NOT_CLOSED
+        if n[EVALUATION] == OK and h[N_KEPT_ROWS] > 0 and w[h[PIVOT] + LAST_PIVOT] < BLIND:
+            n[EVALUATION] = SINGULAR  # multipliers so near to a singular pose are mostly rounding
 
     @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):

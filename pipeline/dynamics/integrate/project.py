@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT
 from pipeline.dynamics.tables import (
     C0,
     CORRECTION,
@@ -13,7 +14,6 @@ from pipeline.dynamics.tables import (
     FLEX_Q0,
     JOINT,
     JOINT_KIND,
-    LAST_PIVOT,
     N_CLOSURE_ROWS,
     N_FLEX,
     N_LINKS,
@@ -21,7 +21,6 @@ from pipeline.dynamics.tables import (
     NQ,
     NV,
     OK,
-    PIVOT,
     POSITION_RATE,
     Q0,
     RESIDUAL,

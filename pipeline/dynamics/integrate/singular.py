@@ -11,6 +11,7 @@ from pipeline.dynamics.assembly import selection
 from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.layout import Layout
 from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT_SIZE, WANTED_PIVOT
 
 if TYPE_CHECKING:
     from pipeline.dynamics.integrate.engine import Engine
@@ -50,16 +51,16 @@ def improve(engine: Engine, t: float) -> bool:
     size, rows = engine.built.packed.sizes["NY"], len(engine.kept)
     row_scale = engine.view("ROW_SCALE", rows).copy()
     y, slope = engine.view("Y", size).copy(), engine.view("SLOPES", size).copy()
-    pivots, before = engine.view("PIVOT", tables.PIVOT_SIZE), engine.kept.copy()
-    present = float(pivots[tables.LAST_PIVOT])
+    pivots, before = engine.view("PIVOT", PIVOT_SIZE), engine.kept.copy()
+    present = float(pivots[LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
     better = ratio > BETTER * present and not np.array_equal(before, engine.kept)
     if not better:
         engine.keep(before)
         engine.view("ROW_SCALE", rows)[:] = row_scale
     engine.view("Y", size)[:], engine.view("SLOPES", size)[:] = y, slope
-    pivots[tables.LAST_PIVOT] = ratio if better else present
-    pivots[tables.WANTED_PIVOT] = WORN * ratio if better else WORN * present
+    pivots[LAST_PIVOT] = ratio if better else present
+    pivots[WANTED_PIVOT] = WORN * ratio if better else WORN * present
     return better
 
 

@@ -13,9 +13,9 @@ from pipeline.dynamics.tables import MODE
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
 # accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter;
 # then what `straddle` keeps: independence of the closure rows at the end of the step and at its start, its start,
-# time of the next singular pose, whether the present step is laid over it
+# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER = range(11)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, N_CONTROLS = range(11, 17)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS, N_CONTROLS = range(11, 18)
 # integers
 (
     STATUS,
@@ -37,7 +37,7 @@ SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, N_CONTROLS = range(11, 17)
 ) = range(MODE + 1, MODE + 17)
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
-NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS = 8, 9, 10
+NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR = 8, 9, 10, 11
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING = 0, 1

@@ -12,8 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT, WANTED_PIVOT
 from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.integrate.state import (
+    AT_SINGULAR,
+    BLIND_STEPS,
     BUDGET,
     CAP,
     CAP_REACHED,
@@ -49,7 +52,6 @@ from pipeline.dynamics.tables import (
     EVALUATION,
     FLOORS,
     GROUPS,
-    LAST_PIVOT,
     LATCHED,
     MAGNITUDE,
     MODE,
@@ -59,10 +61,8 @@ from pipeline.dynamics.tables import (
     NOT_FINITE,
     NY,
     OK,
-    PIVOT,
     RESIDUAL,
     SLOPES,
-    WANTED_PIVOT,
     Y_NEW,
     Y_STAGE,
     Y,
@@ -73,6 +73,8 @@ from pipeline.dynamics.vectors import index, kernel
 RESTART = 1
 #: share of the mechanism's size to which closures are closed before a singular pose
 TIGHTLY = 1e-15
+#: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
+MOST_BLIND = 20.0
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
 
@@ -168,6 +170,8 @@ def compose(
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
+        elif w[index(c + BLIND_STEPS)] > MOST_BLIND:
+            n[STATUS] = AT_SINGULAR
         elif w[index(h[PIVOT] + LAST_PIVOT)] < w[index(h[PIVOT] + WANTED_PIVOT)]:
             n[STATUS] = WORN_ROWS
         elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:

@@ -14,8 +14,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.integrate.state import EVALUATIONS, PASS_TIME, PAST_SIGMA, PAST_TIME, SIGMA, STEP, STRADDLING
-from pipeline.dynamics.tables import CONTROL, EVALUATION, LAST_PIVOT, NY, OK, PIVOT, SLOPES, Y_NEW, Y_STAGE, Y
+from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT
+from pipeline.dynamics.integrate.project import BLIND
+from pipeline.dynamics.integrate.state import (
+    BLIND_STEPS,
+    EVALUATIONS,
+    PASS_TIME,
+    PAST_SIGMA,
+    PAST_TIME,
+    SIGMA,
+    STEP,
+    STRADDLING,
+)
+from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
 
 NEVER = 1e300
@@ -46,6 +57,8 @@ def forget(h, w, t):
     c = h[CONTROL]
     w[index(c + PAST_SIGMA)], w[index(c + PAST_TIME)] = w[index(c + SIGMA)], t
     w[index(c + PASS_TIME)], w[index(c + STRADDLING)] = NEVER, 0.0
+    blind = 0.0 < w[index(c + SIGMA)] and w[index(c + SIGMA)] ** 2 < BLIND
+    w[index(c + BLIND_STEPS)] = w[index(c + BLIND_STEPS)] + 1.0 if blind else 0.0
 
 
 @kernel
@@ -55,6 +68,11 @@ def zero_ahead(sigma, fall, past, span):
     if bend >= 0.0:
         return sigma / fall
     return (np.sqrt(fall * fall - 2.0 * bend * sigma) - fall) / -bend
+
+
+@kernel
+def foresee_nothing(h, f, w, n, t):
+    """Singular poses are stepped over as they come."""
 
 
 def compose(evaluate: Callable) -> Callable:

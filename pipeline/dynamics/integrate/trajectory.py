@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics import tables
+from pipeline.dynamics.assembly.pivots import PIVOT_SIZE
 from pipeline.dynamics.integrate import singular, state
 from pipeline.dynamics.integrate.engine import Engine, Progress
 from pipeline.dynamics.tables import MODE
@@ -103,7 +103,7 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     n[state.N_RECORDED], n[state.NEXT_OUTPUT] = 1, 1
     ratio = singular.select_rows(engine, y, engine.start)
     engine.view("Y", len(y))[:] = y
-    engine.view("PIVOT", tables.PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    engine.view("PIVOT", PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
     events = np.full((room + state.ROOM, state.EVENT_SIZE), np.nan)
     return _Run(engine.w, n, outputs, rows, events, [(engine.start, engine.kept.copy())])
 
@@ -146,6 +146,8 @@ def _refusal(engine: Engine, run: _Run) -> str:
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
+        state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
+        f"({where}); give it another motion",
         state.LOST_CLOSURE: "the loops cannot be kept closed: a singular pose in which they can go on in several ways "
         f"({where})",
     }

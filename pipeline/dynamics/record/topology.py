@@ -88,16 +88,16 @@ def _passes(engine: Engine, trajectory: Trajectory, values: np.ndarray) -> list[
     least = values[:, -1]
     lowest = np.r_[True, least[1:] <= least[:-1]] & np.r_[least[:-1] <= least[1:], True]
     valleys = np.flatnonzero(lowest & (least < LOW * np.median(least)))
-    starts = {int(k) for k in (*(valleys - 1), *valleys) if 0 <= k < len(least) - 1}
-    found = (_pass_after(engine, trajectory, k) for k in sorted(starts))
+    regular = np.flatnonzero(least > ZERO * values[:, 0])
+    ends = {int(k) for side in ("left", "right") for k in np.searchsorted(regular, valleys, side=side)}
+    found = (_pass_before(engine, trajectory, regular, k) for k in sorted(ends) if 0 < k < len(regular))
     return [p for p in found if p is not None]
 
 
-def _pass_after(engine: Engine, trajectory: Trajectory, k: int) -> Pass | None:
-    """The pass between rows k and k + 1, if there is one."""
-    jacobian = _between(engine, trajectory, k)
+def _pass_before(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int) -> Pass | None:
+    """The pass between the regular rows k - 1 and k, if there is one."""
+    jacobian = _between(engine, trajectory, regular, k)
     U, _, Vt = np.linalg.svd(jacobian(0.0), full_matrices=False)
-
     B = U.T @ jacobian(1.0) @ Vt.T
     lost = int(np.sum(np.linalg.eigvalsh(0.5 * (B + B.T)) < 0.0))
     if not lost:
@@ -107,23 +107,23 @@ def _pass_after(engine: Engine, trajectory: Trajectory, k: int) -> Pass | None:
         return float(np.linalg.svd(jacobian(share), compute_uv=False)[-1])
 
     share = float(minimize_scalar(least, bounds=(0.0, 1.0), method="bounded", options={"xatol": WITHIN}).x)
-    times = trajectory.time
+    start, end = trajectory.time[regular[k - 1]], trajectory.time[regular[k]]
     there = np.linalg.svd(jacobian(share))
     joint = singular.worst_joint(engine, there[0][:, -1])
-    return Pass(float(times[k] + share * (times[k + 1] - times[k])), singular.condition(there[1]), lost, joint)
+    return Pass(float(start + share * (end - start)), singular.condition(there[1]), lost, joint)
 
 
-def _between(engine: Engine, trajectory: Trajectory, k: int) -> Callable[[float], np.ndarray]:
-    """Scaled closure Jacobian at a share of the way from row k to k + 1.
+def _between(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int) -> Callable[[float], np.ndarray]:
+    """Scaled closure Jacobian at a share of the way from regular row k - 1 to k.
 
     On the polynomial that has the states and their rates at these rows and, where the motion is smooth, at their
     neighbours.
     """
     times, first = trajectory.time, 1 + 2 * len(engine.built.system.contacts)
-    start, end = float(times[k]), float(times[k + 1])
-    engine.keep(trajectory.selection(k + 1))
+    start, end = float(times[regular[k - 1]]), float(times[regular[k]])
+    engine.keep(trajectory.selection(int(regular[k])))
     engine.select_pieces(0.5 * (start + end))
-    nodes = [k, k + 1] if engine.built.system.contacts else _smooth(engine, times, k)
+    nodes = regular[k - 1 : k + 1] if engine.built.system.contacts else _smooth(engine, times, regular, k)
     states, rates = trajectory.rows[nodes, first:], []
     for t, y in zip(times[nodes], states, strict=True):
         engine.attempt(y, float(t))
@@ -138,12 +138,13 @@ def _between(engine: Engine, trajectory: Trajectory, k: int) -> Callable[[float]
     return jacobian
 
 
-def _smooth(engine: Engine, times: np.ndarray, k: int) -> list[int]:
-    """Rows from k - 1 to k + 2 with no break of a law between them."""
+def _smooth(engine: Engine, times: np.ndarray, regular: np.ndarray, k: int) -> np.ndarray:
+    """Regular rows from k - 2 to k + 1 with no break of a law between them."""
     breaks = engine.breaks
-    low, high = np.searchsorted(breaks, times[k], side="right") - 1, np.searchsorted(breaks, times[k + 1])
-    rows = range(max(k - 1, 0), min(k + 3, len(times)))
-    return [j for j in rows if breaks[low] <= times[j] <= breaks[min(high, len(breaks) - 1)]]
+    before = breaks[np.searchsorted(breaks, times[regular[k - 1]], side="right") - 1]
+    after = breaks[np.searchsorted(breaks, times[regular[k]])]
+    near = regular[max(k - 2, 0) : k + 2]
+    return np.asarray(near[(times[near] >= before) & (times[near] <= after)])
 
 
 def _refuse_rest(found: list[Pass], trajectory: Trajectory, kinetic: np.ndarray) -> None:
