@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
-__all__ = ["cost", "load_scene", "run"]
+__all__ = ["cost", "equilibrium", "frequencies", "load_scene", "run"]
 
 
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
@@ -55,5 +55,52 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
     """
     study: Any = import_module("stages.cost")
     run_: Any = import_module("stages.run")
-    dataset: xr.Dataset = study.bring(load_scene(scene) if isinstance(scene, (str, Path)) else scene, run_.workplace())[0]
+    dataset: xr.Dataset = study.bring(load_scene(scene) if isinstance(scene, (str, Path)) else scene, run_.workplace())[
+        0
+    ]
     return dataset
+
+
+def equilibrium(
+    scene: Scene | str | Path,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    moving: bool = False,
+) -> xr.Dataset:
+    """Static equilibrium of a mechanism near its start pose, the drives held (schema EQUILIBRIUM).
+
+    time: at which the drives' laws give their positions [s], the scene's start when None.
+    drives: positions [m or rad] by drive, instead of the law's.
+    moving: the drives keep the speed of that moment; the pose is then one of steady motion, as of a rotor.
+    A drive that does not hold the mechanism leaves it free to settle: a ball falls onto its socket's floor.
+    Raises FlexclearError: InputError, SolverError (also when nothing balances the loads) or ResourceError.
+    """
+    return _linear(scene, time, drives, moving=moving, vibrations=False)
+
+
+def frequencies(
+    scene: Scene | str | Path,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    moving: bool = False,
+) -> xr.Dataset:
+    """Natural frequencies, damping and shapes of the assembled mechanism about `equilibrium` (schema LINEAR).
+
+    Arguments and errors as there.
+    """
+    return _linear(scene, time, drives, moving=moving, vibrations=True)
+
+
+def _linear(
+    scene: Scene | str | Path,
+    time: float | None,
+    drives: Mapping[str, float] | None,
+    *,
+    moving: bool,
+    vibrations: bool,
+) -> xr.Dataset:
+    stages: Any = import_module("stages.run")
+    scene = load_scene(scene) if isinstance(scene, (str, Path)) else scene
+    return stages.linear(scene, time, drives, moving=moving, vibrations=vibrations)

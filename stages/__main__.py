@@ -59,6 +59,11 @@ def parser() -> argparse.ArgumentParser:
     command = _verb(verbs, "render", _render, "pictures, film and interactive page of scenes")
     command.add_argument("scenes", nargs="+", metavar="SCENE")
 
+    command = _verb(verbs, "frequencies", _frequencies, "equilibrium in a pose, and natural frequencies there")
+    command.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
+    command.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
+    command.add_argument("--moving", action="store_true", help="the drives keep their speed: steady motion")
+
     _verb(verbs, "report", _report, "all figures and tables of the paper, and results/report/index.html")
     _verb(verbs, "schema", _schema, "JSON schema of scene files")
 
@@ -116,6 +121,18 @@ def _render(options: argparse.Namespace) -> None:
 
     graphs = run.graphs(options.scenes)
     run.check(run.workplace().bring([graph.render for graph in graphs]))
+
+
+def _frequencies(options: argparse.Namespace) -> None:
+    from pipeline.core.units import quantity
+    from stages import frequencies, run
+
+    (graph,) = run.graphs([options.scene])
+    try:
+        time = None if options.at is None else quantity(options.at, "time")
+    except ValueError as error:
+        raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
+    print(frequencies.text(run.linear(graph.scene, time, moving=options.moving)), end="")
 
 
 def _report(options: argparse.Namespace) -> None:

@@ -59,7 +59,7 @@ def _integration(scene: Scene) -> Iterator[Design]:
         for power in range(loosest, tightest - 1, -1):
             rtol = 10.0**power
             solver = {"integrator": method, "rtol": rtol}
-            yield design("tolerance", solver, adaptive_integrator=method, tolerance=rtol)
+            yield design("tolerance", solver, adaptive_integrator=method, rtol=rtol)
     for method, steps in STEPS.items():
         for step in steps:
             yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)

@@ -12,7 +12,7 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s4_simulate, s6_render
+from stages import s1_mesh, s2_modes, s4_linear, s4_simulate, s6_render
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
@@ -103,6 +103,22 @@ class Graph:
         """Pictures and film."""
         inputs = {"run": self.simulate, **self._bundles()}
         return self._scene_task("render", "stages.s6_render:run", {"gl": s6_render.gl_state()}, inputs)
+
+    def linear(
+        self,
+        time: float | None = None,
+        drives: Mapping[str, float] | None = None,
+        *,
+        moving: bool = False,
+        vibrations: bool = True,
+    ) -> Task:
+        """Equilibrium in one pose; with its natural vibrations shown as ``linear.nc``, else as ``equilibrium.nc``."""
+        params = s4_linear.params(self.scene, time, drives, moving=moving, vibrations=vibrations)
+        name = "linear" if vibrations else "equilibrium"
+        modules = s4_simulate.modules(self.scene)
+        return self._scene_task(
+            name, "stages.s4_linear:run", params, self._bundles(), names={"nc": f"{name}.nc"}, modules=modules
+        )
 
     def up_to(self, stage: str) -> list[Task]:
         """All tasks of the scene up to a stage, that stage included."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -78,6 +79,28 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     place = place or workplace()
     task = Graph(scene, shown=_as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
+    outcome = place.bring([task], jobs=1)
+    check(outcome)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+
+
+def linear(
+    scene: Scene,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    moving: bool = False,
+    vibrations: bool = True,
+    place: Workplace | None = None,
+) -> xr.Dataset:
+    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
+    if time is not None and not scene.time.start <= time <= scene.time.end:
+        raise InputError(
+            "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
+        )
+    place = place or workplace()
+    graph = Graph(scene, shown=_as_in_its_file(scene))
+    task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     outcome = place.bring([task], jobs=1)
     check(outcome)
     return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)

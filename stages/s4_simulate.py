@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stages.families import module
+from stages.families import constants, module
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +30,15 @@ KERNELS = (
     "integrate.stepper",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
-CONTACT_KERNELS = ("integrate.events",)
+STIFFENING_KERNELS = ("bodies.shortening",)
+CONTACT_KERNELS = (
+    "contact.forces",
+    "contact.form.elastic",
+    "contact.form.hysteretic",
+    "contact.form.linear_damper",
+    "contact.validity",
+    "integrate.events",
+)
 #: of scenes with contacts that are noticed at step ends, and of fixed or chosen steps
 UNLOCATED_KERNELS = ("integrate.step_ends",)
 FIXED_KERNELS, ADAPTIVE_KERNELS = ("integrate.fixed",), ("integrate.adaptive",)
@@ -64,11 +72,16 @@ def modules(scene: Scene) -> tuple[str, ...]:
     kernels += (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
     kernels += UNLOCATED_KERNELS if scene.contacts() and scene.solver.events != "located" else ()
     kernels += (LOAD_KERNELS if scene.forces() else ()) + (("drives.oscillation",) if "harmonic" in laws else ())
+    if any(body.stiffening is not None for body in scene.flexible().values()):
+        kernels += STIFFENING_KERNELS
     found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
     for name, joint in scene.joint.items():
         table = "CONTACTS" if name in scene.contacts() else "NAMES"
         found.add(module(joints, joint.type, where=f"[joint.{name}]", table=table))
-    if any(j.type in ("universal", "cylindrical", "planar") for j in scene.joint.values()) or any(
+        if joint.type in constants(joints)["HELD"]:
+            found.add(module(joints, constants(joints)["HELD"][joint.type], where=f"[joint.{name}]"))
+    several = ("universal", "cylindrical", "planar", *constants(joints)["HELD"])
+    if any(j.type in several for j in scene.joint.values()) or any(
         not hasattr(d, "joint") for d in scene.drive.values()
     ):
         found |= {module(joints, name, where="joint") for name in CHAIN}

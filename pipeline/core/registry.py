@@ -24,9 +24,9 @@ def lookup(package: str, name: str, *, where: str) -> Any:
     return getattr(import_module(f"{package}.{module}"), attribute)
 
 
-def module_of(package: str, name: str) -> str:
-    """Full name of the module that `lookup` would import, without importing it."""
-    return f"{package}.{import_module(package).NAMES[name].partition(':')[0]}"
+def module_of(package: str, name: str, table: str = "NAMES") -> str:
+    """Full name of the module that a family's table lists under `name`, without importing it."""
+    return f"{package}.{getattr(import_module(package), table)[name].partition(':')[0]}"
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:

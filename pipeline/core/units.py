@@ -70,7 +70,7 @@ def quantity(value: object, dimension: str) -> float:
     belongs to another dimension, or the number is not finite.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"expected a {dimension}, a number or text like '1 {_example(dimension)}'")
+        raise ValueError(f"expected {_a(dimension)}, a number or text like '1 {_example(dimension)}'")
     if isinstance(value, str):
         match = _QUANTITY.match(value)
         if match is None:
@@ -79,11 +79,11 @@ def quantity(value: object, dimension: str) -> float:
         if unit is None:
             factor = 1.0
         elif unit not in UNITS:
-            raise ValueError(f"unknown unit '{unit}'; a {dimension} is written in {_known(dimension)}")
+            raise ValueError(f"unknown unit '{unit}'; {_a(dimension)} is written in {_known(dimension)}")
         else:
             factor, found = UNITS[unit]
             if found != dimension:
-                raise ValueError(f"'{value}' is a {found}, but a {dimension} belongs here")
+                raise ValueError(f"'{value}' is {_a(found)}, but {_a(dimension)} belongs here, in {_known(dimension)}")
         result = number * factor
     else:
         result = float(value)
@@ -106,6 +106,10 @@ def any_quantity(value: object) -> float | str:
         raise ValueError(f"unknown unit '{unit}'; known: {', '.join(UNITS)}")
     dimension = UNITS[unit][1]
     return f"{quantity(value, dimension)!r} {_example(dimension, factor=1.0)}"
+
+
+def _a(dimension: str) -> str:
+    return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 
 
 def _known(dimension: str) -> str:

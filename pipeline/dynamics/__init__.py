@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 Progress = Callable[[float | None, str], None]
 
-__all__ = ["ensemble", "simulate"]
+__all__ = ["ensemble", "equilibrium", "frequencies", "simulate"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -22,11 +22,14 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
-    from pipeline.dynamics.record.dataset import dataset
+    from pipeline.dynamics.record.dataset import contact_warnings, dataset
     from pipeline.dynamics.run import integrate
 
     def once(edited: Scene) -> xr.Dataset:
-        return dataset(integrate(edited, bundles, progress))
+        done = integrate(edited, bundles, progress)
+        for sentence in contact_warnings(done.engine.built, done.trajectory):
+            progress(None, f"warning: {sentence}")
+        return dataset(done)
 
     if scene.accuracy is None or not scene.accuracy.quantities:
         return once(scene)
@@ -40,3 +43,37 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     from pipeline.dynamics.record.ensemble import ensemble as run
 
     return run(scene, bundles, progress)
+
+
+def equilibrium(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    moving: bool = False,
+) -> xr.Dataset:
+    """Static equilibrium near the scene's start pose, its drives held (schema EQUILIBRIUM).
+
+    time: at which the drives' laws give their positions [s]; the start when None.  drives: positions [m or rad] by
+    name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.
+    Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
+    """
+    from pipeline.dynamics.linear import dataset, solve
+
+    return dataset.equilibrium(*solve.equilibrium(scene, bundles, progress, time, drives, moving), moving)
+
+
+def frequencies(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    moving: bool = False,
+) -> xr.Dataset:
+    """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
+    from pipeline.dynamics.linear import dataset, solve, vibrations
+
+    bench, found = solve.equilibrium(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, found, vibrations.vibrations(bench, found.at), moving)

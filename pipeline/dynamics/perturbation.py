@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics.integrate.engine import Engine, project
-from pipeline.dynamics.tables import BALL, FRAME_SIZE, SOCKET, VELOCITY
+from pipeline.dynamics.tables import FRAME_SIZE, INNER, OUTER, VELOCITY
 
 
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -28,7 +28,7 @@ def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
     sites = engine.view("SITE_FRAMES", FRAME_SIZE * engine.built.packed.sizes["N_SITES"]).reshape(-1, FRAME_SIZE)
     table = engine.built.packed.table("CONTACTS")
     return np.concatenate(
-        [sites[b, VELOCITY : VELOCITY + 3] - sites[s, VELOCITY : VELOCITY + 3] for s, b in table[:, [SOCKET, BALL]]]
+        [sites[b, VELOCITY : VELOCITY + 3] - sites[a, VELOCITY : VELOCITY + 3] for a, b in table[:, [OUTER, INNER]]]
     )
 
 

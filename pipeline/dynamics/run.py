@@ -18,6 +18,7 @@ from pipeline.dynamics.integrate.beside import beside
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
+from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.tables import SINGULAR
 
 if TYPE_CHECKING:
@@ -56,7 +57,9 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     engine = prepare(tabulate(build(driven, bundles), given), progress)
     start, residual = consistent_start(engine)
     trajectory = step(engine, start, progress)
-    return Run(scene, engine, trajectory, observed(engine, trajectory), residual, _twin(engine, start, trajectory))
+    seen = observed(engine, trajectory)
+    require_closed(engine.built, trajectory, seen)
+    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory))
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:

@@ -49,7 +49,9 @@ WIRING = {
     "CLOSURE_PAIRS": 4,  # closure a, closure b >= a, start and number of their common slots
     "COMMON": 2,  # slot in a, slot in b
     "CLOSURE_ENVELOPE": 2,  # of the rows that are solved for
-    "CONTACTS": 4,  # socket site, ball site, normal law, friction law
+    # outer site, inner site, form of the normal law, friction law or -1, surfaces, place of the bristles'
+    # deflection in the state or -1
+    "CONTACTS": 6,
     "LAWS": 2,  # first piece, number of pieces; the drives' laws first
     "PIECE_HARMONICS": 2,  # first harmonic, number of harmonics
     "LOADS": 12,  # see `loads.fields`
@@ -65,7 +67,8 @@ NUMBERS = {
     "MOMENT_VALUES": 1,
     "PORT_NUMBERS": 12,  # undeformed position (3), rotation (9)
     "PORT_DATA": 1,  # per port: translation shape (3n), rotation shape (3n)
-    "CONTACT_NUMBERS": 11,  # clearance, ball radius, floor, normal law (4), friction law (4)
+    # clearance, radius of the inner surface, floor, sticking speed, normal law (4), friction law (6)
+    "CONTACT_NUMBERS": 14,
     "PIECES": 9,  # start, eight coefficients
     "HARMONICS": 3,  # amplitude, angular frequency, phase
     "LOAD_NUMBERS": 5,  # see `loads`
@@ -83,7 +86,10 @@ _PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *
 HEADER = len(_PLACE)
 #: places that only the kernels of some effects need, which name them themselves
 ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT ROW_SCALE PIVOT".split()
-ELSEWHERE += "N_KEPT_ROWS JACOBIAN_SIZE N_CLOSURE_PAIRS".split()
+ELSEWHERE += (
+    "N_KEPT_ROWS JACOBIAN_SIZE SCHUR_SIZE N_CLOSURE_PAIRS N_KNOWN_ENTRIES KNOWN_ENTRIES CLOSURE_PAIRS COMMON".split()
+)
+ELSEWHERE += "CLOSURE_ENVELOPE CLOSURE_ROWS SUPPORT ENTRIES GAMMA JACOBIAN SPREAD SCHUR".split()
 
 
 def place(name: str) -> int:
@@ -105,10 +111,8 @@ def place(name: str) -> int:
     N_LEDGER,
     N_PAIRS,
     N_KNOWN_PAIRS,
-    N_KNOWN_ENTRIES,
     N_GROUPS,
     MASS_SIZE,
-    SCHUR_SIZE,
     MOST_MODES,
     N_LAWS,
     N_LOADS,
@@ -124,13 +128,6 @@ def place(name: str) -> int:
     KNOWN_PAIRS,
     ENVELOPE,
     CLOSURES,
-    CLOSURE_ROWS,
-    SUPPORT,
-    ENTRIES,
-    KNOWN_ENTRIES,
-    CLOSURE_PAIRS,
-    COMMON,
-    CLOSURE_ENVELOPE,
     CONTACTS,
     GROUPS,
 ) = (place(name) for name in WIRING if name not in ELSEWHERE)
@@ -169,10 +166,6 @@ def place(name: str) -> int:
     ROWS,
     RESIDUAL,
     RESIDUAL_RATE,
-    GAMMA,
-    JACOBIAN,
-    SPREAD,
-    SCHUR,
     MULTIPLIER,
     TOUCH,
     LAW,
@@ -199,8 +192,8 @@ PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)
 FLEX_LINK, N_MODES, FLEX_Q0, FLEX_C0, DATA0, MOMENT0, N_MOMENTS, FLEX_INBOARD = range(8)
 PORT_FLEX, PORT_COLUMN, PORT_SHAPES = range(3)
 SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES, KEPT0, N_KEPT = range(11)
-SOCKET, BALL, NORMAL_KIND, FRICTION_KIND = range(4)
-CLEARANCE, BALL_RADIUS, FLOOR, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 7
+OUTER, INNER, NORMAL_KIND, FRICTION_KIND, SURFACES, BRISTLE = range(6)
+CLEARANCE, RADIUS, FLOOR, STICK_SPEED, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 4, 8
 # a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
 ORIGIN, AXES, OMEGA, VELOCITY, ALPHA, ACCELERATION, FRAME_SIZE = 0, 3, 12, 15, 18, 21, 24
 # a joint's motion: rotation (9), position (3), rates (3 + 3), rate biases (3 + 3), then columns (6 each)
@@ -211,15 +204,16 @@ LAW_SIZE, PIECE_SIZE, LOAD_SIZE, LOAD_STORED = 3, 9, 11, 8
 # spatial inertia: mass, mass * centre (3), inertia about the kernels' origin (xx yy zz xy xz yz)
 INERTIA_SIZE = 10
 # what a contact does now
-GAP, RATE, NORMAL_FORCE, FRICTION_POWER, DAMPING_POWER, STORED = range(6)
-TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 6, 9, 12, 15
-# ledger before the contacts' slots (normal, friction each): work of drives, loss of modal damping
+GAP, RATE, NORMAL_FORCE, FRICTION_POWER, DAMPING_POWER, STORED, BENT, SLIP = range(8)
+TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 8, 11, 14, 17
+# ledger before the contacts' slots (normal loss, work of friction each; then three deflections of each contact
+# with bristles): work of drives, loss of modal damping
 DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
 # what evaluate reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
-#: first entries of n, the integers that change: report of the last evaluation; then the laws' active pieces
-#: and the contacts' modes start where n[ACTIVE] and n[MODE] say
-EVALUATION, ACTIVE, MODE = range(3)
+#: first entries of n, the integers that change: report of the last evaluation; where the laws' active pieces
+#: and the contacts' modes start in n; where the state being evaluated starts in w
+EVALUATION, ACTIVE, MODE, STATE = range(4)
 
 
 @kernel
@@ -249,7 +243,13 @@ def closure(h, c, field):
 @kernel
 def contact(h, c, field):
     """A field of contact c."""
-    return h[index(h[CONTACTS] + 4 * c + field)]
+    return h[index(h[CONTACTS] + 6 * c + field)]
+
+
+@kernel
+def contact_numbers(h, c):
+    """Where f holds the numbers of contact c."""
+    return h[CONTACT_NUMBERS] + 14 * c
 
 
 @kernel

@@ -19,9 +19,9 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
         return {}
     contact = run.event_contact.values.astype(int)
     speed = run.event_approach_speed.values
-    closings = closing(run)
+    closings, openings = of_kind(run, "closing"), of_kind(run, "opening")
     strong = np.flatnonzero(closings & (speed > IMPACT))
-    opens = np.array([_next_opening(int(i), contact, closings) for i in strong], dtype=int)
+    opens = np.array([_next_opening(int(i), contact, openings) for i in strong], dtype=int)
     kept, opens = strong[opens >= 0], opens[opens >= 0]
     peak = run.event_peak_force.values[kept]
     return {
@@ -35,17 +35,17 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     }
 
 
-def closing(run: xr.Dataset) -> np.ndarray:
-    """True for the events that close a gap, shape (event,)."""
+def of_kind(run: xr.Dataset, name: str) -> np.ndarray:
+    """True for the events of a kind, e.g. those that close a gap, shape (event,)."""
     kind = run.event_kind.values
     if kind.dtype.kind in "US" or kind.dtype == object:
-        return np.array([str(k) == "closing" for k in kind], dtype=bool)
+        return np.array([str(k) == name for k in kind], dtype=bool)
     meanings = str(run.event_kind.attrs.get("flag_meanings", "opening closing")).split()
     values = np.atleast_1d(run.event_kind.attrs.get("flag_values", np.arange(len(meanings))))
-    return np.asarray(kind == values[meanings.index("closing")])
+    return np.asarray(kind == values[meanings.index(name)])
 
 
-def _next_opening(i: int, contact: np.ndarray, closings: np.ndarray) -> int:
+def _next_opening(i: int, contact: np.ndarray, openings: np.ndarray) -> int:
     """Index of the first opening of the same contact after event i, or -1."""
-    later = np.flatnonzero((contact[i + 1 :] == contact[i]) & ~closings[i + 1 :])
+    later = np.flatnonzero((contact[i + 1 :] == contact[i]) & openings[i + 1 :])
     return int(i + 1 + later[0]) if later.size else -1

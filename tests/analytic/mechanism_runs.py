@@ -41,11 +41,15 @@ def _bundle(recipe: str, modes: Modes) -> xr.Dataset:
 
 def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:
     """Closings with an approach speed [m/s] above `least`, with their times, speeds, forces and rebounds."""
-    kind = np.array([_is_closing(k) for k in dataset.event_kind.values])
     time, speed = dataset.event_time.values, dataset.event_approach_speed.values
-    rebound = np.full(len(kind), np.nan)
-    for i in np.flatnonzero(kind[:-1] & ~kind[1:]):
-        rebound[i] = speed[i + 1]
+    meanings = dataset.event_kind.attrs["flag_meanings"].split()
+    kind = dataset.event_kind.values == meanings.index("closing")
+    ends = dataset.event_kind.values == meanings.index("opening")
+    contact, rebound = dataset.event_contact.values, np.full(len(kind), np.nan)
+    for i in np.flatnonzero(kind):
+        later = np.flatnonzero(ends[i:] & (contact[i:] == contact[i]))
+        if len(later):
+            rebound[i] = speed[i + later[0]]
     hard = kind & (speed > least)
     return {
         "start": time[hard],
@@ -54,7 +58,3 @@ def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:
         "peak_force": dataset.event_peak_force.values[hard],
         "duration": dataset.event_duration.values[hard],
     }
-
-
-def _is_closing(kind: object) -> bool:
-    return kind in ("closing", b"closing") if isinstance(kind, (str, bytes)) else kind == 1

@@ -13,7 +13,9 @@ import pytest
 
 from pipeline.core.scene.load import compose, load_scene
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics import loads
 from pipeline.dynamics.assembly import fuse
+from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds, tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.integrate.method import Scheme, scheme_of
@@ -23,7 +25,9 @@ CONTACT = (
     "pipeline.dynamics.contact",
     "pipeline.dynamics.joints.clearance_spherical",
     "pipeline.dynamics.integrate.events",
+    "pipeline.dynamics.integrate.trace",
 )
+LOADS = ("pipeline.dynamics.loads.fields", "pipeline.dynamics.loads.composing", "pipeline.dynamics.drives.oscillation")
 FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
@@ -55,16 +59,15 @@ def below(names: set[str], families: tuple[str, ...]) -> set[str]:
 def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: Path) -> None:
     names = imported_by_a_run(root, IDEAL)
     assert "pipeline.dynamics.joints.spherical" in names
-    assert below(names, (*CONTACT, *FLEXIBLE)) == set()
+    assert below(names, (*CONTACT, *FLEXIBLE, *LOADS)) == set()
 
 
 def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     """Also shows that the test above would notice."""
     names = imported_by_a_run(root, CSJ)
     laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
-    normal = {"pipeline.dynamics.contact.normal.lankarani_nikravesh", "pipeline.dynamics.contact.normal.hertz"}
-    # Lankarani and Nikravesh's law is written with Hertz's power
-    assert laws == normal | {"pipeline.dynamics.contact.friction.modified_coulomb"}
+    normal = {"pipeline.dynamics.contact.normal.lankarani_nikravesh"}
+    assert laws == normal | {f"pipeline.dynamics.contact.friction.{n}" for n in ("modified_coulomb", "memoryless")}
     assert below(names, FLEXIBLE) == set()
 
 
@@ -88,22 +91,33 @@ def reached(source: str) -> set[str]:
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
     "contact": ("clearance_spherical", "pipeline.dynamics.joints.clearance_spherical"),
-    "normal law": ("lankarani_nikravesh", "pipeline.dynamics.contact.normal.lankarani_nikravesh"),
+    "normal law": ("import force as form_force", "pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
     "closures": ("import closures", "pipeline.dynamics.assembly.closures"),
+    "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
+    "loads": ("import composing", "pipeline.dynamics.loads.composing"),
+    "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),
 }
-LN, COULOMB = ("lankarani-nikravesh",), ("modified-coulomb",)
+SPRING, NONE = ("spring-damper",), ContactKinds()
+SMOOTH = ContactKinds(("clearance-spherical",), ("hysteretic",))
+RUBBING = ContactKinds(("clearance-spherical",), ("hysteretic",), ("modified-coulomb",))
 CASES = {
-    "tree": (Kinds(("spherical",), (), (), False, False), set()),
-    "ideal": (Kinds(("prismatic", "spherical"), (), (), False, True), {"closures"}),
-    "smooth clearance": (Kinds(("free",), LN, (), False, False), {"contact", "normal law"}),
+    "tree": (Kinds(("spherical",), NONE, False, False), set()),
+    "ideal": (Kinds(("prismatic", "spherical"), NONE, False, True), {"closures"}),
+    "smooth clearance": (Kinds(("free",), SMOOTH, False, False), {"contact", "normal law"}),
     "clearance": (
-        Kinds(("prismatic", "spherical"), LN, COULOMB, False, True),
+        Kinds(("prismatic", "spherical"), RUBBING, False, True),
         {"contact", "normal law", "friction", "closures"},
     ),
-    "flexible": (Kinds(("fixed",), (), (), True, False), {"flexible bodies"}),
-    "everything": (Kinds(("fixed", "spherical"), LN, COULOMB, True, True), set(EFFECTS)),
+    "flexible": (Kinds(("fixed",), NONE, True, False), {"flexible bodies"}),
+    "stiffened": (Kinds(("fixed",), NONE, True, False, stiffening=True), {"flexible bodies", "stiffening"}),
+    "springs": (Kinds(("prismatic",), NONE, False, False, loads=SPRING), {"loads"}),
+    "waves": (Kinds(("prismatic",), NONE, False, False, harmonics=True), {"harmonics"}),
+    "everything": (
+        Kinds(("fixed", "spherical"), RUBBING, True, True, True, ("joint-friction", *SPRING), stiffening=True),
+        set(EFFECTS),
+    ),
 }
 
 
@@ -123,6 +137,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     found, present = CASES[case]
     modules = reached(fuse._source(found, SCHEME))
     wanted = {fuse.module_of(fuse.PACKAGES["joint"], n) for n in found.joints}
+    wanted.add("pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
         wanted.add("pipeline.dynamics.joints.clearance_spherical")
     assert below(modules, ("pipeline.dynamics.joints",)) == wanted
@@ -130,6 +145,9 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
         assert below(modules, FLEXIBLE) == set()
+    acting = {fuse.module_of(fuse.PACKAGES["load"], n) for n in found.loads}
+    kinds_of_loads = {fuse.module_of(fuse.PACKAGES["load"], n) for n in loads.NAMES}
+    assert modules & kinds_of_loads == acting
 
 
 def test_frictionless_clearance_reaches_no_friction_law() -> None:
@@ -150,8 +168,8 @@ NUMBERS: dict[str, object] = {
     "joint.A1.ball_radius": "15 mm",
     "joint.A1.socket_material.youngs_modulus": "70 GPa",
     "joint.A1.normal.restitution": 0.5,
-    "joint.A1.normal.exponent": 2.0,
-    "joint.A1.friction.static": 0.0,
+    "joint.A1.normal": {"law": "flores", "restitution": 0.5, "exponent": 2.0, "stiffness": 1e13},
+    "joint.A1.friction.static": 0.2,
     "joint.A1.friction.v_static": "0.1 mm/s",
     "joint.A1.floor": "1 mm/s",
     "body.platform.mass": "1 kg",
@@ -163,10 +181,11 @@ NUMBERS: dict[str, object] = {
     "drive.P1.law.change": ["30 mm", "-30 mm"],
     "drive.P2.law": {"type": "constant", "value": 0.0},
     "drive.P3.law": {"type": "step", "start": [0.0], "end": [0.1], "change": ["1 mm"]},
+    "drive.P4.law": {"type": "spline", "time": [0.0, 0.1, 0.2], "value": ["0 mm", "2 mm", "1 mm"]},
     "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
     "time.end": "1 s",
     "output": {"interval": "1 ms"},
-    "solver": {"rtol": 1e-8},
+    "solver": {"rtol": 1e-8, "evaluations": 1000},
 }
 
 
@@ -226,7 +245,7 @@ def test_a_flexible_rod_makes_another_kind_of_mechanism(root: Path) -> None:
     rigid, flexible = (kinds(path_of(root, name)) for name in (CSJ, "sps4/far_csj_cb"))
     assert not rigid.flexible
     assert flexible.flexible
-    assert (rigid.normals, rigid.frictions, rigid.closures) == (flexible.normals, flexible.frictions, flexible.closures)
+    assert (rigid.contacts, rigid.closures) == (flexible.contacts, flexible.closures)
 
 
 def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(root: Path) -> None:

@@ -2,40 +2,80 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from pydantic import TypeAdapter
 
-from pipeline.core.registry import lookup
-from pipeline.core.scene.parts import Constant, Step
+from pipeline.core.scene.laws import Law, Step
 from pipeline.dynamics import drives
+from pipeline.dynamics.assembly import known, laws
+from pipeline.dynamics.drives.oscillation import oscillate
+from pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from pipeline.dynamics.tables import ACTIVE, HEADER, LAW, N_LAWS, PIECES, place
 from tests.analytic.mechanism_runs import run
 
+KNOWN_MOTION = known.compose(oscillate)
 #: eq. (35): 60 mm out and back
 STROKE = Step(type="step", start=(0.0, 0.09), end=(0.09, 0.18), change=(0.06, -0.06))
+WAVES = {"type": "harmonic", "amplitude": [0.3, -0.1], "frequency": [2.0, "1.5 Hz"], "phase": [0.4, "90 deg"]}
+POINTS: dict[str, Any] = {"time": [0.0, 0.1, 0.3, 0.35, 0.6, 0.8, 1.0], "value": [0.0, 0.2, 0.1, 0.4, -0.3, 0.0, 0.0]}
+TABLE = {"file": "moves.csv", "time": {"column": "t", "unit": "s"}, "value": {"column": "x", "unit": "mm"}}
+RAMP = {"type": "polynomial", "coefficients": [0.1, -0.2, 0.5, 0.0, 0.0, 0.3, 0.0, -0.7], "origin": 0.2}
 #: drive law -> instances; overlapping steps, gaps and a step of no change among them
-LAWS: dict[str, tuple[Any, ...]] = {
-    "constant": (Constant(type="constant", value=0.012), Constant(type="constant")),
+TABLES: dict[str, tuple[Any, ...]] = {
+    "constant": ({"type": "constant", "value": 0.012}, {"type": "constant"}),
     "step": (
         STROKE,
-        Step(type="step", start=(0.2, 0.0, 0.25), end=(0.3, 0.5, 0.26), change=(0.1, -0.2, 0.05)),
-        Step(type="step", start=(0.1, 0.7), end=(0.4, 0.8), change=(0.0, 1.0)),
+        {"type": "step", "start": [0.2, 0.0, 0.25], "end": [0.3, 0.5, 0.26], "change": [0.1, -0.2, 0.05]},
+        {"type": "step", "start": [0.1, 0.7], "end": [0.4, 0.8], "change": [0.0, 1.0]},
+    ),
+    "polynomial": (RAMP,),
+    "harmonic": ({**WAVES, "offset": -0.2},),
+    "spline": tuple(
+        {"type": "spline", **POINTS, "degree": degree, "ends": ends}
+        for degree in (3, 5)
+        for ends in ("not-a-knot", "natural", "clamped", "periodic")
+    ),
+    "table": ({"type": "table", **TABLE, "points": [(t, 1e3 * t * t) for t in POINTS["time"]]},),
+    "sum": ({"type": "sum", "laws": [RAMP, WAVES, {"type": "spline", **POINTS}]},),
+    "piecewise": (
+        {
+            "type": "piecewise",
+            "sections": [
+                {"start": -0.1, "law": {"type": "harmonic", "amplitude": [0.5], "frequency": [3.0]}},
+                {"start": 0.0, "law": {"type": "polynomial", "coefficients": [0.0, 1.5]}},
+                {"start": 0.5, "law": {"type": "polynomial", "coefficients": [0.75, 1.5, 4.0], "origin": 0.5}},
+            ],
+        },
     ),
 }
+LAWS = {name: tuple(TypeAdapter(Law).validate_python(law) for law in tables) for name, tables in TABLES.items()}
 
 
-def pieces(law: Any) -> np.ndarray:
-    return lookup(drives.__name__, law.type, where="test")(law)
+def pieces(law: Any) -> Pieces:
+    return pieces_of(law, "length")
 
 
 def value(law: Any, t: float, order: int = 0, side: str = "right") -> float:
     """A derivative of the law at t, from the piece that holds right (or left) of it."""
-    table = pieces(law)
-    k = max(int(np.searchsorted(table[:, 0], t, side=side)) - 1, 0)  # type: ignore[call-overload]
-    return float(np.polynomial.Polynomial(table[k, 1:]).deriv(order)(t - table[k, 0]))
+    return pieces(law).value(t, order, side)
+
+
+def compiled(law: Any, t: float, piece: int) -> np.ndarray:
+    """Value, rate and second rate from the kernel, with this piece in force."""
+    wiring, numbers = laws.fill([pieces(law)])
+    shares, h, n = wiring["PIECE_HARMONICS"].ravel(), np.zeros(HEADER, dtype=np.int64), np.zeros(8, dtype=np.int64)
+    f = np.concatenate([numbers["PIECES"].ravel(), numbers["HARMONICS"].ravel()])
+    h[N_LAWS], h[LAW], h[PIECES], h[place("HARMONICS")] = 1, 0, 0, numbers["PIECES"].size
+    h[place("PIECE_HARMONICS")], n[ACTIVE], n[7] = HEADER, 7, piece
+    w = np.zeros(3)
+    KNOWN_MOTION(np.concatenate([h, shares]), f, w, n, t)
+    return w
 
 
 def adams_step(t: float, t0: float, h0: float, t1: float, h1: float) -> float:
@@ -46,8 +86,8 @@ def adams_step(t: float, t0: float, h0: float, t1: float, h1: float) -> float:
 
 def scale(law: Any, order: int) -> float:
     """Size of what is summed in a derivative of the law."""
-    if law.type == "constant":
-        return 1.0
+    if law.type != "step":
+        return 100.0  # of the splines' coefficients, over intervals of 0.05 s
     parts = zip(law.start, law.end, law.change, strict=True)
     return 1e-3 + sum(6.0 * abs(h) / (b - a) ** order for a, b, h in parts)
 
@@ -62,7 +102,7 @@ def test_every_drive_law_is_tried_here() -> None:
 
 @every_law
 def test_value_and_rate_do_not_jump_between_pieces(law: Any) -> None:
-    for t in pieces(law)[:, 0]:
+    for t in pieces(law).starts[1:]:
         for order in (0, 1):
             left, right = (value(law, t, order, side) for side in ("left", "right"))
             # rounding of (t - start) / (end - start)
@@ -71,9 +111,52 @@ def test_value_and_rate_do_not_jump_between_pieces(law: Any) -> None:
 
 @every_law
 def test_pieces_start_in_order(law: Any) -> None:
-    table = pieces(law)
-    assert table.shape[1] == 7
-    assert np.all(np.diff(table[:, 0]) > 0.0)
+    assert np.all(np.diff(pieces(law).starts) > 0.0)
+
+
+@every_law
+def test_the_kernel_evaluates_the_pieces_and_their_exact_derivatives(law: Any) -> None:
+    starts = [*pieces(law).starts, pieces(law).starts[-1] + 0.2]
+    for k, (a, b) in enumerate(pairwise(starts)):
+        for t in (a + 0.3 * (b - a), a + 0.9 * (b - a)):
+            found, h = compiled(law, t, k), 1e-3 * (b - a)
+            # rounding of polynomials of terms as large as `scale`
+            assert found == pytest.approx([value(law, t, order) for order in range(3)], abs=1e-10)
+            around = np.array([compiled(law, t + j * h, k) for j in (-2, -1, 1, 2)])
+            slopes = (8.0 * (around[2] - around[1]) - (around[3] - around[0])) / (12.0 * h)
+            # fourth order in h: 5e5 (the fifth rates of the spline) times h^4 / 30; rounding 1e-15 / h
+            assert slopes[:2] == pytest.approx(found[1:], rel=1e-8, abs=1e-7)
+
+
+@pytest.mark.parametrize("law", LAWS["spline"], ids=lambda law: f"{law.degree}-{law.ends}")
+def test_splines_pass_their_points_as_smoothly_as_they_say(law: Any) -> None:
+    for t, x in zip(law.time, law.value, strict=True):
+        assert value(law, t) == pytest.approx(x, abs=1e-13)
+    for t in pieces(law).starts[1:]:
+        for order in range(law.degree):
+            left, right = (value(law, t, order, side) for side in ("left", "right"))
+            size = max(abs(value(law, s, order)) for s in np.linspace(0.0, 1.0, 50))
+            assert left == pytest.approx(right, abs=1e-9 * max(size, 1.0))
+    ends = {"natural": {3: (2,), 5: (3, 4)}, "clamped": {3: (1,), 5: (1, 2)}}.get(law.ends, {}).get(law.degree, ())
+    for order in ends:
+        size = max(abs(value(law, s, order)) for s in np.linspace(0.0, 1.0, 50))
+        assert [value(law, t, order, "left") for t in (0.0, 1.0)] == pytest.approx([0.0, 0.0], abs=1e-10 * size)
+    if law.ends == "periodic":
+        for order in range(law.degree):
+            size = max(abs(value(law, s, order)) for s in np.linspace(0.0, 1.0, 50))
+            assert value(law, 0.0, order) == pytest.approx(value(law, 1.0, order, "left"), abs=1e-9 * size)
+
+
+def test_a_sum_is_the_sum_and_sections_follow_each_other() -> None:
+    total, (ramp, waves, spline) = LAWS["sum"][0], LAWS["sum"][0].laws
+    for t in (0.05, 0.31, 0.77):
+        for order in range(3):
+            parts = sum(value(law, t, order) for law in (ramp, waves, spline))
+            assert value(total, t, order) == pytest.approx(parts, abs=1e-11)
+    sections = LAWS["piecewise"][0]
+    assert value(sections, -0.5) == pytest.approx(0.5 * np.sin(-1.5), abs=1e-15)
+    assert value(sections, 0.25) == pytest.approx(0.375, abs=1e-15)
+    assert value(sections, 0.7) == pytest.approx(0.75 + 1.5 * 0.2 + 4.0 * 0.04, abs=1e-15)
 
 
 def test_a_constant_drive_holds_its_value() -> None:

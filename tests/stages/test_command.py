@@ -64,6 +64,34 @@ WRONG = {
         SCENE + JOINT + '\n[solver]\nintegrator = "rk5"\n',
         ["[solver]", "no integrator is called 'rk5'", "did you mean 'rk4'"],
     ),
+    "fixed steps of no length": (
+        SCENE + JOINT + '\n[solver]\nintegrator = "rk4"\n',
+        ["[solver]", "rk4 has no error estimate", "give step"],
+    ),
+    "negative step": (
+        SCENE + JOINT + '\n[solver]\nintegrator = "rk4"\nstep = "-1 us"\n',
+        ["[solver.step]", "greater than 0"],
+    ),
+    "step of another dimension": (
+        SCENE + JOINT + '\n[solver]\nstep = "1 mm"\n',
+        ["[solver.step]", "'1 mm' is a length"],
+    ),
+    "steps of a method that chooses them": (
+        SCENE + JOINT + '\n[solver]\nintegrator = "radau"\nstep = "1 us"\n',
+        ["[solver]", "radau chooses its steps by rtol", "remove step"],
+    ),
+    "unlocated events of chosen steps": (
+        SCENE + JOINT + '\n[solver]\nevents = "at step ends"\n',
+        ["[solver]", "needs fixed steps", "give step"],
+    ),
+    "spectral radius above one": (
+        SCENE + JOINT + '\n[solver]\nintegrator = "generalized-alpha"\nrho_inf = 1.5\n',
+        ["[solver.rho_inf]", "less than or equal to 1", "1.5"],
+    ),
+    "spectral radius of a method without one": (
+        SCENE + JOINT + "\n[solver]\nrho_inf = 0.5\n",
+        ["[solver]", "rho_inf belongs to generalized-alpha"],
+    ),
     "no such recipe": (
         SCENE + ROD,
         ["rod.toml", "no such file"],

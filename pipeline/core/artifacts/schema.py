@@ -103,6 +103,24 @@ BUNDLE: Schema = {
     "frame_rotation_shape": _V(
         ("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"
     ),
+    "shortening_first_moment": _V(
+        ("mode", "mode2"),
+        "m-1",
+        "integral of rho times the displacement along x that bending causes, second derivative",
+        optional=True,
+    ),
+    "shortening_second_moment": _V(
+        ("mode", "mode2"),
+        "1",
+        "integral of rho x times the displacement along x that bending causes, second derivative",
+        optional=True,
+    ),
+    "frame_shortening": _V(
+        ("frame", "mode", "mode2"),
+        "kg-1 m-1",
+        "displacement of the frame along x that bending causes, second derivative by modal coordinates",
+        optional=True,
+    ),
     "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
     "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
     "shape_translation": _V(("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"),
@@ -158,7 +176,22 @@ RUN: Schema = {
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
     "contact_force": _V(("time", "contact", "axis"), "N", "contact force on the ball, world axes", optional=True),
     "contact_normal_force": _V(("time", "contact"), "N", "normal contact force, >= 0", optional=True),
-    "contact_friction_power": _V(("time", "contact"), "W", "power of the friction force, <= 0", optional=True),
+    "contact_friction_power": _V(("time", "contact"), "W", "minus the power that friction takes, <= 0", optional=True),
+    "contact_sliding_speed": _V(
+        ("time", "contact"), "m s-1", "sliding speed at the contact; 0 without friction or contact", optional=True
+    ),
+    "contact_elastic": _V(("time", "contact"), "J", "energy stored in the contact and its bristles", optional=True),
+    "contact_damping_loss": _V(
+        ("time", "contact"), "J", "energy lost to the normal damping of the contact since the start", optional=True
+    ),
+    "contact_friction_loss": _V(
+        ("time", "contact"), "J", "energy lost to the friction of the contact since the start", optional=True
+    ),
+    "contact_delivered_restitution": _V(
+        ("contact",), "1", "rebound over approach speed that the contact's law gives a free impact", optional=True
+    ),
+    "load_loss": _V(("time",), "J", "energy lost to the loads since the start", optional=True),
+    "modal_damping_loss": _V(("time",), "J", "energy lost to modal damping since the start", optional=True),
     "contact_offset": _V(
         ("time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True
     ),
@@ -192,9 +225,11 @@ RUN: Schema = {
     ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
     "event_contact": _V(("event",), "1", "index of the contact", optional=True),
-    "event_kind": _V(("event",), "1", "closing or opening", optional=True),
+    "event_kind": _V(
+        ("event",), "1", "opening, closing, maximum compression, begin of sticking or slipping", optional=True
+    ),
     "event_approach_speed": _V(
-        ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening", optional=True
+        ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening, 0 at compression", optional=True
     ),
     "event_peak_force": _V(
         ("event",), "N", "largest normal force of the contact that this closing begins", optional=True
@@ -218,6 +253,31 @@ ENSEMBLE: Schema = {
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
+}
+
+_STILL = """position quaternion frame_position joint_force joint_moment joint_position modal_coordinate
+drive_force drive_position load_force load_moment load_length contact_gap contact_penetration contact_force
+contact_normal_force contact_offset potential elastic"""
+#: static equilibrium, or steady motion: what a run says at one instant
+EQUILIBRIUM: Schema = {
+    name: _V(RUN[name].dims[1:], RUN[name].units, RUN[name].long_name, RUN[name].optional) for name in _STILL.split()
+}
+
+#: natural vibrations about it; shapes per unit of a coordinate with unit modal mass, parts real and imaginary
+LINEAR: Schema = EQUILIBRIUM | {
+    "frequency": _V(("vibration",), "Hz", "frequency of the vibration, damping included"),
+    "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
+    "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
+    "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
+    "dominant": _V(("vibration",), "1", "body with the largest share of the kinetic energy"),
+    "energy_share": _V(("vibration", "moving_body"), "1", "share of the body in the kinetic energy"),
+    "frame_translation": _V(
+        ("vibration", "part", "frame", "axis"), "kg-0.5", "displacement of the named frame, world axes"
+    ),
+    "frame_rotation": _V(
+        ("vibration", "part", "frame", "axis"), "kg-0.5 m-1", "rotation vector of the named frame, world axes"
+    ),
+    "modal_shape": _V(("vibration", "part", "mode"), "1", "modal coordinates of the flexible bodies", optional=True),
 }
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias
 
@@ -127,7 +128,7 @@ class Table(Part):
     value: Column
     degree: Literal[3, 5] = 3
     ends: Ends = "not-a-knot"
-    points: tuple[tuple[float, float], ...]
+    points: tuple[tuple[float, float], ...] = ()
 
     @model_validator(mode="before")
     @classmethod
@@ -171,14 +172,12 @@ class Piecewise(Part):
     @model_validator(mode="after")
     def _ordered(self) -> Piecewise:
         starts = [s.start for s in self.sections]
-        if any(not a < b for a, b in zip(starts[:-1], starts[1:], strict=True)):
+        if any(not a < b for a, b in pairwise(starts)):
             raise ValueError(f"the sections start one after the other, not at {starts}")
         return self
 
 
-Law = Annotated[
-    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise, Field(discriminator="type")
-]
+Law = Annotated[Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise, Field(discriminator="type")]
 Sum.model_rebuild()
 Section.model_rebuild()
 Piecewise.model_rebuild()
@@ -237,7 +236,9 @@ def _is_number(cell: str) -> bool:
 def _check_points(time: tuple[float, ...] | list[float], degree: int, ends: str) -> None:
     fewest = 2 if degree == 3 and ends != "periodic" else 3 if degree == 3 else 6
     if len(time) < fewest:
-        raise ValueError(f"a spline of degree {degree} with {ends} ends takes at least {fewest} points, not {len(time)}")
-    for k, (a, b) in enumerate(zip(time[:-1], time[1:], strict=True), start=2):
+        raise ValueError(
+            f"a spline of degree {degree} with {ends} ends takes at least {fewest} points, not {len(time)}"
+        )
+    for k, (a, b) in enumerate(pairwise(time), start=2):
         if not a < b:
             raise ValueError(f"times increase from point to point, but point {k} at {b} s follows one at {a} s")

@@ -19,7 +19,7 @@ FAMILIES = ("body", "joint", "drive", "load")
 TYPES = (
     *("ground", "rigid", "flexible"),
     *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"),
-    "clearance-spherical",
+    *("clearance-spherical", "clearance-revolute", "modified-coulomb", "ambrosio", "lugre"),
     *("joint-drive", "path-drive"),
     *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise"),
     *("gravity", "point-force", "point-torque", "spring-damper", "joint-force", "joint-spring", "joint-friction"),

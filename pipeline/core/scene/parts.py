@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
+from pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
     Inertia,
-    Length,
     Mass,
     Number,
     Part,
     Pose,
     Position,
-    Pressure,
-    Speed,
+    Time,
     Velocity,
 )
 
@@ -58,17 +57,39 @@ class Modes(Part):
     interfaces: tuple[str, ...] | None = None
 
 
+class RatioPerMode(Part):
+    """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
+
+    ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
+
+
+class Rayleigh(Part):
+    """Damping matrix alpha M + beta K of the deformation; rigid motion of the body is not damped.
+
+    alpha [1/s], beta [s]: the ratio of a mode with frequency omega is (alpha/omega + beta omega)/2.
+    """
+
+    alpha: Annotated[Number, Field(ge=0.0)] = 0.0
+    beta: Annotated[Time, Field(ge=0.0)] = 0.0
+
+
+class Stiffening(Part):
+    """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
+
+
 class FlexibleBody(Part):
     """A body reduced from a mesh; its frames are those of the recipe.
 
     pose: start pose of the undeformed mesh frame.
-    damping: modal damping ratio of every elastic coordinate; absent means none.
+    damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
+    stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
     """
 
     type: Literal["flexible"]
     mesh: str
     modes: Modes
-    damping: Annotated[Number, Field(gt=0.0)] | None = None
+    damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
+    stiffening: Stiffening | None = None
     pose: Pose | None = None
     velocity: Velocity | None = None
     angular_velocity: AngularVelocity | None = None
@@ -87,64 +108,4 @@ class IdealJoint(Part):
     between: tuple[FrameName, FrameName]
 
 
-class Material(Part):
-    """Elastic constants of a contacting surface."""
-
-    youngs_modulus: Annotated[Pressure, Positive]
-    poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
-
-
-class NormalLaw(Part):
-    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii."""
-
-    law: str
-    restitution: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
-    exponent: Annotated[Number, Field(ge=1.0)] = 1.5
-    stiffness: Annotated[Number, Positive] | None = None
-
-
-class FrictionLaw(Part):
-    """A friction law with the paper's four parameters (Table 6)."""
-
-    law: str
-    static: Annotated[Number, Field(ge=0.0)]
-    dynamic: Annotated[Number, Field(ge=0.0)]
-    v_static: Annotated[Speed, Positive]
-    v_dynamic: Annotated[Speed, Positive]
-
-    @model_validator(mode="after")
-    def _ordered(self) -> FrictionLaw:
-        if not self.v_static < self.v_dynamic:
-            raise ValueError(
-                f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve"
-            )
-        return self
-
-
-class ClearanceSpherical(Part):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame].
-
-    floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
-    for grazing and resting contact.
-    """
-
-    type: Literal["clearance-spherical"]
-    between: tuple[FrameName, FrameName]
-    clearance: Annotated[Length, Positive]
-    ball_radius: Annotated[Length, Positive]
-    socket_material: Material | None = None
-    ball_material: Material | None = None
-    normal: NormalLaw
-    friction: FrictionLaw | None = None
-    floor: Annotated[Speed, Positive] = 1e-6
-
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> ClearanceSpherical:
-        if self.normal.stiffness is None and (self.socket_material is None or self.ball_material is None):
-            raise ValueError(
-                "the contact stiffness is unknown: give socket_material and ball_material, or normal.stiffness"
-            )
-        return self
-
-
-Joint = Annotated[IdealJoint | ClearanceSpherical, Field(discriminator="type")]
+Joint = Annotated[IdealJoint | ClearanceSpherical | ClearanceRevolute, Field(discriminator="type")]

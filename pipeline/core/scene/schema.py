@@ -8,12 +8,12 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, model_validator
 
 from pipeline.core import quantities
+from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, Time
 from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.parts import (
     Body,
-    ClearanceSpherical,
     FlexibleBody,
     Ground,
     Joint,
@@ -191,9 +191,9 @@ class Scene(Part):
         """Frames of the fixed world by name, over all bodies of type ground."""
         return {f"{n}.{f}": p for n, b in self.body.items() if isinstance(b, Ground) for f, p in b.frames.items()}
 
-    def contacts(self) -> dict[str, ClearanceSpherical]:
+    def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""
-        return {n: j for n, j in self.joint.items() if isinstance(j, ClearanceSpherical)}
+        return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""

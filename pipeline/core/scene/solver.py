@@ -17,11 +17,14 @@ class Stepping(Part):
     """What all integrators have.
 
     rtol: relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations.
+    ledger_tolerance: largest energy error of a run, as a share of the energy that it turns over.
     evaluations: most right-hand sides of one run.  step: present means steps of this length.
     events: where contacts begin and end, ``at step ends`` only with fixed steps.
     """
 
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
+    # no contact law is known to a thousandth of its energy; a run that is off by more says something else
+    ledger_tolerance: Annotated[Number, Field(gt=0.0)] = 1e-3
     evaluations: Annotated[int, Field(gt=0)] = 50_000_000
     step: Annotated[Time, Field(gt=0.0)] | None = None
     events: Literal["located", "at step ends"] = "located"
@@ -59,9 +62,15 @@ class GeneralizedAlpha(Stepping):
 
 
 class Radau(Stepping):
-    """Implicit Runge-Kutta method of order 5 for stiff scenes."""
+    """Implicit Runge-Kutta method of order 5 for stiff scenes, with chosen steps."""
 
     integrator: Literal["radau"]
+
+    @model_validator(mode="after")
+    def _chooses_steps(self) -> Radau:
+        if self.step is not None:
+            raise ValueError("radau chooses its steps by rtol: remove step, or take generalized-alpha")
+        return self
 
 
 #: integrator -> tag of its model; tags stand in angles because error messages leave those out

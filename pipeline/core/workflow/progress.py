@@ -14,6 +14,8 @@ SPARSE = 10.0
 REDRAW = 0.1
 #: the rest is estimated once this share has been done; before, the estimate jumps about
 ENOUGH = 0.02
+#: what a task says with this begin stays on the screen
+WARNING = "warning: "
 
 
 @dataclass
@@ -56,6 +58,8 @@ class Monitor:
         if job is None:
             return
         news = fraction is None and text != job.text
+        if text.startswith(WARNING) and self.out.isatty():
+            self.say(f"{job.name}: {text}")  # stays, where the line of progress is rewritten
         # what has no share (compiling, waiting) says nothing about the pace of the rest
         if fraction is None or job.since is None:
             job.since = None if fraction is None else (self.clock(), fraction)

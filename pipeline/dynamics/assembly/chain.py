@@ -64,12 +64,16 @@ def _joint(edge: Edge, reverse: bool) -> list[Stage]:
 def _path(edge: Edge) -> list[Stage]:
     """Slides to the frame's origin; then Cardan angles, a rotation vector, or a free rotation."""
     slides, turns = edge.drives[:3], edge.drives[3:]
-    found = [Stage(c.part, c.axes, (k,), (d,) if d else ()) for k, (c, d) in enumerate(zip(SLIDES, slides, strict=True))]
+    found = [
+        Stage(c.part, c.axes, (k,), (d,) if d else ()) for k, (c, d) in enumerate(zip(SLIDES, slides, strict=True))
+    ]
     if edge.vector:
         return [*found, Stage("rotation-vector", np.eye(3), (3, 4, 5), tuple(d for d in turns if d))]
     if not any(turns):
         return [*found, Stage("spherical", np.eye(3), (3, 4, 5, 6))]
-    angles = (Stage(c.part, c.axes, (3 + k,), (d,) if d else ()) for k, (c, d) in enumerate(zip(TURNS, turns, strict=True)))
+    angles = (
+        Stage(c.part, c.axes, (3 + k,), (d,) if d else ()) for k, (c, d) in enumerate(zip(TURNS, turns, strict=True))
+    )
     return [*found, *angles]
 
 

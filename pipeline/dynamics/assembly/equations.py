@@ -47,6 +47,7 @@ from pipeline.dynamics.tables import (
     PORT_COLUMN,
     PORT_FLEX,
     POSITION_RATE,
+    STATE,
     TURN,
     U,
     X,
@@ -244,6 +245,7 @@ def compose(
     @kernel
     def evaluate(h, f, w, n, t, y, dy):
         """Rates dy of the state y at time t, both places in w; n[EVALUATION] says whether it could."""
+        n[STATE] = y
         spread_state(h, w, y)
         known_motion(h, f, w, n, t)
         for k in range(h[N_LEDGER]):

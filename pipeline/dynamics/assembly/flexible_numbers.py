@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.scene.parts import FlexibleBody
+from pipeline.core.errors import InputError
+from pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
 from pipeline.dynamics.assembly.layout import Layout
+from pipeline.dynamics.assembly.system import System
 from pipeline.dynamics.assembly.wiring import integers
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
@@ -17,6 +19,7 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Wiring (FLEXES, MOMENTS, PORTS) and numbers (FLEX_NUMBERS .. PORT_DATA) of the flexible bodies."""
     flex, flex_real, data, index, value = [], [], [], [], []
     data0 = moment0 = 0
+    any_shortened = any(b.stiffening is not None for b in layout.system.scene.flexible().values())
     order = sorted(layout.modes)
     for i in order:
         link = layout.system.links[i]
@@ -25,7 +28,9 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         bundle = layout.system.bundles[str(link.flexible)]
         n = layout.modes[i]
         moments, where = _moments(bundle)
-        chunk = _data(bundle, body.damping or 0.0)
+        chunk = _data(bundle, _damping(str(link.flexible), body, bundle))
+        if any_shortened:
+            chunk = np.concatenate([chunk, *_forms(layout.system, str(link.flexible), n)])
         moves = int(_inboard_moves(layout, i, bundle))
         flex.append((i, n, layout.flex_q0[i], layout.flex_c0[i], data0, moment0, len(moments), moves))
         flex_real.append(
@@ -36,7 +41,7 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
         index.append(where)
         data0 += len(chunk)
         moment0 += len(moments)
-    port, port_real, port_data = _ports(layout, order)
+    port, port_real, port_data = _ports(layout, order, any_shortened)
     wiring = {
         "FLEXES": integers(flex, 8),
         "MOMENTS": np.concatenate([*index, np.zeros((0, 2), dtype=np.int64)]),
@@ -52,19 +57,61 @@ def fill(layout: Layout) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     return wiring, numbers
 
 
-def _data(bundle: xr.Dataset, damping: float) -> np.ndarray:
+def bow(system: System, body: str, frame: str | None = None) -> np.ndarray | None:
+    """Shortening of a bent body per pair of modes at a frame [1/(kg m)], or its first moment [1/m]; shape (mode, mode).
+
+    None where the scene does not ask for it.
+    """
+    part = system.scene.body[body]
+    if not isinstance(part, FlexibleBody) or part.stiffening is None:
+        return None
+    bundle = system.bundles[body]
+    if "frame_shortening" not in bundle:
+        raise InputError(
+            f"[body.{body}.stiffening]",
+            "the bundle of its mesh says nothing about the shortening of a bent body",
+            "stiffening is for beams; remove it",
+        )
+    if frame is None:
+        return bundle["shortening_first_moment"].values
+    return bundle["frame_shortening"].sel(frame=frame).values
+
+
+def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:
+    """Damping 2 zeta omega of every mode [1/s]; InputError when ratios and modes differ in number."""
+    square = np.diag(bundle["modal_stiffness"].values)
+    given = body.damping
+    if isinstance(given, Rayleigh):
+        return given.alpha + given.beta * square
+    if isinstance(given, RatioPerMode) and len(given.ratios) != len(square):
+        raise InputError(
+            f"[body.{name}.damping.ratios]",
+            f"{len(given.ratios)} damping ratios are given for {len(square)} modes",
+            "give one ratio per mode",
+        )
+    ratios = given.ratios if isinstance(given, RatioPerMode) else given or 0.0
+    return 2.0 * np.asarray(ratios) * np.sqrt(square)
+
+
+def _forms(system: System, body: str, n: int) -> list[np.ndarray]:
+    """Int rho B and int rho x B (n n each) of a body, zeros where it does not ask for stiffening."""
+    first = bow(system, body)
+    second = None if first is None else system.bundles[body]["shortening_second_moment"].values
+    return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
+
+
+def _data(bundle: xr.Dataset, damping: np.ndarray) -> np.ndarray:
     """C1 (3n), E (9n), modal mass (n n), stiffness omega^2 (n), damping 2 zeta omega (n).
 
     The coordinates of a bundle are mass-normalised eigenmodes of its reduced matrices.
     """
     stiffness = np.diag(bundle["modal_stiffness"].values)
-    omega = np.sqrt(stiffness)
     chunks = [
         bundle["modal_first_moment"].values,
         bundle["position_mode_moment"].values,
         bundle["modal_mass"].values,
         stiffness,
-        2.0 * damping * omega,
+        damping,
     ]
     return np.concatenate([c.ravel() for c in chunks])
 
@@ -106,10 +153,11 @@ def _inboard_moves(layout: Layout, i: int, bundle: xr.Dataset) -> bool:
     if frame is None:
         return False
     _, translation, rotation = _frame_shapes(bundle, frame)
-    return bool(np.any(translation) or np.any(rotation))
+    drawn = bow(layout.system, str(layout.system.links[i].flexible), frame)
+    return bool(np.any(translation) or np.any(rotation) or (drawn is not None and np.any(drawn)))
 
 
-def _ports(layout: Layout, order: list[int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _ports(layout: Layout, order: list[int], shortened: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Ports of sites first, then one inboard port per flexible link (Layout.port_of_inboard)."""
     rows, reals, data, start = [], [], [], 0
 
@@ -122,10 +170,13 @@ def _ports(layout: Layout, order: list[int]) -> tuple[np.ndarray, np.ndarray, np
         else:
             pose, *found = _frame_shapes(bundle, frame)
             shapes = [s.ravel() for s in found]
+        if shortened:
+            drawn = None if frame is None else bow(layout.system, str(layout.system.links[link].flexible), frame)
+            shapes.append(np.zeros(n * n) if drawn is None else drawn.ravel())
         rows.append((order.index(link), column, start))
         reals.append(pose)
         data.extend(shapes)
-        start += 6 * n
+        start += sum(len(s) for s in shapes)
 
     for site, frame, column in layout.ports:
         add(layout.sites[site].link, frame.partition(".")[2], column)

@@ -27,6 +27,7 @@ from numba.core.bytecode import FunctionIdentity
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.registry import module_of
 from pipeline.core.workflow.fingerprint import Sources, imported
+from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds
 from pipeline.dynamics.integrate.method import Scheme
 
@@ -35,7 +36,7 @@ NAMING = "counters by entry"
 SOURCES = Sources(Path(__file__).resolve().parents[3])
 PACKAGES = {
     "joint": "pipeline.dynamics.joints",
-    "normal": "pipeline.dynamics.contact.normal",
+    "form": "pipeline.dynamics.contact.form",
     "friction": "pipeline.dynamics.contact.friction",
     "load": "pipeline.dynamics.loads",
     "integrator": "pipeline.dynamics.integrate",
@@ -125,7 +126,7 @@ def _reached(roots: set[str]) -> dict[str, str]:
 
 def _source(kinds: Kinds, scheme: Scheme) -> str:
     lines = [
-        f'"""Generated: joints {kinds.joints}, normal laws {kinds.normals}, friction {kinds.frictions}."""',
+        f'"""Generated: joints {kinds.joints}, {kinds.contacts}."""',
         *([f"# loads {kinds.loads}"] if kinds.loads else []),
         "import numpy as np",
         "from numba import njit",
@@ -137,9 +138,9 @@ def _source(kinds: Kinds, scheme: Scheme) -> str:
         f"from {module_of(PACKAGES['integrator'], scheme.integrator)} import METHOD",
     ]
     lines += _imports("joint", kinds.joints, ("motion",))
-    lines.append(f"joint_motion = dispatch.joints({_names('joint', 'motion', kinds.joints)})")
-    lines += _flexible_lines(kinds.flexible)
-    lines += _contact_lines(kinds, scheme)
+    lines.append(f"joint_motion = dispatch.choose({_names('joint', 'motion', kinds.joints)})")
+    lines += _flexible_lines(kinds.flexible, kinds.stiffening)
+    lines += _contact_lines(kinds.contacts, scheme)
     lines += _law_lines(kinds.harmonics)
     lines += _load_lines(kinds)
     lines += _closure_lines(kinds.closures)
@@ -147,9 +148,9 @@ def _source(kinds: Kinds, scheme: Scheme) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...]) -> list[str]:
+def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...], table: str = "NAMES") -> list[str]:
     return [
-        f"from {module_of(PACKAGES[family], name)} import "
+        f"from {module_of(PACKAGES[family], name, table)} import "
         + ", ".join(f"{function} as {family}_{function}_{k}" for function in functions)
         for k, name in enumerate(names)
     ]
@@ -159,20 +160,27 @@ def _names(family: str, function: str, names: tuple[str, ...]) -> str:
     return "(" + "".join(f"{family}_{function}_{k}, " for k in range(len(names))) + ")"
 
 
-def _flexible_lines(present: bool) -> list[str]:
+def _flexible_lines(present: bool, stiffening: bool) -> list[str]:
     if not present:
         return [
             "port, inboard = motion.no_port, motion.no_inboard",
             "flexible_inertia, port_load, modal = equations.no_flexible, equations.no_port_load, equations.no_modal",
             "flexible_observed, flexible_energy = observing.no_modal, observing.no_energy",
         ]
+    plain = ["shorten, shorten_port = (flexible.straight, flexible.straight), flexible.straight"]
+    forms = [
+        "from pipeline.dynamics.bodies import shortening",
+        "shorten, shorten_port = (shortening.first_moment, shortening.second_moment), shortening.at_port",
+    ]
     return [
         "from pipeline.dynamics.bodies import flexible, ports",
-        "port, inboard = ports.site, ports.inboard",
-        "flexible_inertia = equations.flexible_inertia(flexible.inertia, flexible.mass_matrix)",
+        *(forms if stiffening else plain),
+        "body = flexible.compose(*shorten)",
+        "port, inboard = ports.compose(shorten_port)",
+        "flexible_inertia = equations.flexible_inertia(body.inertia, body.mass_matrix)",
         "port_load, modal = equations.gather_port, equations.modal_forces",
-        "flexible_observed = observing.modal_inertias(flexible.inertia, flexible.modal_inertia)",
-        "flexible_energy = observing.flexible_energies(flexible.energies)",
+        "flexible_observed = observing.modal_inertias(body.inertia, body.modal_inertia)",
+        "flexible_energy = observing.flexible_energies(body.energies)",
     ]
 
 
@@ -180,19 +188,28 @@ def _stepping(scheme: Scheme) -> str:
     return "fixed" if scheme.fixed else "adaptive"
 
 
-def _contact_lines(kinds: Kinds, scheme: Scheme) -> list[str]:
-    if not kinds.normals:
+def _contact_lines(kinds: ContactKinds, scheme: Scheme) -> list[str]:
+    if not kinds.surfaces:
         return ["contacts = equations.no_contacts", "events = (stepper.watch_nothing, stepper.settle_nothing)"]
+    rub, regimes = "frictionless()", "no_regimes"
+    if kinds.frictions:
+        rub, regimes = f"rubbing(dispatch.choose({_names('friction', 'traction', kinds.frictions)}))", "regimes"
+    events = [
+        "from pipeline.dynamics.integrate import events as contact_events, trace",
+        f"events = contact_events.watching(trace.{regimes})",
+    ]
+    if not scheme.located:
+        events = ["from pipeline.dynamics.integrate.step_ends import EVENTS_OF_CONTACTS as events"]
     return [
-        "from pipeline.dynamics.joints import clearance_spherical",
-        f"from pipeline.dynamics.integrate.{'events' if scheme.located else 'step_ends'} import "
-        "EVENTS_OF_CONTACTS as events",
-        *_imports("normal", kinds.normals, ("force", "stored")),
-        *_imports("friction", kinds.frictions, ("coefficient",)),
-        f"normal = dispatch.normals({_names('normal', 'force', kinds.normals)})",
-        f"stored = dispatch.energies({_names('normal', 'stored', kinds.normals)})",
-        f"friction = dispatch.frictions({_names('friction', 'coefficient', kinds.frictions)})",
-        "contacts = clearance_spherical.compose(normal, stored, friction)",
+        "from pipeline.dynamics.contact import forces as contact_forces",
+        *_imports("joint", kinds.surfaces, ("separation",), "CONTACTS"),
+        *_imports("friction", kinds.frictions, ("traction",)),
+        *_imports("form", kinds.forms, ("force", "stored")),
+        f"separation = dispatch.choose({_names('joint', 'separation', kinds.surfaces)})",
+        f"normal = dispatch.choose({_names('form', 'force', kinds.forms)})",
+        f"stored = dispatch.choose({_names('form', 'stored', kinds.forms)})",
+        f"contacts = contact_forces.compose(separation, normal, stored, contact_forces.{rub})",
+        *events,
     ]
 
 

@@ -18,7 +18,8 @@ from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.tree import PATH
 from pipeline.dynamics.tables import AXES, OMEGA, VELOCITY
 
-Frames = Callable[[np.ndarray], np.ndarray]  #: state -> frames of all links, (links, FRAME_SIZE)
+#: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
+Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
@@ -63,8 +64,11 @@ def _world(built: Tables, frame: str) -> Placement:
     return built.system.links[site.link].start.of(site.place)
 
 
-def given_velocities(built: Tables, frames: Frames, y: np.ndarray) -> np.ndarray:
-    """Speeds that come nearest, in the metric of the mass, to the velocities that the scene gives."""
+def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarray:
+    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+
+    Raises InputError when joints and drives do not allow the velocities.
+    """
     scene, layout = built.system.scene, built.layout
     wanted = {
         n: b
@@ -75,38 +79,41 @@ def given_velocities(built: Tables, frames: Frames, y: np.ndarray) -> np.ndarray
         return y
     y = y.copy()
     nq, nv = layout.nq, layout.nv
-    rows, target = [], []
-    base = _twists(built, frames, y, wanted)
+    y[nq : nq + nv] = 0.0
+    given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
+    told = ~np.isnan(given)
+
+    def rates(state: np.ndarray) -> np.ndarray:
+        frames, opening = motion(state)
+        return np.concatenate([_twists(built, frames, wanted)[told], opening])
+
+    base = rates(y)
     columns = []
     for k in range(nv):
         moved = y.copy()
         moved[nq + k] = 1.0
-        columns.append(_twists(built, frames, moved, wanted) - base)
-    for place, body in enumerate(wanted.values()):
-        given = (body.angular_velocity, body.velocity)
-        for part, value in enumerate(given):
-            if value is None:
-                continue
-            span = slice(6 * place + 3 * part, 6 * place + 3 * part + 3)
-            rows.append(np.array([c[span] for c in columns]).T)
-            target.append(np.array(value) - base[span])
-    A, b = np.concatenate(rows), np.concatenate(target)
-    speeds, *_ = np.linalg.lstsq(A, b, rcond=1e-12)
-    miss = float(np.max(np.abs(A @ speeds - b)))
-    if miss > 1e-6 * (1.0 + float(np.max(np.abs(b)))):
+        columns.append(rates(moved) - base)
+    matrix = np.array(columns).T.reshape(len(base), nv)
+    target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
+    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
+    miss = float(np.max(np.abs(matrix @ speeds - target)))
+    if miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
-            f"the joints do not allow the velocities given for {names} (they miss by {miss:.3g})",
+            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g})",
             "give velocities that agree with each other, or fewer of them",
         )
     y[nq : nq + nv] = speeds
     return y
 
 
-def _twists(built: Tables, frames: Frames, y: np.ndarray, bodies: dict) -> np.ndarray:
+def _components(given: tuple[float, float, float] | None) -> list[float]:
+    return [np.nan] * 3 if given is None else list(given)
+
+
+def _twists(built: Tables, link_frames: np.ndarray, bodies: dict) -> np.ndarray:
     """Angular velocity and velocity of the centre of mass of each body, flattened."""
-    link_frames = frames(y)
     found = []
     for name in bodies:
         link = built.system.link_of[name]
@@ -130,11 +137,11 @@ def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
         load = scene.load[name]
         if row[TURNS] >= 0:
             y[len(y) - built.packed.sizes["N_TURNS"] + row[TURNS]] = now[VALUE]
-        if isinstance(load, SpringDamper) and now[VALUE] <= SHORTEST * built.system.length:
-            if load.damping > 0.0 or load.free_length:
-                raise InputError(
-                    f"[load.{name}.between]",
-                    "its two ends start in one place, so that it pulls in no direction",
-                    "move an end; only a spring of no free length and no damping may start so",
-                )
+        has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
+        if has_direction and now[VALUE] <= SHORTEST * built.system.length:
+            raise InputError(
+                f"[load.{name}.between]",
+                "its two ends start in one place, so that it pulls in no direction",
+                "move an end; only a spring of no free length and no damping may start so",
+            )
     return y

@@ -55,7 +55,7 @@ def tabulate(system: System, layout: Layout) -> Loaded:
     scene, names = system.scene, order(system.scene)
     kinds = tuple(sorted({load.type for load in scene.forces().values()}))
     rows: list[tuple[int, ...]] = []
-    numbers, laws, turns = [], [], 0
+    numbers, laws, turns = list[list[float]](), list[Pieces](), 0
     for name in names:
         row, coordinate = describe(scene, name)
         a, b = _sites(system, layout, name, row)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
-from pipeline.dynamics import tables
+from pipeline.dynamics.assembly import contact_numbers, loading, wiring
 from pipeline.dynamics.assembly import flexible_numbers as flexible
 from pipeline.dynamics.assembly import laws as lawful
-from pipeline.dynamics.assembly import loading, wiring
 from pipeline.dynamics.assembly.closing import assembled
+from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.driving import drive_laws, joint_class
 from pipeline.dynamics.assembly.layout import Layout, number
 from pipeline.dynamics.assembly.merge import Placement
@@ -23,9 +23,10 @@ from pipeline.dynamics.assembly.system import Link, System
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.integrate.method import Method
 
-NORMAL = "pipeline.dynamics.contact.normal"
+if TYPE_CHECKING:
+    from pipeline.dynamics.contact.law import Resolved
+
 INTEGRATORS = "pipeline.dynamics.integrate"
-FRICTION = "pipeline.dynamics.contact.friction"
 NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 
@@ -34,17 +35,20 @@ class Kinds:
     """Which kinds of parts a system has: all that its compiled code depends on."""
 
     joints: tuple[str, ...]
-    normals: tuple[str, ...]
-    frictions: tuple[str, ...]
+    contacts: ContactKinds
     flexible: bool
     closures: bool
     harmonics: bool = False
     loads: tuple[str, ...] = ()
+    stiffening: bool = False
 
 
 @dataclass(frozen=True)
 class Tables:
-    """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system."""
+    """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system.
+
+    laws: the normal law of every contact.
+    """
 
     system: System
     layout: Layout
@@ -52,6 +56,7 @@ class Tables:
     packed: Packed
     method: Method
     closure_order: np.ndarray
+    laws: tuple[Resolved, ...]
 
 
 def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
@@ -61,6 +66,7 @@ def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
     """
     system = assembled(system, given)
     layout = number(system)
+    normals = contact_numbers.resolve(system)
     site_pairs = [(e.kind, layout.site(a), layout.site(b)) for e, a, b in system.closures]
     touching = [(layout.site(a), layout.site(b)) for _, _, a, b in system.contacts]
     closing = wiring.closures(layout, site_pairs)
@@ -71,17 +77,17 @@ def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
     signs = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}
     signed = [law.times(signs[name]) for name, law in zip(system.drives, laws, strict=True)]
     law_wiring, law_numbers = lawful.fill([*signed, *loaded.laws])
-    turns, slot = loaded.turns, tables.CONTACT_LOSS + 2 * len(system.contacts)
-    ledger = slot + (loading.LEDGER + turns if system.scene.forces() else 0)
-    groups, floors = _error_groups(layout, ledger - turns, turns)
+    turns, slot = loaded.turns, contact_numbers.ledger_size(system)
+    loads = loading.LEDGER if system.scene.forces() else 0
+    groups, floors = _error_groups(layout, loads, turns)
     sites = [(s.link, layout.port_of(k)) for k, s in enumerate(layout.sites)]
     method = lookup(INTEGRATORS, system.scene.solver.integrator, where="[solver.integrator]")
-    kinds = _kinds(system, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
-    contacts, contact_numbers = _contacts(system, kinds, touching)
+    kinds = _kinds(system, normals, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
+    contacts, numbers_of_contacts = contact_numbers.fill(layout, kinds.contacts, normals, touching)
     packed = pack(
         {
             "NQ": layout.nq,
-            "N_LEDGER": ledger,
+            "N_LEDGER": slot + loads + turns,
             "N_DRIVES": layout.known,
             "N_TURNS": turns,
             "LOAD_SLOT": slot,
@@ -102,7 +108,7 @@ def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
             "LINK_NUMBERS": np.array([_link_numbers(link) for link in system.links]),
             "SITE_NUMBERS": np.array([_pose_row(s.place) for s in layout.sites]),
             **flexible_numbers,
-            "CONTACT_NUMBERS": contact_numbers,
+            "CONTACT_NUMBERS": numbers_of_contacts,
             **law_numbers,
             **loaded.numbers,
             "GRAVITY": loading.gravity(system.scene),
@@ -111,19 +117,18 @@ def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
         method,
         layout.columns,
     )
-    return Tables(system, layout, kinds, packed, method, order)
+    return Tables(system, layout, kinds, packed, method, order, normals)
 
 
-def _kinds(system: System, harmonics: bool, loads: tuple[str, ...]) -> Kinds:
-    contacts = [joint for _, joint, _, _ in system.contacts]
+def _kinds(system: System, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Kinds:
     return Kinds(
         joints=tuple(sorted({link.kind for link in system.links[1:]})),
-        normals=tuple(sorted({c.normal.law for c in contacts})),
-        frictions=tuple(sorted({c.friction.law for c in contacts if c.friction is not None})),
+        contacts=contact_numbers.kinds(system, normals),
         flexible=any(link.flexible for link in system.links),
         closures=bool(system.closures),
         harmonics=harmonics,
         loads=loads,
+        stiffening=any(b.stiffening is not None for b in system.scene.flexible().values()),
     )
 
 
@@ -151,32 +156,12 @@ def _link_numbers(link: Link) -> np.ndarray:
     return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
 
-def _contacts(system: System, kinds: Kinds, touching: list[tuple[int, int]]) -> tuple[np.ndarray, np.ndarray]:
-    rows, reals = [], []
-    for (name, joint, _, _), (socket, ball) in zip(system.contacts, touching, strict=True):
-        place = f"[joint.{name}.normal]"
-        normal = lookup(NORMAL, joint.normal.law, where=place)
-        stiffness = lookup("pipeline.dynamics.contact", joint.type, where=place)(joint)
-        try:
-            parameters = normal.parameters(joint.normal, stiffness)
-        except ValueError as error:
-            raise InputError(place, str(error)) from None
-        friction_kind, friction = -1, (0.0, 0.0, 0.0, 0.0)
-        if joint.friction is not None:
-            friction_kind = kinds.frictions.index(joint.friction.law)
-            law = lookup(FRICTION, joint.friction.law, where=f"[joint.{name}.friction]")
-            friction = law.parameters(joint.friction)
-        rows.append((socket, ball, kinds.normals.index(joint.normal.law), friction_kind))
-        reals.append([joint.clearance, joint.ball_radius, joint.floor, *parameters, *friction])
-    return wiring.integers(rows, 4), np.array(reals, dtype=float).reshape(-1, 11)
-
-
-def _error_groups(layout: Layout, ledger: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
+def _error_groups(layout: Layout, loads: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and the floor below which a group is resolved absolutely.
 
     A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
-    ledger: number of energies; turns: number of angles after them.
+    loads: number of the loads' energies; turns: number of angles after them.
     """
     L = layout.system.length
     groups: list[int] = []
@@ -202,9 +187,10 @@ def _error_groups(layout: Layout, ledger: int, turns: int) -> tuple[np.ndarray, 
                 target[first : first + layout.modes[i]] = len(floors) - 1
     groups = [*q_group, *v_group]
     energy = _mass(layout.system) * L**2
-    for floor in [energy] * ledger + [1.0] * turns:
+    tail = [*contact_numbers.ledger_groups(layout.system, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * turns]
+    for floor, count in tail:
         floors.append(floor)
-        groups.append(len(floors) - 1)
+        groups += [len(floors) - 1] * count
     return np.array(groups, dtype=np.int64), np.array(floors)
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics import tables
-from pipeline.dynamics.assembly.pivots import PIVOT_SIZE
+from pipeline.dynamics.assembly.places import PIVOT_SIZE
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.method import Method
 

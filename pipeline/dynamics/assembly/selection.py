@@ -13,7 +13,7 @@ from scipy.linalg import qr
 from pipeline.dynamics import tables
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.packing import Packed, envelope_size
-from pipeline.dynamics.assembly.pivots import N_KEPT_ROWS
+from pipeline.dynamics.assembly.places import N_KEPT_ROWS, SCHUR_SIZE
 from pipeline.dynamics.assembly.wiring import closure_envelope
 
 #: rows below this share of the longest are rounding
@@ -71,7 +71,7 @@ def write(built: Tables, h: np.ndarray, kept: np.ndarray) -> None:
         start += int(closure[tables.N_KEPT])
     envelope = view(built.packed, h, "CLOSURE_ENVELOPE")
     envelope[:start] = closure_envelope(closures, built.packed.table("CLOSURE_PAIRS"))
-    h[N_KEPT_ROWS], h[tables.SCHUR_SIZE] = start, envelope_size(envelope[:start])
+    h[N_KEPT_ROWS], h[SCHUR_SIZE] = start, envelope_size(envelope[:start])
 
 
 def dense(built: Tables, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
@@ -88,6 +88,12 @@ def dense(built: Tables, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
         block = block.reshape(*stored.shape[:-1], slots, count)
         full[..., c[tables.KEPT0] : c[tables.KEPT0] + count, columns] = np.swapaxes(block, -1, -2)
     return full
+
+
+def kept_places(built: Tables, h: np.ndarray) -> np.ndarray:
+    """Place of each kept row among all, as residuals and their rates are stored."""
+    spans = (range(c[tables.ROW0], c[tables.ROW0] + c[tables.N_KEPT]) for c in view(built.packed, h, "CLOSURES"))
+    return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
 def joints_of_rows(built: Tables, h: np.ndarray) -> list[str]:

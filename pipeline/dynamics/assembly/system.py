@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import InputError
-from pipeline.core.scene.parts import ClearanceSpherical
+from pipeline.core.scene.clearance import Clearance
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.chain import Stage, stages
 from pipeline.dynamics.assembly.driving import prescribed
@@ -78,7 +78,7 @@ class System:
     links: list[Link]
     link_of: dict[str, int]
     closures: list[tuple[Edge, Site, Site]]
-    contacts: list[tuple[str, ClearanceSpherical, Site, Site]]
+    contacts: list[tuple[str, Clearance, Site, Site]]
     origin: np.ndarray
     length: float
     start_residual: float = 0.0
@@ -161,7 +161,7 @@ def _joined(
     inboard = Site(0, Placement(-origin), None) if edge.kind == PATH else _site(frames, links, link_of, near)
     parts = stages(edge, branch.reverse, inboard.frame is not None, group.flexible)
     here = links[inboard.link].start.of(inboard.place)
-    axes, made = np.eye(3), []
+    axes, made = np.eye(3), list[Link]()
     for k, part in enumerate(parts):
         turned = Placement(R=axes.T @ part.axes)
         site = Site(inboard.link, inboard.place.of(turned), inboard.frame)

@@ -10,6 +10,7 @@ from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.driving import joint_class, joint_drives
 from pipeline.dynamics.assembly.merge import Frame, Group, find_frame
+from pipeline.dynamics.joints import HELD
 
 #: kind of an edge that is no joint of the scene: a frame's pose in the world, prescribed in part or whole
 PATH = "path"
@@ -47,7 +48,7 @@ class Branch:
 
 
 def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
-    """Joints between different groups, and paths; contacts are forces, not joints."""
+    """Joints between different groups, and paths. Of a clearance joint, what it holds beside its contact."""
     driven = joint_drives(scene)
     result = []
     contacts = scene.contacts()
@@ -55,22 +56,23 @@ def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]
         a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
         if a.body == b.body:
             raise InputError(f"[joint.{name}.between]", f"joins '{a.body}' to itself", "name frames of two bodies")
-        if name in contacts:
+        kind = HELD.get(joint.type) if name in contacts else joint.type
+        if kind is None:
             continue
         ga, gb = group_of[a.body], group_of[b.body]
         if ga == gb:
-            if joint.type != "fixed":
+            if kind != "fixed":
                 raise InputError(
                     f"[joint.{name}]", "its two bodies are rigidly joined already", "remove it, or a fixed joint"
                 )
             continue
-        result.append(Edge(name, joint.type, ga, gb, *joint.between, driven.get(name, ())))
+        result.append(Edge(name, kind, ga, gb, *joint.between, driven.get(name, ())))
     return result + _paths(scene, frames, group_of)
 
 
 def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
     """Edges from the ground to the frames whose pose is prescribed."""
-    result = []
+    result: list[Edge] = []
     for name, drive in scene.drive.items():
         if not isinstance(drive, PathDrive):
             continue
@@ -101,7 +103,9 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
     while len(branches) < len(groups):
         frontier = [e for e in left if (e.a in link_of) != (e.b in link_of)]
         if frontier:
-            best = min(frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]]))
+            best = min(
+                frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]])
+            )
             left.remove(best)
             reverse = best.a not in link_of
             parent, group = (best.b, best.a) if reverse else (best.a, best.b)

@@ -6,6 +6,8 @@ in full, so that angular velocity and energy agree to rounding.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from pipeline.dynamics.tables import (
     ACCELERATION,
     ALPHA,
@@ -62,98 +64,105 @@ def _shape(f, first, n, j):
     return (f[index(first + j)], f[index(first + n + j)], f[index(first + 2 * n + j)])
 
 
-@kernel
-def relative_motion(h, f, w, p):
-    """Pose, twist and acceleration of port p's frame in the body frame, and its rotation vector theta.
+def compose(shortening: Callable) -> tuple[Callable, Callable]:
+    """The kernels `site` and `inboard`; shortening(h, f, w, p, j, vector) is what bending adds along x, or zero."""
 
-    Body components.  The accelerations hold what the known modal accelerations give.
-    """
-    k = port(h, p, PORT_FLEX)
-    n, x, c0 = flex(h, k, N_MODES), h[X] + flex(h, k, FLEX_Q0), flex(h, k, FLEX_C0)
-    u, du = h[U] + c0, h[DU] + c0
-    move = h[PORT_DATA] + port(h, p, PORT_SHAPES)
-    spin = move + 3 * n
-    zero = (0.0, 0.0, 0.0)
-    s, s_rate, s_acc, theta, theta_rate, theta_acc = zero, zero, zero, zero, zero, zero
-    for j in range(n):
-        phi, psi = _shape(f, move, n, j), _shape(f, spin, n, j)
-        s, theta = add(s, scale(w[index(x + j)], phi)), add(theta, scale(w[index(x + j)], psi))
-        s_rate, theta_rate = add(s_rate, scale(w[index(u + j)], phi)), add(theta_rate, scale(w[index(u + j)], psi))
-        s_acc, theta_acc = add(s_acc, scale(w[index(du + j)], phi)), add(theta_acc, scale(w[index(du + j)], psi))
-    numbers = h[PORT_NUMBERS] + 12 * p
-    local = add(at(f, numbers), s)
-    turned = product(exponential(theta), at9(f, numbers + 3))
-    alpha = add(tangent_rate(theta, theta_rate), tangent(theta, theta_acc))
-    return local, turned, tangent(theta, theta_rate), s_rate, alpha, s_acc, theta
+    @kernel
+    def relative_motion(h, f, w, p):
+        """Pose, twist and acceleration of port p's frame in the body frame, and its rotation vector theta.
 
-
-@kernel
-def modal_columns(h, f, w, p, R, origin, theta, sign, first):
-    """Twist of port p's frame relative to the body, per modal rate, about the kernels' origin.
-
-    Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port.
-    """
-    k = port(h, p, PORT_FLEX)
-    n, move = flex(h, k, N_MODES), h[PORT_DATA] + port(h, p, PORT_SHAPES)
-    for j in range(n):
-        angular = scale(sign, turn(R, tangent(theta, _shape(f, move + 3 * n, n, j))))
-        linear = scale(sign, turn(R, _shape(f, move, n, j)))
-        o = column(h, first + j)
-        accumulate(w, o, angular)
-        accumulate(w, o + 3, add(linear, cross(origin, angular)))
-
-
-@kernel
-def site(h, f, w, s):
-    """Motion of a site on a flexible link, and the columns of its port."""
-    p = site_port(h, s)
-    k = port(h, p, PORT_FLEX)
-    local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
-    frame = link_frame(h, flex(h, k, FLEX_LINK))
-    R, omega, alpha = at9(w, frame + AXES), at(w, frame + OMEGA), at(w, frame + ALPHA)
-    arm, turning, sliding = turn(R, local), turn(R, omega_l), turn(R, v_l)
-    origin, swing = add(at(w, frame + ORIGIN), arm), cross(omega, arm)
-    a = add(at(w, frame + ACCELERATION), add(cross(alpha, arm), cross(omega, swing)))
-    a = add(a, add(scale(2.0, cross(omega, sliding)), turn(R, a_l)))
-    o = site_frame(h, s)
-    put(w, o + ORIGIN, origin)
-    put9(w, o + AXES, product(R, turned))
-    put(w, o + OMEGA, add(omega, turning))
-    put(w, o + VELOCITY, add(at(w, frame + VELOCITY), add(swing, sliding)))
-    put(w, o + ALPHA, add(alpha, add(turn(R, alpha_l), cross(omega, turning))))
-    put(w, o + ACCELERATION, a)
-    moves, first, c0 = flex(h, k, FLEX_INBOARD), port(h, p, PORT_COLUMN), flex(h, k, FLEX_C0)
-    for j in range(flex(h, k, N_MODES)):
-        for e in range(6):
-            w[index(column(h, first + j) + e)] = w[index(column(h, c0 + j) + e)] if moves else 0.0
-    modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
-
-
-@kernel
-def inboard(h, f, w, i, origin, R, omega, v, alpha, a):
-    """From the inboard joint frame G, which the modes may move in the body, to the body frame."""
-    p = link(h, i, INBOARD_PORT)
-    k = port(h, p, PORT_FLEX)
-    if flex(h, k, FLEX_INBOARD) == 0:
-        # the reference condition holds this frame still in the body: a rigid step
+        Body components.  The accelerations hold what the known modal accelerations give.
+        """
+        k = port(h, p, PORT_FLEX)
+        n, x, c0 = flex(h, k, N_MODES), h[X] + flex(h, k, FLEX_Q0), flex(h, k, FLEX_C0)
+        u, du = h[U] + c0, h[DU] + c0
+        move = h[PORT_DATA] + port(h, p, PORT_SHAPES)
+        spin = move + 3 * n
+        zero = (0.0, 0.0, 0.0)
+        s, s_rate, s_acc, theta, theta_rate, theta_acc = zero, zero, zero, zero, zero, zero
+        for j in range(n):
+            phi, psi, drawn = _shape(f, move, n, j), _shape(f, spin, n, j), shortening(h, f, w, p, j, x)
+            bent = (phi[0] + drawn, phi[1], phi[2])
+            s = add(s, scale(w[index(x + j)], (phi[0] + 0.5 * drawn, phi[1], phi[2])))
+            s_rate, s_acc = add(s_rate, scale(w[index(u + j)], bent)), add(s_acc, scale(w[index(du + j)], bent))
+            s_acc = add(s_acc, (w[index(u + j)] * shortening(h, f, w, p, j, u), 0.0, 0.0))
+            theta, theta_rate = add(theta, scale(w[index(x + j)], psi)), add(theta_rate, scale(w[index(u + j)], psi))
+            theta_acc = add(theta_acc, scale(w[index(du + j)], psi))
         numbers = h[PORT_NUMBERS] + 12 * p
-        R_WB = product(R, transpose(at9(f, numbers + 3)))
-        arm = turn(R_WB, at(f, numbers))
-        swing = cross(omega, arm)
-        a_B = sub(a, add(cross(alpha, arm), cross(omega, swing)))
-        return sub(origin, arm), R_WB, omega, sub(v, swing), alpha, a_B
-    local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
-    R_WB = product(R, transpose(turned))
-    arm, turning, sliding = turn(R_WB, local), turn(R_WB, omega_l), turn(R_WB, v_l)
-    omega_B = sub(omega, turning)
-    alpha_B = sub(alpha, add(turn(R_WB, alpha_l), cross(omega_B, turning)))
-    swing = cross(omega_B, arm)
-    v_B = sub(v, add(swing, sliding))
-    a_B = sub(a, add(cross(alpha_B, arm), cross(omega_B, swing)))
-    a_B = sub(a_B, add(scale(2.0, cross(omega_B, sliding)), turn(R_WB, a_l)))
-    c0 = flex(h, k, FLEX_C0)
-    for j in range(flex(h, k, N_MODES)):
-        for e in range(6):
-            w[index(column(h, c0 + j) + e)] = 0.0
-    modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c0)
-    return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
+        local = add(at(f, numbers), s)
+        turned = product(exponential(theta), at9(f, numbers + 3))
+        alpha = add(tangent_rate(theta, theta_rate), tangent(theta, theta_acc))
+        return local, turned, tangent(theta, theta_rate), s_rate, alpha, s_acc, theta
+
+    @kernel
+    def modal_columns(h, f, w, p, R, origin, theta, sign, first):
+        """Twist of port p's frame relative to the body, per modal rate, about the kernels' origin.
+
+        Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port.
+        """
+        k = port(h, p, PORT_FLEX)
+        n, move, x = flex(h, k, N_MODES), h[PORT_DATA] + port(h, p, PORT_SHAPES), h[X] + flex(h, k, FLEX_Q0)
+        for j in range(n):
+            phi = _shape(f, move, n, j)
+            bent = (phi[0] + shortening(h, f, w, p, j, x), phi[1], phi[2])
+            angular = scale(sign, turn(R, tangent(theta, _shape(f, move + 3 * n, n, j))))
+            linear = scale(sign, turn(R, bent))
+            o = column(h, first + j)
+            accumulate(w, o, angular)
+            accumulate(w, o + 3, add(linear, cross(origin, angular)))
+
+    @kernel
+    def site(h, f, w, s):
+        """Motion of a site on a flexible link, and the columns of its port."""
+        p = site_port(h, s)
+        k = port(h, p, PORT_FLEX)
+        local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
+        frame = link_frame(h, flex(h, k, FLEX_LINK))
+        R, omega, alpha = at9(w, frame + AXES), at(w, frame + OMEGA), at(w, frame + ALPHA)
+        arm, turning, sliding = turn(R, local), turn(R, omega_l), turn(R, v_l)
+        origin, swing = add(at(w, frame + ORIGIN), arm), cross(omega, arm)
+        a = add(at(w, frame + ACCELERATION), add(cross(alpha, arm), cross(omega, swing)))
+        a = add(a, add(scale(2.0, cross(omega, sliding)), turn(R, a_l)))
+        o = site_frame(h, s)
+        put(w, o + ORIGIN, origin)
+        put9(w, o + AXES, product(R, turned))
+        put(w, o + OMEGA, add(omega, turning))
+        put(w, o + VELOCITY, add(at(w, frame + VELOCITY), add(swing, sliding)))
+        put(w, o + ALPHA, add(alpha, add(turn(R, alpha_l), cross(omega, turning))))
+        put(w, o + ACCELERATION, a)
+        moves, first, c0 = flex(h, k, FLEX_INBOARD), port(h, p, PORT_COLUMN), flex(h, k, FLEX_C0)
+        for j in range(flex(h, k, N_MODES)):
+            for e in range(6):
+                w[index(column(h, first + j) + e)] = w[index(column(h, c0 + j) + e)] if moves else 0.0
+        modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
+
+    @kernel
+    def inboard(h, f, w, i, origin, R, omega, v, alpha, a):
+        """From the inboard joint frame G, which the modes may move in the body, to the body frame."""
+        p = link(h, i, INBOARD_PORT)
+        k = port(h, p, PORT_FLEX)
+        if flex(h, k, FLEX_INBOARD) == 0:
+            # the reference condition holds this frame still in the body: a rigid step
+            numbers = h[PORT_NUMBERS] + 12 * p
+            R_WB = product(R, transpose(at9(f, numbers + 3)))
+            arm = turn(R_WB, at(f, numbers))
+            swing = cross(omega, arm)
+            a_B = sub(a, add(cross(alpha, arm), cross(omega, swing)))
+            return sub(origin, arm), R_WB, omega, sub(v, swing), alpha, a_B
+        local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
+        R_WB = product(R, transpose(turned))
+        arm, turning, sliding = turn(R_WB, local), turn(R_WB, omega_l), turn(R_WB, v_l)
+        omega_B = sub(omega, turning)
+        alpha_B = sub(alpha, add(turn(R_WB, alpha_l), cross(omega_B, turning)))
+        swing = cross(omega_B, arm)
+        v_B = sub(v, add(swing, sliding))
+        a_B = sub(a, add(cross(alpha_B, arm), cross(omega_B, swing)))
+        a_B = sub(a_B, add(scale(2.0, cross(omega_B, sliding)), turn(R_WB, a_l)))
+        c0 = flex(h, k, FLEX_C0)
+        for j in range(flex(h, k, N_MODES)):
+            for e in range(6):
+                w[index(column(h, c0 + j) + e)] = 0.0
+        modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c0)
+        return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
+
+    return site, inboard

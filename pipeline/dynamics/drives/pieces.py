@@ -10,7 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import comb, inf
+from functools import cached_property
+from itertools import pairwise
+from math import comb, inf, perm, pi, sin
 
 import numpy as np
 
@@ -37,9 +39,10 @@ class Piece:
 
     def value(self, t: float, order: int = 0) -> float:
         """A derivative at time t."""
-        s = t - self.start
-        smooth = float(np.polynomial.Polynomial(self.coefficients).deriv(order)(s))
-        return smooth + sum(a * w**order * np.sin(w * s + phase + 0.5 * np.pi * order) for a, w, phase in self.terms)
+        s, smooth = t - self.start, 0.0
+        for n in range(len(self.coefficients) - 1, order - 1, -1):
+            smooth = smooth * s + perm(n, order) * self.coefficients[n]
+        return smooth + sum(a * w**order * sin(w * s + phase + 0.5 * pi * order) for a, w, phase in self.terms)
 
 
 @dataclass(frozen=True)
@@ -49,7 +52,7 @@ class Pieces:
     pieces: tuple[Piece, ...]
     span: tuple[float, float] = (-inf, inf)
 
-    @property
+    @cached_property
     def starts(self) -> np.ndarray:
         """Start of each piece [s], shape (n,); all but the first are breaks."""
         return np.array([p.start for p in self.pieces])
@@ -95,9 +98,7 @@ def pieces_of(law: object, dimension: str) -> Pieces:
 
 def polynomials(starts: Iterable[float], coefficients: Iterable[Sequence[float]]) -> tuple[Piece, ...]:
     """Pieces without harmonics."""
-    return tuple(
-        Piece(float(t), tuple(float(c) for c in row)) for t, row in zip(starts, coefficients, strict=True)
-    )
+    return tuple(Piece(float(t), tuple(float(c) for c in row)) for t, row in zip(starts, coefficients, strict=True))
 
 
 def covers(law: Pieces, start: float, end: float) -> bool:
@@ -108,11 +109,12 @@ def covers(law: Pieces, start: float, end: float) -> bool:
 
 def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
     """Time of the first break between start and end where value or rate jumps, and which of them does."""
-    inside = [float(t) for t in law.starts[1:] if start < t < end]
-    grid = np.linspace(start, end, 65)
+    meeting = [(p, q) for p, q in pairwise(law.pieces) if start < q.start < end]
+    grid = [float(t) for t in np.linspace(start, end, 65)]
     for order, word in ((0, "value"), (1, "rate")):
-        size = max(abs(law.value(float(t), order)) for t in (*grid, *inside))
-        for t in inside:
-            if abs(law.value(t, order, "right") - law.value(t, order, "left")) > 1e-7 * size:
-                return t, word
+        size = max(abs(law.value(t, order)) for t in grid)
+        for left, right in meeting:
+            here = left.value(right.start, order), right.value(right.start, order)
+            if abs(here[1] - here[0]) > 1e-6 * max(size, abs(here[0]), abs(here[1])):
+                return right.start, word
     return None

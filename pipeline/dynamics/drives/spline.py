@@ -6,11 +6,12 @@ Source: de Boor (1978), A Practical Guide to Splines, ch. IV and XIII (by SciPy)
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
-from pipeline.core.scene.laws import Spline
+from pipeline.core.scene.laws import Ends, Spline
 from pipeline.core.units import quantity
 from pipeline.dynamics.drives.pieces import Pieces, polynomials
 
@@ -20,7 +21,7 @@ def pieces(law: Spline, dimension: str) -> Pieces:
     return through(law.time, [quantity(v, dimension) for v in law.value], law.degree, law.ends)
 
 
-def through(time: Sequence[float], value: Sequence[float], degree: int, ends: str) -> Pieces:
+def through(time: Sequence[float], value: Sequence[float], degree: int, ends: Ends) -> Pieces:
     """The spline through the points; ValueError when they are not periodic though they should be."""
     if ends == "periodic" and value[0] != value[-1]:
         raise ValueError("a periodic spline ends with the value that it starts with")
@@ -29,13 +30,14 @@ def through(time: Sequence[float], value: Sequence[float], degree: int, ends: st
         drawn = CubicSpline(t, x, bc_type=ends)
         starts, rows = t[:-1], drawn.c[::-1].T
     else:
-        drawn = PPoly.from_spline(make_interp_spline(t, x, k=5, bc_type=_ends(ends)))
-        keep = np.diff(drawn.x) > 0.0  # the knots at both ends are repeated
-        starts, rows = drawn.x[:-1][keep], drawn.c[::-1].T[keep]
+        made: Any = make_interp_spline(t, x, k=5, bc_type=_ends(ends))
+        fifth = PPoly.from_spline(made)
+        keep = np.diff(fifth.x) > 0.0  # the knots at both ends are repeated
+        starts, rows = fifth.x[:-1][keep], fifth.c[::-1].T[keep]
     return Pieces(polynomials(starts, rows), (float(t[0]), float(t[-1])))
 
 
-def _ends(ends: str) -> object:
+def _ends(ends: Ends) -> Any:
     both = {"natural": [(3, 0.0), (4, 0.0)], "clamped": [(1, 0.0), (2, 0.0)]}
     if ends in both:
         return both[ends], both[ends]

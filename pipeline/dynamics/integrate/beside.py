@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT_SIZE
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT_SIZE
 from pipeline.dynamics.integrate.engine import Engine, observe
 
 #: first distance in time, as share of the run, and its factor from try to try

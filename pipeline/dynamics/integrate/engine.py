@@ -121,13 +121,14 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     y = initial.start_state(built)
     singular.select_rows(engine, y, engine.start)
     y = project(engine, y)
-    links = built.packed.sizes["N_LINKS"]
+    links, rows = built.packed.sizes["N_LINKS"], built.packed.sizes["N_CLOSURE_ROWS"]
 
-    def frames(state_vector: np.ndarray) -> np.ndarray:
+    def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         engine.evaluate(state_vector, engine.start)
-        return engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
+        frames = engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
+        return frames, engine.view("RESIDUAL_RATE", rows).copy()
 
-    y = project(engine, initial.given_velocities(built, frames, y))
+    y = project(engine, initial.given_velocities(built, motion, y))
     if built.kinds.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
@@ -153,16 +154,25 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     return seen["state"][0].copy()
 
 
-def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
-    engine.evaluate(y, engine.start)
+def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
+    """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
     contacts = engine.built.system.contacts
-    touches = engine.view("TOUCH", TOUCH_SIZE * len(contacts)).reshape(-1, TOUCH_SIZE)
-    for (name, joint, _, _), touch in zip(contacts, touches, strict=True):
-        if touch[GAP] < -1e-9 * joint.clearance:
+    if not contacts:
+        return {}
+    engine.evaluate(y, engine.start)
+    gaps = engine.view("TOUCH", TOUCH_SIZE * len(contacts)).reshape(-1, TOUCH_SIZE)[:, GAP]
+    return {c: -float(gaps[c]) for c, (_, joint, _, _) in enumerate(contacts) if gaps[c] < -1e-9 * joint.clearance}
+
+
+def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
+    for c, depth in overlapping(engine, y).items():
+        name, joint, _, _ = engine.built.system.contacts[c]
+        if joint.initial_approach_speed is None:
             raise InputError(
                 f"[joint.{name}]",
-                f"ball and socket start {-touch[GAP]:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
-                "move a body, or enlarge the clearance",
+                f"its surfaces start {depth:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
+                "move a body, enlarge the clearance, or declare the speed at which this contact began as "
+                "initial_approach_speed",
             )
 
 

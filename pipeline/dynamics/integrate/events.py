@@ -3,6 +3,7 @@
 A closing is a gap that falls through zero, an opening one that rises through it. Both are looked
 for in every accepted step, also when gap and penetration return within the step; the earliest is
 located on the dense output, the step is repeated to end there, and the contact's mode changes.
+What happens in between is followed by `trace`.
 """
 
 from __future__ import annotations
@@ -15,31 +16,32 @@ from pipeline.dynamics.integrate.state import (
     CULPRIT,
     DURATION,
     EVALUATIONS,
-    EVENT_CONTACT,
-    EVENT_KIND,
     EVENT_ROW,
     EVENT_TIME,
+    FORCE0,
     GAP0,
     GAP1,
     IMMEDIATE,
     LENGTH,
     LOST_CLOSURE,
-    N_EVENTS,
     OPENING,
     PEAK_DEPTH,
     PEAK_FORCE,
     RATE0,
     RATE1,
     RTOL,
+    SLIP0,
     SPEED,
     STATUS,
     STUCK_EVENT,
     TIME,
-    WATCH_SIZE,
+    TREND0,
 )
+from pipeline.dynamics.integrate.trace import compose as compose_trace
+from pipeline.dynamics.integrate.trace import note, remember_end, watch
 from pipeline.dynamics.tables import (
+    BRISTLE,
     CLEARANCE,
-    CONTACT_NUMBERS,
     CONTROL,
     GAP,
     LATCHED,
@@ -48,11 +50,13 @@ from pipeline.dynamics.tables import (
     NORMAL_FORCE,
     NY,
     RATE,
+    SLIP,
     SLOPES,
-    WATCH,
     Y_NEW,
     Y_STAGE,
     Y,
+    contact,
+    contact_numbers,
     touch,
 )
 from pipeline.dynamics.vectors import kernel
@@ -62,17 +66,7 @@ ZERO_GAP = 1e-12
 ROOT_ITERATIONS = 60
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
-#: dense samples of a step in which the force may peak
-SAMPLES = 8
-#: penetration rates below this share of the impact rate may hold the peak of the force
-NEAR_PEAK = 0.3
 NEVER = 2.0
-
-
-@kernel
-def watch(h, c):
-    """Where w holds what the stepper watches of contact c."""
-    return h[WATCH] + WATCH_SIZE * c
 
 
 @kernel
@@ -84,14 +78,16 @@ def side(n, c):
 @kernel
 def clearance(h, f, c):
     """Clearance of contact c."""
-    return f[h[CONTACT_NUMBERS] + 11 * c + CLEARANCE]
+    return f[contact_numbers(h, c) + CLEARANCE]
 
 
 @kernel
 def start_watch(h, w):
-    """Remember gap and rate where a step starts."""
+    """Note what the contacts do where a segment starts, which has just been evaluated."""
     for c in range(h[N_CONTACTS]):
-        w[watch(h, c) + GAP0], w[watch(h, c) + RATE0] = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
+        o, now = watch(h, c), touch(h, c)
+        w[o + GAP0], w[o + RATE0] = w[now + GAP], w[now + RATE]
+        w[o + FORCE0], w[o + SLIP0] = w[now + NORMAL_FORCE], w[now + SLIP]
 
 
 @kernel
@@ -102,42 +98,55 @@ def suspicious(h, w, n, c):
 
 
 @kernel
-def peaking(h, w, n, c):
-    """Whether the force of a closed contact may peak within the step."""
-    o = watch(h, c)
-    return n[n[MODE] + c] == 1 and w[o + RATE0] > 0.0 and w[o + RATE1] < NEAR_PEAK * w[h[LATCHED] + c]
+def straighten(h, w, c):
+    """The bristles of a contact that begins bear nothing yet."""
+    place = contact(h, c, BRISTLE)
+    if place >= 0:
+        for k in range(3):
+            w[h[Y_NEW] + place + k] = 0.0
 
 
 @kernel
 def switch(h, w, n, events, c, t):
     """Change the mode of contact c at time t, latch its impact rate, and write the event down."""
-    row, o = n[N_EVENTS], watch(h, c)
-    event, rate = events[row], w[o + RATE1]
-    event[EVENT_TIME], event[EVENT_CONTACT] = t, c
+    o = watch(h, c)
+    rate = w[o + RATE1]
     if n[n[MODE] + c] == 0:
         n[n[MODE] + c] = 1
         w[h[LATCHED] + c] = max(rate, 0.0)
-        event[EVENT_KIND], event[SPEED], event[PEAK_FORCE], event[PEAK_DEPTH] = CLOSING, rate, 0.0, 0.0
-        w[o + EVENT_ROW] = row
+        straighten(h, w, c)
+        row = note(events, n, c, CLOSING, t)
+        event = events[row]
+        event[SPEED], event[PEAK_FORCE], event[PEAK_DEPTH] = rate, 0.0, 0.0
+        w[o + EVENT_ROW], w[o + TREND0] = row, 1.0
     else:
         n[n[MODE] + c] = 0
-        event[EVENT_KIND], event[SPEED] = OPENING, -rate
+        ended = events[note(events, n, c, OPENING, t)]
+        ended[SPEED] = -rate
         begun = events[int(w[o + EVENT_ROW])]
         begun[DURATION] = t - begun[EVENT_TIME]
-    n[N_EVENTS] = row + 1
 
 
-def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+def make_settle(
+    evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any, regimes: Callable
+) -> Callable:
     """The kernel settle(h, f, w, n, step, t_new, events) -> (event?, dense output ready?, end, step)."""
     interpolate, last = method.interpolate, method.last
     spare = method.slopes - 1  # row of SLOPES that no stage uses
 
     @kernel
-    def look(h, f, w, n, step, theta, c):
-        """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
+    def peek(h, f, w, n, step, theta):
+        """Evaluate the state at a share of the step."""
         interpolate(h, w, theta, h[Y_STAGE])
         evaluate(h, f, w, n, w[h[CONTROL] + TIME] + theta * step, h[Y_STAGE], h[SLOPES] + h[NY] * spare)
         n[EVALUATIONS] += 1
+
+    trace = compose_trace(evaluate, peek, extend, method, regimes)
+
+    @kernel
+    def look(h, f, w, n, step, theta, c):
+        """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
+        peek(h, f, w, n, step, theta)
         return side(n, c) * w[touch(h, c) + GAP], -side(n, c) * w[touch(h, c) + RATE] * step
 
     @kernel
@@ -193,26 +202,6 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
         return NEVER
 
     @kernel
-    def peaks(h, f, w, n, step, c, event):
-        """Largest force and penetration of a closed contact in this step, from dense samples."""
-        best, before, after, previous, depth = 0.0, 0.0, 0.0, 0.0, 0.0
-        at_peak = False
-        for k in range(SAMPLES + 1):
-            look(h, f, w, n, step, k / SAMPLES, c)
-            force = w[touch(h, c) + NORMAL_FORCE]
-            depth = max(depth, -w[touch(h, c) + GAP])
-            if at_peak:
-                after, at_peak = force, False
-            if force > best:
-                best, before, after, at_peak = force, previous, 0.0, k > 0
-            previous = force
-        bend = 2.0 * best - before - after
-        if before > 0.0 and after > 0.0 and bend > 0.0:
-            best += (after - before) ** 2 / (8.0 * bend)  # top of the parabola through three samples
-        event[PEAK_FORCE] = max(event[PEAK_FORCE], best)
-        event[PEAK_DEPTH] = max(event[PEAK_DEPTH], depth)
-
-    @kernel
     def end_at(h, f, w, n, step, c):
         """Repeat the step so that it ends on the event; its length, or -1 when it cannot be done."""
         o, slope = h[CONTROL], h[SLOPES] + h[NY] * last
@@ -233,22 +222,18 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
         return step
 
     @kernel
-    def first_event(h, f, w, n, step, events):
-        """Contact and share of the step of its first mode change; also the peaks on the way."""
+    def first_event(h, f, w, n, step):
+        """Contact and share of the step of its first mode change, and whether the dense output is ready."""
         ready, first, which = False, NEVER, -1
         for c in range(h[N_CONTACTS]):
-            w[watch(h, c) + GAP1], w[watch(h, c) + RATE1] = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
-        for c in range(h[N_CONTACTS]):
-            change, peak = suspicious(h, w, n, c), peaking(h, w, n, c)
-            if (change or peak) and not ready:
+            if not suspicious(h, w, n, c):
+                continue
+            if not ready:
                 extend(h, f, w, n, step)
                 ready = True
-            if change:
-                theta = find(h, f, w, n, step, c)
-                if theta < first:
-                    first, which = theta, c
-            if peak:
-                peaks(h, f, w, n, step, c, events[int(w[watch(h, c) + EVENT_ROW])])
+            theta = find(h, f, w, n, step, c)
+            if theta < first:
+                first, which = theta, c
         return which, first, ready
 
     @kernel
@@ -270,13 +255,11 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
     @kernel
     def settle(h, f, w, n, step, t_new, events):
         t = w[h[CONTROL] + TIME]
-        which, first, ready = first_event(h, f, w, n, step, events)
+        remember_end(h, w)
+        which, first, ready = first_event(h, f, w, n, step)
         if which < 0:
             n[IMMEDIATE] = 0
-            for c in range(h[N_CONTACTS]):
-                o = watch(h, c)
-                w[o + GAP0], w[o + RATE0] = w[o + GAP1], w[o + RATE1]
-            return 0, ready, t_new, step
+            return 0, trace(h, f, w, n, step, ready, events), t_new, step
         if first * step <= 1e-15 * max(abs(t), step):
             return at_once(h, f, w, n, which, events), True, t, step
         n[IMMEDIATE] = 0
@@ -284,12 +267,22 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
         if length < 0.0:
             n[STATUS], n[CULPRIT] = LOST_CLOSURE, which
             return -1, ready, t_new, step
-        w[watch(h, which) + RATE1] = w[touch(h, which) + RATE]
+        remember_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
+        trace(h, f, w, n, length, True, events)
         switch(h, w, n, events, which, t + length)
         return 1, True, t + length, length
 
     return settle
 
 
-EVENTS_OF_CONTACTS = (start_watch, make_settle)
+def watching(regimes: Callable) -> tuple[Callable, Callable]:
+    """What the stepper calls at the start of a segment, and the maker of what it calls after each step.
+
+    regimes: whether contacts have regimes of sticking (`trace.regimes` or `trace.no_regimes`).
+    """
+
+    def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+        return make_settle(evaluate, attempt, extend, project, method, regimes)
+
+    return start_watch, make

@@ -48,6 +48,8 @@ class Method:
     gap: middle of the widest gap between the stages, as share of the step.
     memory: floats kept between steps, from the numbers of positions, speeds and state variables.
     parameter: the method's number in the scene's solver table.
+    stability: reach of the region of stability along the negative real axis, of an explicit method whose last
+        stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
     """
 
     slopes: int
@@ -61,6 +63,7 @@ class Method:
     gap: float = 0.5
     memory: Callable[[int, int, int], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
+    stability: float | None = None
 
 
 @dataclass(frozen=True)

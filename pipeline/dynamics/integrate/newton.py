@@ -14,16 +14,22 @@ SMALL = 1e-3
 
 
 @kernel
+def limit(rtol):
+    """Norm of what may be left, in units of the tolerance."""
+    return max(SHARE, ROUNDING / rtol)
+
+
+@kernel
 def converged(k, norm, last_norm, rtol):
     """1 when correction k (norm in units of the tolerance) was the last one, -1 when it is hopeless, else 0."""
-    limit = max(SHARE, ROUNDING / rtol)
+    enough = limit(rtol)
     if not norm <= 1e300:
         return -1
     if k == 0:
-        return 1 if norm <= SMALL * limit else 0
+        return 1 if norm <= SMALL * enough else 0
     rate = norm / last_norm
-    if rate < 1.0 and rate / (1.0 - rate) * norm < limit:
+    if rate < 1.0 and rate / (1.0 - rate) * norm < enough:
         return 1
     if rate >= 1.0:
-        return 1 if norm <= limit else -1
+        return 1 if norm <= enough else -1
     return 0

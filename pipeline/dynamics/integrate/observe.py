@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.assembly.pivots import JACOBIAN_SIZE, LAST_PIVOT, N_KEPT_ROWS, PIVOT
+from pipeline.dynamics.assembly.places import JACOBIAN, JACOBIAN_SIZE, LAST_PIVOT, N_KEPT_ROWS, PIVOT
 from pipeline.dynamics.integrate.project import BLIND, largest
 from pipeline.dynamics.tables import (
     ACTIVE,
+    BENT,
     DRIVE_FORCE,
     DU,
     EVALUATION,
@@ -15,7 +16,6 @@ from pipeline.dynamics.tables import (
     FRAME_SIZE,
     GRAVITY,
     INERTIA_SIZE,
-    JACOBIAN,
     KEPT0,
     LATCHED,
     LINK_FRAMES,
@@ -187,7 +187,7 @@ def compose(
                 kinetic += rigid_energy(h, f, w, i)
             potential -= dot(at(f, h[GRAVITY]), at(w, h[OWN] + INERTIA_SIZE * i + 1))
         for c in range(h[N_CONTACTS]):
-            elastic += w[touch(h, c) + STORED]
+            elastic += w[touch(h, c) + STORED] + w[touch(h, c) + BENT]
         for k in range(h[N_LOADS]):
             elastic += w[h[LOAD] + LOAD_SIZE * k + LOAD_STORED]
         out[column], out[column + 1], out[column + 2] = kinetic, potential, elastic

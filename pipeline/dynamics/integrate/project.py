@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT
 from pipeline.dynamics.tables import (
     C0,
     CORRECTION,

@@ -1,9 +1,8 @@
 r"""Radau IIA of order 5: implicit, L-stable, for stiff friction, stiff contacts and stiff modes.
 
 The three stages are found by a simplified Newton iteration whose linear systems are parted into a real and a complex
-one; the Jacobian, of the positions and speeds, is made by finite differences and kept while iterations converge fast.
-Ledger variables influence nothing, so that they stay out of the systems. The error estimate is filtered by the real
-system; dense output is the collocation polynomial.
+one; the Jacobian is made by finite differences and kept while iterations converge fast. The error estimate is filtered
+by the real system; dense output is the collocation polynomial.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.5 (table 5.6) and IV.8.
 """
@@ -27,7 +26,6 @@ from pipeline.dynamics.integrate.radau_systems import (
     TRANSFORMED,
     VALID,
     Z,
-    dynamic,
     factorise,
     jacobian_entry,
     memory,
@@ -187,11 +185,11 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
 
     @kernel
     def jacobian(h, f, w, n):
-        """Change of all rates with positions and speeds, at the start of the step."""
+        """Change of all rates with all variables, at the start of the step."""
         size, near = h[NY], h[SLOPES] + h[NY]
         for c in range(size):
             w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)]
-        for k in range(dynamic(h)):
+        for k in range(size):
             y = w[index(h[Y] + k)]
             w[index(h[Y_STAGE] + k)] = y + NUDGE * (f[index(h[FLOORS] + h[index(h[GROUPS] + k)])] + abs(y))
             nudge = w[index(h[Y_STAGE] + k)] - y
@@ -221,8 +219,8 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
                 if n[EVALUATION] != OK:
                     return -1.0
             residuals(h, w, step)
-            solve_real(h, w, step, stage_vector(h, CORRECTION, 0))
-            solve_pair(h, w, step, stage_vector(h, CORRECTION, 1), stage_vector(h, CORRECTION, 2))
+            solve_real(h, w, stage_vector(h, CORRECTION, 0))
+            solve_pair(h, w, stage_vector(h, CORRECTION, 1), stage_vector(h, CORRECTION, 2))
             norm = correct(h, w)
             rate = norm / last_norm if k > 0 else 0.0
             verdict = converged(k, norm, last_norm, w[index(h[CONTROL] + RTOL)])
@@ -263,7 +261,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
             for i in range(3):
                 bent += E[i] * w[index(stage_vector(h, Z, i) + c)]
             w[index(out + c)] = w[index(slope + c)] + bent / step
-        solve_real(h, w, step, out)
+        solve_real(h, w, out)
         for c in range(h[NY]):
             total += (w[index(out + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
         return np.sqrt(total / h[NY])

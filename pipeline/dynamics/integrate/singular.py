@@ -11,7 +11,7 @@ from pipeline.dynamics.assembly import selection
 from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.layout import Layout
 from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT_SIZE, WANTED_PIVOT
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT_SIZE, WANTED_PIVOT
 
 if TYPE_CHECKING:
     from pipeline.dynamics.integrate.engine import Engine

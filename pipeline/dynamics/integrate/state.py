@@ -7,15 +7,16 @@ events another.
 
 from __future__ import annotations
 
-from pipeline.dynamics.tables import MODE
+from pipeline.dynamics.tables import STATE as LAST
 
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
-# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter;
+# accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter,
+# largest rate of a closure before projection, largest rate of the equations that a step met;
 # then what `straddle` keeps: independence of the closure rows at the end of the step and at its start, its start,
 # time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER = range(11)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS, N_CONTROLS = range(11, 18)
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS, N_CONTROLS = range(13, 20)
 # integers
 (
     STATUS,
@@ -33,15 +34,17 @@ SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS, N_CONTROLS = r
     PROJECTION_EVALUATIONS,
     JACOBIANS,
     CULPRIT,
+    STIFF_STEPS,
     INTEGERS,
-) = range(MODE + 1, MODE + 17)
+) = range(LAST + 1, LAST + 18)
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
 NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR = 8, 9, 10, 11
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
-CLOSING, OPENING = 0, 1
-# per contact, what the stepper watches: gap and rate at both ends of the step, row of its last closing
-GAP0, RATE0, GAP1, RATE1, EVENT_ROW, WATCH_SIZE = range(6)
-#: free rows of record and events that one step may need
-ROOM = 8
+CLOSING, OPENING, COMPRESSION, STICKING, SLIPPING = range(5)
+# per contact, what the stepper watches: at the start and at the end of the step gap, rate, normal force, sliding
+# speed and whether the force grows (> 0); row of its last closing
+GAP0, RATE0, FORCE0, SLIP0, TREND0, GAP1, RATE1, FORCE1, SLIP1, TREND1, EVENT_ROW, WATCH_SIZE = range(12)
+#: free rows that one step may need: of the record; of the events, per contact
+ROOM, EVENTS_OF_A_CONTACT = 8, 3

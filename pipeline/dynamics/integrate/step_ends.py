@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics.integrate.events import start_watch, switch, watch
+from pipeline.dynamics.integrate.events import start_watch, switch
 from pipeline.dynamics.integrate.state import (
     EVALUATIONS,
     EVENT_ROW,
@@ -21,6 +21,7 @@ from pipeline.dynamics.integrate.state import (
     STATUS,
 )
 from pipeline.dynamics.integrate.stepper import RESTART
+from pipeline.dynamics.integrate.trace import watch
 from pipeline.dynamics.tables import (
     EVALUATION,
     GAP,

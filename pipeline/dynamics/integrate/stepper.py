@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT, WANTED_PIVOT
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT, WANTED_PIVOT
 from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.integrate.state import (
     AT_SINGULAR,
@@ -23,6 +23,7 @@ from pipeline.dynamics.integrate.state import (
     DRIFT,
     END,
     EVALUATIONS,
+    EVENTS_OF_A_CONTACT,
     FRESH,
     FULL,
     LENGTH,
@@ -34,6 +35,7 @@ from pipeline.dynamics.integrate.state import (
     PAUSED,
     PROJECTION_EVALUATIONS,
     PROJECTIONS,
+    RATE_DRIFT,
     REJECTED,
     ROOM,
     RTOL,
@@ -46,6 +48,7 @@ from pipeline.dynamics.integrate.state import (
     TIME,
     WORN_ROWS,
 )
+from pipeline.dynamics.integrate.stiffness import detect
 from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan
 from pipeline.dynamics.tables import (
     CONTROL,
@@ -62,6 +65,7 @@ from pipeline.dynamics.tables import (
     NY,
     OK,
     RESIDUAL,
+    RESIDUAL_RATE,
     SLOPES,
     Y_NEW,
     Y_STAGE,
@@ -158,6 +162,7 @@ def compose(
     interpolate, last, ends = method.interpolate, method.last, method.ends
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
+    feel = detect(method)
     first_step, judge, after_rejection, next_step, lay, foresee = stepping(evaluate, start_watch, begin, error, method)
 
     @kernel
@@ -174,7 +179,10 @@ def compose(
             n[STATUS] = AT_SINGULAR
         elif w[index(h[PIVOT] + LAST_PIVOT)] < w[index(h[PIVOT] + WANTED_PIVOT)]:
             n[STATUS] = WORN_ROWS
-        elif n[N_RECORDED] + waiting + ROOM > rows.shape[0] or n[N_EVENTS] + ROOM > events.shape[0]:
+        elif (
+            n[N_RECORDED] + waiting + ROOM > rows.shape[0]
+            or n[N_EVENTS] + ROOM + EVENTS_OF_A_CONTACT * h[N_CONTACTS] > events.shape[0]
+        ):
             n[STATUS] = FULL
         else:
             return False
@@ -207,6 +215,7 @@ def compose(
             n[EVALUATION] = NOT_FINITE
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
+        w[index(c + RATE_DRIFT)] = max(w[index(c + RATE_DRIFT)], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
         share = TIGHTLY if near(h, w, t_new) else w[index(c + RTOL)]
         used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[index(c + LENGTH)])
         note(h, w)
@@ -227,7 +236,10 @@ def compose(
             return 1e9
         if norm > allowed(h, w):
             return min(norm, 1e9)
-        return norm if finish(h, f, w, n, t_new) else 1e9
+        if not finish(h, f, w, n, t_new):
+            return 1e9
+        feel(h, w, n, step)
+        return norm
 
     @kernel
     def accept(h, w, t_new):

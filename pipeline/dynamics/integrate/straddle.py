@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.assembly.pivots import LAST_PIVOT, PIVOT
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT
 from pipeline.dynamics.integrate.project import BLIND
 from pipeline.dynamics.integrate.state import (
     BLIND_STEPS,

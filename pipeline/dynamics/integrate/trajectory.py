@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics.assembly.pivots import PIVOT_SIZE
+from pipeline.dynamics.assembly.places import PIVOT_SIZE
 from pipeline.dynamics.integrate import singular, state
-from pipeline.dynamics.integrate.engine import Engine, Progress
+from pipeline.dynamics.integrate.engine import Engine, Progress, overlapping
 from pipeline.dynamics.tables import MODE
 
 #: evaluations between two looks at the clock and the keyboard
@@ -18,20 +18,26 @@ SLICE = 20_000
 EVENT_ROWS = 4096
 #: why the stepper stops that another choice of closure rows may mend
 STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
+#: above this share of steps that stability limits, stiffness is named as the cause of a long run
+STIFF_SHARE = 0.3
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`.
+    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`, by time.
 
     selections: closure rows solved for, each from a time on.
+    drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
+    steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
     """
 
     rows: np.ndarray
     events: np.ndarray
     counters: dict[str, int]
-    drift: float
     selections: tuple[tuple[float, np.ndarray], ...]
+    drift: float = 0.0
+    rate_drift: float = 0.0
+    steepest: float = 0.0
 
     @property
     def time(self) -> np.ndarray:
@@ -80,7 +86,7 @@ def integrate(engine: Engine, y: np.ndarray, progress: Progress) -> Trajectory:
         engine.select_pieces(0.5 * (a + b))
         control[state.END], run.n[state.FRESH] = b, 1
         _segment(engine, run, progress)
-    return _collect(run, float(control[state.DRIFT]))
+    return _collect(run, control)
 
 
 def _begin(engine: Engine, y: np.ndarray) -> _Run:
@@ -105,7 +111,30 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     engine.view("Y", len(y))[:] = y
     engine.view("PIVOT", PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
     events = np.full((room + state.ROOM, state.EVENT_SIZE), np.nan)
+    _begin_closed(engine, y, rows[0], events)
     return _Run(engine.w, n, outputs, rows, events, [(engine.start, engine.kept.copy())])
+
+
+def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.ndarray) -> None:
+    """Contacts that the start already has begin there, at the approach speeds that the scene declares."""
+    contacts = engine.built.system.contacts
+    if not contacts:
+        return
+    n, count = engine.n, len(contacts)
+    modes, latched = n[n[MODE] : n[MODE] + count], engine.view("LATCHED", count)
+    watched = engine.view("WATCH", state.WATCH_SIZE * count).reshape(count, -1)
+    watched[:] = 0.0
+    for c in overlapping(engine, y):
+        speed = contacts[c][1].initial_approach_speed
+        if speed is None:
+            continue  # a start that differs by a hair from one that touches: it closes at once
+        modes[c], latched[c] = 1, speed
+        event = events[n[state.N_EVENTS]]
+        event[[state.EVENT_TIME, state.EVENT_CONTACT, state.EVENT_KIND]] = engine.start, c, state.CLOSING
+        event[[state.SPEED, state.PEAK_FORCE, state.PEAK_DEPTH]] = speed, 0.0, 0.0
+        watched[c, [state.EVENT_ROW, state.TREND0]] = n[state.N_EVENTS], 1.0
+        n[state.N_EVENTS] += 1
+    row[1 : 1 + count], row[1 + count : 1 + 2 * count] = modes, latched
 
 
 def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
@@ -138,11 +167,12 @@ def _refusal(engine: Engine, run: _Run) -> str:
     culprit = contacts[n[state.CULPRIT]] if contacts else ""
     reasons = {
         state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
-        "contacts may be collapsing in time, or the tolerance is too tight",
+        + _why_so_many(n, control),
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than an explicit method can follow ({where})",
         state.NO_START: f"the equations are singular here ({where})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero",
+        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
+        + (f", or the fixed step of {control[state.FIXED]:.2g} s is too long for it" if control[state.FIXED] else ""),
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {control[state.FIXED]:.2g} s: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
@@ -154,7 +184,18 @@ def _refusal(engine: Engine, run: _Run) -> str:
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
 
 
-def _collect(run: _Run, drift: float) -> Trajectory:
+def _why_so_many(n: np.ndarray, control: np.ndarray) -> str:
+    """What used the evaluations up."""
+    if n[state.STIFF_STEPS] > STIFF_SHARE * max(1, n[state.STEPS]):
+        return (
+            f"{n[state.STIFF_STEPS]} of {n[state.STEPS]} steps were limited by stability: the equations have rates up "
+            f"to {control[state.STEEPEST]:.2g} 1/s, as the slope of friction at small sliding speeds has; "
+            "choose an implicit integrator, or a larger v_static"
+        )
+    return "contacts may be collapsing in time, or the tolerance is too tight"
+
+
+def _collect(run: _Run, control: np.ndarray) -> Trajectory:
     n = run.n
     rows = run.rows[: n[state.N_RECORDED]]
     keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
@@ -163,7 +204,12 @@ def _collect(run: _Run, drift: float) -> Trajectory:
         "steps": int(n[state.STEPS]),
         "rejected_steps": int(n[state.REJECTED]),
         "projections": int(n[state.PROJECTIONS]),
+        "stiff_steps": int(n[state.STIFF_STEPS]),
         "projection_evaluations": int(n[state.PROJECTION_EVALUATIONS]),
         "jacobians": int(n[state.JACOBIANS]),
     }
-    return Trajectory(rows[keep], run.events[: n[state.N_EVENTS]], counters, drift, tuple(run.selections))
+    events = run.events[: n[state.N_EVENTS]]
+    # what happens inside a step is noted when the step is done: one contact after the other
+    in_order = events[np.argsort(events[:, state.EVENT_TIME], kind="stable")]
+    drift, rate_drift, steepest = (float(control[k]) for k in (state.DRIFT, state.RATE_DRIFT, state.STEEPEST))
+    return Trajectory(rows[keep], in_order, counters, tuple(run.selections), drift, rate_drift, steepest)

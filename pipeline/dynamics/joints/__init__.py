@@ -22,4 +22,9 @@ NAMES = {
     "rotation-vector": "rotation_vector:RotationVector",
     "free": "free:Free",
 }
-CONTACTS = {"clearance-spherical": "clearance_spherical:ClearanceSpherical"}
+CONTACTS = {
+    "clearance-spherical": "clearance_spherical:ClearanceSpherical",
+    "clearance-revolute": "clearance_revolute:ClearanceRevolute",
+}
+#: the ideal joint that a clearance joint keeps beside its contact
+HELD = {"clearance-revolute": "planar"}

@@ -11,25 +11,35 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.loading import LEDGER, order
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics.record import ledger
 from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.run import Run
 from pipeline.dynamics.tables import (
-    CONTACT_LOSS,
     FRICTION_POWER,
     GAP,
     NORMAL_FORCE,
     RATE,
+    SLIP,
     TOUCH_FORCE,
     TOUCH_OFFSET,
     TOUCH_SIZE,
 )
+
+#: event kinds by their flag values; 0 and 1 as ever
+EVENT_KINDS = ("opening", "closing", "compression", "sticking", "slipping")
+_FLAGS = {
+    state.OPENING: "opening",
+    state.CLOSING: "closing",
+    state.COMPRESSION: "compression",
+    state.STICKING: "sticking",
+    state.SLIPPING: "slipping",
+}
 
 Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -53,14 +63,14 @@ def dataset(run: Run) -> xr.Dataset:
         coordinates["twin_time"] = run.twin.time
         variables["twin_separation"] = (("twin_time",), run.twin.separation)
         variables["horizon"] = ((), np.array(run.twin.horizon))
-    _ledger(built, seen, variables)
+    variables.update(ledger.series(built, seen))
     topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
     made = xr.Dataset(variables | topological, coords=coordinates | named)
-    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run))
+    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run), **_told(built, trajectory))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
-            "flag_values": np.array([0, 1], dtype=np.int8),
-            "flag_meanings": "opening closing",
+            "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
+            "flag_meanings": " ".join(EVENT_KINDS),
         }
     return result
 
@@ -79,10 +89,40 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
+def _told(built: Tables, trajectory: Trajectory) -> dict[str, str]:
+    """Laws of the contacts, and in words where the run left the range of one."""
+    if not built.system.contacts:
+        return {}
+    from pipeline.dynamics.contact import validity
+
+    return {
+        "contacts": validity.laws(built.system.contacts, built.laws),
+        "warnings": "\n".join(contact_warnings(built, trajectory)),
+    }
+
+
+def contact_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
+    """Sentences about contacts that left the range for which their laws were made."""
+    if not built.system.contacts:
+        return []
+    from pipeline.dynamics.contact import validity
+
+    e, found = trajectory.events, []
+    for c, ((name, joint, _, _), law) in enumerate(zip(built.system.contacts, built.laws, strict=True)):
+        mine = e[e[:, state.EVENT_CONTACT] == c]
+        depth, force = np.fmax.reduce(mine[:, [state.PEAK_DEPTH, state.PEAK_FORCE]], axis=0, initial=0.0)
+        found += validity.warnings(name, joint, law, float(depth), float(force))
+    return found
+
+
 def _report(run: Run) -> dict[str, float | int]:
+    counters = run.trajectory.counters
     found: dict[str, float | int] = {
-        **run.trajectory.counters,
+        **counters,
+        "stiff_share": counters.get("stiff_steps", 0) / max(1, counters.get("steps", 0)),
+        "largest_rate": run.trajectory.steepest,
         "largest_drift_before_projection": run.trajectory.drift,
+        "largest_rate_drift_before_projection": run.trajectory.rate_drift,
         "closure_residual_of_given_start": run.start_residual,
     }
     return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
@@ -163,7 +203,7 @@ def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordina
 def _loads(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
     from pipeline.dynamics.record.loads import load_series
 
-    coordinates["load"] = order(built.system.scene)
+    coordinates["load"] = list(built.system.scene.forces())
     variables.update(load_series(built, seen))
 
 
@@ -176,10 +216,12 @@ def _contacts(built: Tables, seen: Seen, variables: Variables, coordinates: dict
         "contact_rate": touch[..., RATE],
         "contact_normal_force": touch[..., NORMAL_FORCE],
         "contact_friction_power": touch[..., FRICTION_POWER],
+        "contact_sliding_speed": touch[..., SLIP],
     }
     variables.update({name: (("time", "contact"), values) for name, values in scalars.items()})
     for name, o in (("contact_force", TOUCH_FORCE), ("contact_offset", TOUCH_OFFSET)):
         variables[name] = (("time", "contact", "axis"), touch[..., o : o + 3])
+    variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in built.laws]))
 
 
 def _events(trajectory: Trajectory, variables: Variables) -> None:
@@ -187,36 +229,10 @@ def _events(trajectory: Trajectory, variables: Variables) -> None:
     columns = {
         "event_time": e[:, state.EVENT_TIME],
         "event_contact": e[:, state.EVENT_CONTACT].astype(np.int32),
-        "event_kind": (e[:, state.EVENT_KIND] == state.CLOSING).astype(np.int8),
+        "event_kind": np.array([EVENT_KINDS.index(_FLAGS[int(k)]) for k in e[:, state.EVENT_KIND]], dtype=np.int8),
         "event_approach_speed": e[:, state.SPEED],
         "event_peak_force": e[:, state.PEAK_FORCE],
         "event_peak_penetration": e[:, state.PEAK_DEPTH],
         "event_duration": e[:, state.DURATION],
     }
     variables.update({name: (("event",), values) for name, values in columns.items()})
-
-
-def _ledger(built: Tables, seen: Seen, variables: Variables) -> None:
-    names = built.system.scene.forces()
-    ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
-    kinetic, potential, elastic = seen["energy"].T
-    # ledger: work of the drives, loss of modal damping, per contact its normal and friction losses; then, where
-    # there are loads, their work, their losses, and the angles that some of them follow
-    losses = CONTACT_LOSS + 2 * len(built.system.contacts)
-    assert ledger.shape[1] == losses + (LEDGER + built.packed.sizes["N_TURNS"] if names else 0)
-    work, dissipated = ledger[:, 0], ledger[:, 1:losses].sum(axis=1)
-    load_work = ledger[:, losses] if names else np.zeros(len(ledger))
-    if names:
-        dissipated = dissipated + ledger[:, losses + 1]
-        variables["load_work"] = (("time",), load_work)
-    balance = kinetic + potential + elastic + dissipated - work - load_work
-    series = {
-        "kinetic": kinetic,
-        "potential": potential,
-        "elastic": elastic,
-        "dissipated": dissipated,
-        "drive_work": work,
-        "energy_error": balance - balance[0],
-        "constraint_error": seen["residual"][:, 0],
-    }
-    variables.update({name: (("time",), values) for name, values in series.items()})

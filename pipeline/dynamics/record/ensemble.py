@@ -21,6 +21,7 @@ from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_star
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
 from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.record.dataset import attributes
+from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run import engine_of, observed
 from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
@@ -71,6 +72,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     peak, count, share = _contact_statistics(engine, trajectory)
     kept = replace(trajectory, rows=trajectory.rows[rows])
     seen = observed(engine, kept)
+    require_closed(engine.built, kept, seen)
     motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
     chosen = [motions[n] for n in names]
     touch = seen["touch"].reshape(len(rows), -1, TOUCH_SIZE)

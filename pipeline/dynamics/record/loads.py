@@ -15,7 +15,7 @@ Seen = dict[str, np.ndarray]
 
 
 def load_series(built: Tables, seen: Seen) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-    """Forces and moments on the (second) frame, lengths and powers, loads in the order of the tables."""
+    """Forces and moments on the (second) frame, lengths and powers, loads in the order of the scene."""
     table = _table(seen)
     force, moment = table[..., FORCE : FORCE + 3], table[..., MOMENT : MOMENT + 3]
     sites = seen["site_frame"].reshape(len(table), -1, FRAME_SIZE)
@@ -28,12 +28,15 @@ def load_series(built: Tables, seen: Seen) -> dict[str, tuple[tuple[str, ...], n
         at_origin = v - np.cross(omega, p)
         power[:, held] += sign * np.sum(omega * moment[:, held] + at_origin * force[:, held], axis=-1)
     origin = sites[:, wiring[:, B], ORIGIN : ORIGIN + 3]
-    return {
+    names = order(built.system.scene)
+    shown = [names.index(name) for name in built.system.scene.forces()]
+    series = {
         "load_force": (("time", "load", "axis"), force),
         "load_moment": (("time", "load", "axis"), moment - np.cross(origin, force)),
         "load_length": (("time", "load"), table[..., VALUE]),
         "load_power": (("time", "load"), power),
     }
+    return {name: (dims, values[:, shown]) for name, (dims, values) in series.items()}
 
 
 def on_body(built: Tables, seen: Seen, body: str) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,9 @@ import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
+from pipeline.dynamics.assembly.flexible_numbers import bow
 from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.record.deformation import shift
 from pipeline.dynamics.tables import ACCELERATION, ALPHA, AXES, FRAME_SIZE, OMEGA, ORIGIN, VELOCITY
 
 
@@ -84,8 +86,8 @@ def body_motions(built: Tables, seen: dict[str, np.ndarray], links: list[Motion]
         elif i and system.links[i].flexible == name:
             bundle, state = system.bundles[name], modal(built, i, seen)
             C, mass = bundle["modal_first_moment"].values, float(bundle["mass"])
-            arm = (bundle["first_moment"].values + state.q @ C.T) / mass
-            found[name] = links[i].moving(arm, state.u @ C.T / mass, state.du @ C.T / mass)
+            arm, rate, second = shift(C, bow(system, name), state.q, state.u, state.du)
+            found[name] = links[i].moving((bundle["first_moment"].values + arm) / mass, rate / mass, second / mass)
     return found
 
 
@@ -97,9 +99,10 @@ def frame_positions(built: Tables, seen: dict[str, np.ndarray], links: list[Moti
         place = system.links[i].places[frame.body].of(frame.place)
         arm = np.broadcast_to(place.p, (len(links[i].p), 3))
         if system.links[i].flexible:
-            bundle = system.bundles[frame.body]
-            k = list(bundle["frame"].values).index(name.partition(".")[2])
-            arm = arm + modal(built, i, seen).q @ bundle["frame_translation_shape"].values[k].T
+            bundle, label = system.bundles[frame.body], name.partition(".")[2]
+            state = modal(built, i, seen)
+            S = bundle["frame_translation_shape"].sel(frame=label).values
+            arm = arm + shift(S, bow(system, frame.body, label), state.q, state.u, state.du)[0]
         found[name] = links[i].p + np.einsum("tij,tj->ti", links[i].R, arm)
     return found
 

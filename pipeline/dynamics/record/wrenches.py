@@ -22,7 +22,10 @@ def joint_wrenches(
 
     Returned as (moment, force).
     """
-    found = _tree(built, seen) | _closures(built, seen) | _contacts(built, seen)
+    found = _tree(built, seen) | _closures(built, seen)
+    for name, (moment, force) in _contacts(built, seen).items():
+        held = found.get(name, (0.0, 0.0))  # what a clearance joint holds beside its contact
+        found[name] = (held[0] + moment, held[1] + force)
     found |= _inside_groups(built, seen, bodies, found)
     result = {}
     for name, joint in built.system.scene.joint.items():

@@ -18,7 +18,7 @@ from pipeline.core.quantities import Quantity
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {
-    "tolerance": ("adaptive_integrator", "tolerance"),
+    "tolerance": ("adaptive_integrator", "rtol"),
     "step": ("fixed_integrator", "step"),
     "model": ("theory", "mode_set", "modes", "elements"),
     "sampling": ("interval",),

@@ -9,6 +9,7 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import BUNDLE, conform
 from pipeline.structure.fe import beam as beams
+from pipeline.structure.modes import geometric_stiffness
 from pipeline.structure.modes.inertia_integrals import integrate
 
 ATTRIBUTES = ("title", "reference", "count", "interfaces", "section", "inertia_section", "source")
@@ -49,5 +50,6 @@ def build(mesh: xr.Dataset, modes: xr.Dataset) -> xr.Dataset:
         # drawn as a round rod of the true area, whatever the section
         "radius": (("cell",), np.sqrt(mesh["area"].values / np.pi)),
     }
+    data |= geometric_stiffness.variables(mesh, beam, shape.reshape(-1, n), tuple(modes.attrs["interfaces"].split()))
     attributes = {name: modes.attrs[name] for name in ATTRIBUTES}
     return conform(xr.Dataset(data, coords={"frame": mesh["frame"].values}), BUNDLE, **attributes)

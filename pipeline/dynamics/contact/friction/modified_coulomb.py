@@ -2,21 +2,24 @@ r"""Coulomb friction made continuous: a cubic rise to mu_s at v_s, a cubic fall 
 
 .. math:: F_t = -\mu(|v_t|)\,F_n\,v_t/|v_t|
 
-Eqs. (27) and (28) of the paper both carry a minus sign, so that friction would drive the
-sliding as printed; the sign that dissipates is used here. Below v_s the coefficient is
-:math:`\tfrac12\mu_s(3y - y^3)`, y = v/v_s.
+Eqs. (27) and (28) of the paper both carry a minus sign. Read together, they make friction drive the
+sliding; read as eq. (28) alone being the signed coefficient, they make it dissipate. The reading
+that dissipates is used here. Below v_s the coefficient is :math:`\tfrac12\mu_s(3y - y^3)`,
+y = v/v_s; between v_s and v_d eq. (28) names its steps from the higher speed to the lower, which
+is the same cubic. Below v_s is the regime that stands for sticking.
 Source: Wang & Wang (2019), eqs. (27)-(29).
 """
 
 from __future__ import annotations
 
-from pipeline.core.scene.parts import FrictionLaw
+from pipeline.core.scene import clearance
+from pipeline.dynamics.contact.friction.memoryless import sliding
 from pipeline.dynamics.vectors import kernel
 
 
 @kernel
 def coefficient(speed, p):
-    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d)."""
+    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d, -, -)."""
     if speed >= p[3]:
         return p[1]
     if speed >= p[2]:
@@ -26,12 +29,26 @@ def coefficient(speed, p):
     return 0.5 * p[0] * y * (3.0 - y * y)
 
 
+traction = sliding(coefficient)
+
+
 class ModifiedCoulomb:
     """See the module's text."""
 
     coefficient = staticmethod(coefficient)
+    traction = staticmethod(traction)
 
     @staticmethod
-    def parameters(law: FrictionLaw) -> tuple[float, float, float, float]:
-        """mu_s, mu_d [-], v_s, v_d [m/s]."""
-        return (law.static, law.dynamic, law.v_static, law.v_dynamic)
+    def parameters(law: clearance.ModifiedCoulomb) -> tuple[float, ...]:
+        """mu_s, mu_d [-], v_s, v_d [m/s], and two unused numbers."""
+        return (law.static, law.dynamic, law.v_static, law.v_dynamic, 0.0, 0.0)
+
+    @staticmethod
+    def stick_speed(law: clearance.ModifiedCoulomb) -> float:
+        """v_s [m/s]."""
+        return law.v_static
+
+    @staticmethod
+    def bristle(law: clearance.ModifiedCoulomb) -> float | None:
+        """No memory."""
+        return None

@@ -1,8 +1,21 @@
 """Normal contact laws. To add one: a module here, a line below; the property tests pick it up.
 
-Each module has ``parameters(law, stiffness)`` (four numbers for the kernel) and the kernels
-``force(depth, rate, impact_rate, p)`` and ``stored(depth, p)``; p holds the four numbers.
+Each module has a `LAW` with its own ``exponent`` and with ``resolve(law, stiffness, mass) -> Resolved``
+(see `contact.law`): the numbers for one of the compiled forms in `contact.form`, and the
+restitution that a free impact gets.
 """
 
 KIND = "normal law"
-NAMES = {"hertz": "hertz:Hertz", "lankarani-nikravesh": "lankarani_nikravesh:LankaraniNikravesh"}
+NAMES = {
+    "hertz": "hertz:LAW",
+    "hunt-crossley": "hunt_crossley:LAW",
+    "herbert-mcwhannell": "herbert_mcwhannell:LAW",
+    "lee-wang": "lee_wang:LAW",
+    "lankarani-nikravesh": "lankarani_nikravesh:LAW",
+    "gonthier": "gonthier:LAW",
+    "flores": "flores:LAW",
+    "hu-guo": "hu_guo:LAW",
+    "zhiying-qishao": "zhiying_qishao:LAW",
+    "carvalho-martins": "carvalho_martins:LAW",
+    "kelvin-voigt": "kelvin_voigt:LAW",
+}

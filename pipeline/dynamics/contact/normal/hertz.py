@@ -2,43 +2,38 @@ r"""Elastic contact without loss.
 
 .. math:: F_N = K\,\delta^n
 
-Source: Hertz (1882); Wang & Wang (2019), eq. (25) with c_r = 1. Valid while the contact area is
-small against the radii.
+Valid while the contact area is small against the radii and nothing yields; a free impact rebounds
+with the speed of its approach.
+Source: Hertz (1882), J. reine angew. Math. 92, 156-171; Wang & Wang (2019), eq. (25) with c_r = 1.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import dataclass
 
-from pipeline.core.scene.parts import NormalLaw
-from pipeline.dynamics.vectors import kernel
-
-
-@kernel
-def power(depth, exponent):
-    """depth^exponent for depth >= 0, fast for the Hertzian 3/2."""
-    return depth * np.sqrt(depth) if exponent == 1.5 else depth**exponent
+from pipeline.core.scene.clearance import NormalLaw
+from pipeline.dynamics.contact.law import CLOSE, Resolved, refuse_linear
 
 
-@kernel
-def force(depth, rate, impact_rate, p):
-    """Normal force [N], >= 0; depth [m] >= 0, rate and impact_rate [m/s]; p = (K, n, -, -)."""
-    return p[0] * power(depth, p[1])
-
-
-@kernel
-def stored(depth, p):
-    """Energy [J] that the elastic part of the force can give back."""
-    return p[0] * depth * power(depth, p[1]) / (p[1] + 1.0)
-
-
+@dataclass(frozen=True)
 class Hertz:
     """See the module's text."""
 
-    force = staticmethod(force)
-    stored = staticmethod(stored)
+    exponent: float = 1.5
 
-    @staticmethod
-    def parameters(law: NormalLaw, stiffness: float) -> tuple[float, float, float, float]:
-        """K [N/m^n], n, and two unused numbers."""
-        return (stiffness, law.exponent, 0.0, 0.0)
+    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+        """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+        refuse_linear("hertz", law)
+        if law.delivered_restitution not in (None, 1.0):
+            raise ValueError(
+                f"the law 'hertz' loses nothing and delivers no restitution of {law.delivered_restitution:g}; "
+                "choose a law with damping"
+            )
+        exponent = self.exponent if law.exponent is None else law.exponent
+        warning = None
+        if law.restitution is not None and 1.0 - law.restitution > CLOSE:
+            warning = f"'hertz' loses nothing: it delivers a restitution of 1, not of {law.restitution:g}"
+        return Resolved("elastic", (stiffness, exponent, 0.0, 0.0), exponent, None, 1.0, warning)
+
+
+LAW = Hertz()

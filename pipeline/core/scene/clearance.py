@@ -1,0 +1,192 @@
+"""Clearance joints as a scene says them: geometry, materials, normal law, friction law."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Pressure, Speed
+
+Positive = Field(gt=0.0)
+Share = Field(ge=0.0, le=1.0)
+
+
+class Material(Part):
+    """Elastic constants of a contacting surface."""
+
+    youngs_modulus: Annotated[Pressure, Positive]
+    poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
+
+
+class NormalLaw(Part):
+    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii.
+
+    restitution: the law's own parameter c_r; a free impact rebounds with it only as well as the law
+    achieves.  delivered_restitution: the rebound that a free impact is to have; the parameter
+    follows from it.  exponent: default 1.5, for linear laws 1.  damping [N s/m] and effective_mass
+    (default: the reduced mass of the two links): for linear laws only.
+    """
+
+    law: str
+    restitution: Annotated[Number, Share] | None = None
+    delivered_restitution: Annotated[Number, Share] | None = None
+    exponent: Annotated[Number, Field(ge=1.0)] | None = None
+    stiffness: Annotated[Number, Positive] | None = None
+    damping: Annotated[Number, Field(ge=0.0)] | None = None
+    effective_mass: Annotated[Mass, Positive] | None = None
+
+    @model_validator(mode="after")
+    def _one_restitution(self) -> NormalLaw:
+        if self.restitution is not None and self.delivered_restitution is not None:
+            raise ValueError(
+                "restitution (the law's parameter) and delivered_restitution (the rebound) say the same; give one"
+            )
+        return self
+
+
+class ModifiedCoulomb(Part):
+    """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6)."""
+
+    law: Literal["modified-coulomb"]
+    static: Annotated[Number, Field(ge=0.0)]
+    dynamic: Annotated[Number, Field(ge=0.0)]
+    v_static: Annotated[Speed, Positive]
+    v_dynamic: Annotated[Speed, Positive]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> ModifiedCoulomb:
+        if not self.v_static < self.v_dynamic:
+            raise ValueError(
+                f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve"
+            )
+        _not_above(self.dynamic, self.static)
+        return self
+
+
+class Ambrosio(Part):
+    """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1."""
+
+    law: Literal["ambrosio"]
+    dynamic: Annotated[Number, Field(ge=0.0)]
+    v0: Annotated[Speed, Field(ge=0.0)]
+    v1: Annotated[Speed, Positive]
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Ambrosio:
+        if not self.v0 < self.v1:
+            raise ValueError(f"v0 = {self.v0} m/s, below which there is no friction, is below v1 = {self.v1} m/s")
+        return self
+
+
+class LuGre(Part):
+    """LuGre friction per unit of normal force.
+
+    bristle_stiffness [1/m], bristle_damping [s/m] and viscous [s/m]: sigma_0, sigma_1, sigma_2 over
+    the normal force; v_stribeck: speed over which friction falls from static to dynamic.
+    """
+
+    law: Literal["lugre"]
+    static: Annotated[Number, Positive]
+    dynamic: Annotated[Number, Positive]
+    v_stribeck: Annotated[Speed, Positive]
+    bristle_stiffness: Annotated[Number, Positive]
+    bristle_damping: Annotated[Number, Field(ge=0.0)] = 0.0
+    viscous: Annotated[Number, Field(ge=0.0)] = 0.0
+
+    @model_validator(mode="after")
+    def _passive(self) -> LuGre:
+        _not_above(self.dynamic, self.static)
+        # the damping fades as exp(-(v/v_stribeck)^2); its v-fold is then at most 0.4289 v_stribeck sigma_1, and
+        # the law takes energy only while that stays below 4 mu (Barahanov & Ortega 2000, for constant damping)
+        most = 4.0 * self.dynamic / (0.42888194248035340 * self.v_stribeck)
+        if self.bristle_damping > most:
+            raise ValueError(
+                f"bristle_damping = {self.bristle_damping} s/m would drive the sliding; "
+                f"with these coefficients at most {most:.6g} s/m dissipates"
+            )
+        return self
+
+
+Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre, Field(discriminator="law")]
+
+
+def _not_above(dynamic: float, static: float) -> None:
+    if dynamic > static:
+        raise ValueError(f"dynamic = {dynamic} exceeds static = {static}: friction does not grow when sliding begins")
+
+
+class _Clearance(Part):
+    """What all clearance joints have.
+
+    floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
+    for grazing and resting contact.  initial_approach_speed: impact rate of a contact that the
+    scene's start already has; without it, a start in contact is refused.
+    """
+
+    between: tuple[FrameName, FrameName]
+    clearance: Annotated[Length, Positive]
+    normal: NormalLaw
+    friction: Friction | None = None
+    floor: Annotated[Speed, Positive] = 1e-6
+    initial_approach_speed: Annotated[Speed, Positive] | None = None
+
+
+class ClearanceSpherical(_Clearance):
+    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+
+    type: Literal["clearance-spherical"]
+    ball_radius: Annotated[Length, Positive]
+    socket_material: Material | None = None
+    ball_material: Material | None = None
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> ClearanceSpherical:
+        _require_materials(self.normal, self.materials, "socket_material and ball_material")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return self.ball_radius
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Of the outer and the inner surface."""
+        return self.socket_material, self.ball_material
+
+
+class ClearanceRevolute(_Clearance):
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame.
+
+    length: of the bearing, along the axis.
+    """
+
+    type: Literal["clearance-revolute"]
+    pin_radius: Annotated[Length, Positive]
+    length: Annotated[Length, Positive]
+    journal_material: Material | None = None
+    pin_material: Material | None = None
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> ClearanceRevolute:
+        _require_materials(self.normal, self.materials, "journal_material and pin_material")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return self.pin_radius
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Of the outer and the inner surface."""
+        return self.journal_material, self.pin_material
+
+
+def _require_materials(law: NormalLaw, materials: tuple[Material | None, Material | None], names: str) -> None:
+    if law.stiffness is None and None in materials:
+        raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
+
+
+Clearance = ClearanceSpherical | ClearanceRevolute

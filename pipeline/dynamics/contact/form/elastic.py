@@ -1,0 +1,27 @@
+r"""A force without loss: :math:`F_N = K\,\delta^n`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.vectors import kernel
+
+
+@kernel
+def power(depth, exponent):
+    """depth^exponent for depth >= 0, fast for the Hertzian 3/2 and the linear 1."""
+    if exponent == 1.5:
+        return depth * np.sqrt(depth)
+    return depth if exponent == 1.0 else depth**exponent
+
+
+@kernel
+def force(depth, rate, impact_rate, p):
+    """Elastic force [N], >= 0, and no damping; depth [m] >= 0, rates [m/s]; p = (K, n, -, -)."""
+    return p[0] * power(depth, p[1]), 0.0
+
+
+@kernel
+def stored(depth, p):
+    """Energy [J] that the elastic part of the force can give back."""
+    return p[0] * depth * power(depth, p[1]) / (p[1] + 1.0)

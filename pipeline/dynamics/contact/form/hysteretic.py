@@ -1,0 +1,22 @@
+r"""Damping in proportion to the elastic force: :math:`F_N = K\,\delta^n(1 + a\,\dot\delta/\dot\delta^{(-)})`.
+
+The force is never negative: where the surfaces part faster than the impact rate over a, it is zero.
+Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445.
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.contact.form.elastic import power, stored
+from pipeline.dynamics.vectors import kernel
+
+__all__ = ["force", "stored"]
+
+
+@kernel
+def force(depth, rate, impact_rate, p):
+    """Elastic and damping force [N], together >= 0; impact_rate: `rate` when this contact began [m/s], > 0.
+
+    p = (K, n, a, -).
+    """
+    elastic = p[0] * power(depth, p[1])
+    return elastic, max(-elastic, elastic * (p[2] * rate / impact_rate))

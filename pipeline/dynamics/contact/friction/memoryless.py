@@ -1,0 +1,23 @@
+"""Friction that depends on the present sliding speed alone: a coefficient against the sliding velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.dynamics.vectors import dot, kernel, scale
+
+
+def sliding(coefficient: Callable) -> Callable:
+    """The kernel `traction` of a law whose coefficient(speed, p) >= 0 times the normal force is its force."""
+
+    @kernel
+    def traction(z, slip, f_n, p):
+        speed = np.sqrt(dot(slip, slip))
+        if speed > 0.0:
+            f_t = f_n * coefficient(speed, p)
+            return scale(-f_t / speed, slip), f_t * speed, 0.0, (0.0, 0.0, 0.0)
+        return (0.0, 0.0, 0.0), 0.0, 0.0, (0.0, 0.0, 0.0)
+
+    return traction

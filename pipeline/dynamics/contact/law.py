@@ -1,0 +1,104 @@
+"""A normal law with its numbers, and the family of laws that a factor of hysteresis tells apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import isfinite
+
+from scipy.optimize import brentq
+
+from pipeline.core.scene.clearance import NormalLaw
+from pipeline.dynamics.contact import restitution as closed_form
+
+#: a law that delivers a restitution further than this from the one asked for is used outside its range
+CLOSE = 0.05
+
+
+@dataclass(frozen=True)
+class Resolved:
+    """What a normal law comes to: form and four numbers for the kernels, and what a free impact gets.
+
+    parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
+    approach speed of a free impact.  warning: in words, when the law is used outside its range.
+    """
+
+    form: str
+    numbers: tuple[float, float, float, float]
+    exponent: float
+    parameter: float | None
+    delivered: float
+    warning: str | None = None
+
+
+@dataclass(frozen=True)
+class Hysteresis:
+    """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the coefficient of restitution asked for.
+
+    valid: restitutions for which the law delivers what it is asked for within CLOSE.
+    exponent: where the scene gives none.
+    """
+
+    name: str
+    factor: Callable[[float], float]
+    valid: tuple[float, float]
+    exponent: float = 1.5
+
+    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+        """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+        refuse_linear(self.name, law)
+        exponent = self.exponent if law.exponent is None else law.exponent
+        if law.delivered_restitution is not None:
+            delivered = law.delivered_restitution
+            a = closed_form.factor(delivered)
+            parameter = self._parameter(a)
+        elif law.restitution is not None:
+            parameter = law.restitution
+            a = self._factor(parameter)
+            delivered = closed_form.delivered(a)
+        else:
+            raise ValueError(f"the law '{self.name}' needs a restitution, or a delivered_restitution")
+        return Resolved(
+            "hysteretic", (stiffness, exponent, a, 0.0), exponent, parameter, delivered, self._warning(law, delivered)
+        )
+
+    def _factor(self, parameter: float) -> float:
+        a = self.factor(parameter) if parameter > 0.0 or self._finite_at_zero() else float("inf")
+        if not isfinite(a):
+            raise ValueError(f"the law '{self.name}' has no finite damping for a restitution of 0; ask for 0.01 or so")
+        return a
+
+    def _finite_at_zero(self) -> bool:
+        try:
+            return isfinite(self.factor(0.0))
+        except ZeroDivisionError:
+            return False
+
+    def _parameter(self, a: float) -> float:
+        """The parameter whose factor is a; the factors of all these laws fall as it grows."""
+        if a == 0.0:
+            return 1.0
+        least = 0.0 if self._finite_at_zero() else 1e-300
+        if self.factor(least) < a:
+            lowest = closed_form.delivered(self.factor(least))
+            raise ValueError(
+                f"the law '{self.name}' delivers no restitution below {lowest:.4g}; ask for more, or choose "
+                "'gonthier', 'hu-guo' or 'flores', which cover the whole range"
+            )
+        return float(brentq(lambda c: self.factor(c) - a, least, 1.0, xtol=1e-17, rtol=1e-15))
+
+    def _warning(self, law: NormalLaw, delivered: float) -> str | None:
+        if law.restitution is None or abs(delivered - law.restitution) <= CLOSE:
+            return None
+        low, high = self.valid
+        return (
+            f"'{self.name}' asked for a restitution of {law.restitution:g} delivers {delivered:.4g} "
+            f"(meant for {low:g} to {high:g}); delivered_restitution = {law.restitution:g} asks for the rebound itself"
+        )
+
+
+def refuse_linear(name: str, law: NormalLaw) -> None:
+    """ValueError when a scene gives a law numbers that only linear ones take."""
+    for key in ("damping", "effective_mass"):
+        if getattr(law, key) is not None:
+            raise ValueError(f"the law '{name}' takes no {key}; 'kelvin-voigt' does")

@@ -1,0 +1,20 @@
+r"""Hertzian contact whose damping is a rational fit of the exact restitution.
+
+.. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \frac{3(1-c_r)(11-c_r)}{2(1+9c_r)}
+
+For nearly the whole range: asked for 0.9, 0.7 or 0.5 it delivers that to three digits, for 0.1 0.129, and never less
+than 0.060; within 0.05 of what is asked from 0.03 up.
+Source: Carvalho & Martins (2019), Mech. Mach. Theory 139, 185-194.
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.contact.law import Hysteresis
+
+
+def factor(c_r: float) -> float:
+    """Factor a of the damping for the coefficient of restitution c_r asked for."""
+    return 1.5 * (1.0 - c_r) * (11.0 - c_r) / (1.0 + 9.0 * c_r)
+
+
+LAW = Hysteresis("carvalho-martins", factor, valid=(0.03, 1.0))

@@ -1,0 +1,19 @@
+r"""Hertzian contact with a damping from the energy lost, compression and restitution apart.
+
+.. math:: F_N = K\,\delta^n\left[1 + a\,\dot\delta/\dot\delta^{(-)}\right], \quad a = \frac{3(1-c_r)}{2c_r}
+
+For the whole range except 0: asked for 0.5 it delivers 0.488, for 0.9 0.900; at most 0.035 off (at 0.2).
+Source: Hu & Guo (2015), Nonlinear Dynamics 82, 1617-1634.
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.contact.law import Hysteresis
+
+
+def factor(c_r: float) -> float:
+    """Factor a of the damping for the coefficient of restitution c_r asked for."""
+    return 1.5 * (1.0 - c_r) / c_r
+
+
+LAW = Hysteresis("hu-guo", factor, valid=(0.0, 1.0))

@@ -1,0 +1,51 @@
+r"""A linear spring and a linear damper side by side.
+
+.. math:: F_N = \max(0,\; K\,\delta + C\,\dot\delta), \quad C = 2\zeta\sqrt{K m}
+
+Linear: the exponent is 1. C is given as `damping`, or follows from the restitution that a free
+impact of the effective mass m is to have; the closed form is exact, so that this law delivers what
+it is asked for. The force does not pull: the contact ends where K d + C d' = 0, before the
+surfaces part (no adhesion). It jumps where the contact begins, which no real surface does; valid
+for soft layers and as the usual linear comparison.
+Source: Goldsmith (1960), Impact, ch. 1; restitution without adhesion: Schwager & Poeschel (2007),
+Granular Matter 9, 465-469.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from pipeline.core.scene.clearance import NormalLaw
+from pipeline.dynamics.contact import restitution
+from pipeline.dynamics.contact.law import Resolved
+
+
+@dataclass(frozen=True)
+class KelvinVoigt:
+    """See the module's text."""
+
+    exponent: float = 1.0
+
+    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+        """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+        if law.exponent not in (None, 1.0):
+            raise ValueError(f"the law 'kelvin-voigt' is linear; its exponent is 1, not {law.exponent:g}")
+        mass = mass if law.effective_mass is None else law.effective_mass
+        if mass is None:
+            raise ValueError("neither side of this joint has a mass of its own; give an effective_mass")
+        critical = 2.0 * math.sqrt(stiffness * mass)
+        asked = law.restitution if law.delivered_restitution is None else law.delivered_restitution
+        if law.damping is not None:
+            if asked is not None:
+                raise ValueError("damping and restitution say the same; give one")
+            damping = law.damping
+        elif asked is not None:
+            damping = critical * restitution.damping_ratio(asked)
+        else:
+            raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
+        delivered = restitution.linear_delivered(damping / critical)
+        return Resolved("linear-damper", (stiffness, 1.0, damping, 0.0), 1.0, asked, delivered)
+
+
+LAW = KelvinVoigt()

@@ -1,0 +1,74 @@
+r"""What restitution a law delivers: closed forms of a free impact.
+
+For :math:`F = K\delta^n(1 + a\,\dot\delta/\dot\delta_0)` the rebound e over the approach obeys
+:math:`\ln[(1+a)/(1-ae)] = a(1+e)`, that is psi(a) = psi(-ae) with psi(x) = x - ln(1 + x),
+whatever K, n, mass and speed.
+Source: Gonthier, McPhee, Lange & Piedboeuf (2004), Multibody System Dynamics 11, 209-233, eq. (29);
+Zhang & Sharf (2009), J. Applied Mechanics 76, 034501.
+"""
+
+from __future__ import annotations
+
+import math
+
+from scipy.optimize import brentq
+
+#: nearest to 1 that psi(-y) may come; beyond it 1 - y is rounding
+NEAREST = 1.0 - 2.0**-53
+
+
+def psi(x: float) -> float:
+    """X - ln(1 + x) without cancellation."""
+    if abs(x) > 0.05:
+        return x - math.log1p(x)
+    return sum((-1) ** k * x**k / k for k in range(2, 14))  # 0.05^14 / 14 is below rounding of x^2 / 2
+
+
+def delivered(a: float) -> float:
+    """Rebound over approach speed that the factor a >= 0 gives a free impact."""
+    if a == 0.0:
+        return 1.0
+    wanted = psi(a)
+    if wanted >= psi(-NEAREST):
+        return 1.0 / a
+    return float(brentq(lambda y: psi(-y) - wanted, 0.0, NEAREST, xtol=1e-300, rtol=1e-15)) / a
+
+
+def factor(e: float) -> float:
+    """Factor a that delivers the restitution 0 < e <= 1; ValueError for 0, which no finite factor delivers."""
+    if e <= 0.0:
+        raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
+    if e == 1.0:
+        return 0.0
+
+    def defect(y: float) -> float:  # y = a e
+        return psi(y / e) - psi(-y)
+
+    if defect(NEAREST) >= 0.0:
+        return NEAREST / e
+    return float(brentq(defect, 0.5 * e * (1.0 - e), NEAREST, xtol=1e-300, rtol=1e-15)) / e
+
+
+def linear_delivered(zeta: float) -> float:
+    r"""Rebound over approach speed of :math:`m\ddot\delta = -\max(0, K\delta + C\dot\delta)`, zeta = C / (2 sqrt(K m)).
+
+    The contact ends where the force would begin to pull:
+    :math:`e = \exp[-\tan\varphi\,(\pi - 2\varphi)]`, :math:`\sin\varphi = \zeta`, and
+    :math:`\exp[-2\psi\coth\psi]`, :math:`\cosh\psi = \zeta`, above 1.
+    Source: Schwager & Poeschel (2007), Granular Matter 9, 465-469, eq. (21), in one angle.
+    """
+    if zeta < 1.0:
+        angle = math.asin(zeta)
+        return math.exp(-math.tan(angle) * (math.pi - 2.0 * angle))
+    if zeta == 1.0:
+        return math.exp(-2.0)
+    rate = math.acosh(zeta)
+    return math.exp(-2.0 * rate / math.tanh(rate))
+
+
+def damping_ratio(e: float) -> float:
+    """Zeta with linear_delivered(zeta) = e, 0 < e <= 1; ValueError for 0."""
+    if e <= 0.0:
+        raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
+    # beyond 1 the restitution falls below (2 zeta)^-2, so that this is enough
+    return float(brentq(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5, xtol=1e-300, rtol=1e-15))

@@ -1,0 +1,234 @@
+"""Newton iterations of the generalized-alpha method, for the rates at the end of a step.
+
+First a simplified iteration with the Jacobian that is there, then with a new one; with fixed steps at last a damped
+one with a new Jacobian at every iterate, where friction saturates within the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.dynamics.integrate.alpha_system import (
+    A_STEP,
+    BY_POSITION,
+    BY_STATE,
+    CORRECTION,
+    LU_STEP,
+    NEW,
+    OLD,
+    RESIDUAL,
+    SCALED,
+    SHIFT,
+    STEP_BEFORE,
+    VALID,
+    before,
+    constants,
+    diagonal,
+    factorise,
+    matrix,
+    positions,
+    rates,
+    reach,
+    solve,
+    vector,
+)
+from pipeline.dynamics.integrate.newton import converged, limit
+from pipeline.dynamics.integrate.state import EVALUATIONS, FIXED, JACOBIANS, RTOL, TIME
+from pipeline.dynamics.tables import (
+    CONTROL,
+    EVALUATION,
+    FLOORS,
+    GROUPS,
+    MAGNITUDE,
+    MEMORY,
+    NQ,
+    NV,
+    NY,
+    OK,
+    SLOPES,
+    Y_NEW,
+    Y_STAGE,
+    Y,
+)
+from pipeline.dynamics.vectors import index, kernel
+
+# rows of SLOPES: Newton's iterate, and what is tried beside it
+ITERATE, ESTIMATE = 1, 3
+MOST_ITERATIONS, SLOW, MOST_CORRECTIONS, MOST_HALVINGS = 10, 4, 30, 12
+#: perturbation of a Jacobian's column, relative to the variable's size: root of the rounding error
+NUDGE = 1e-8
+
+
+def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]:
+    """The kernels place(h, w, step, out) and converge(h, f, w, n, step)."""
+
+    @kernel
+    def column(h, f, w, n, t, slope, k, nudge, target):
+        """Column k of a Jacobian of the rates, from the nudged state in Y_STAGE."""
+        m, nq, near = rates(h), h[NQ], h[SLOPES] + h[NY] * ESTIMATE
+        evaluate(h, f, w, n, t, h[Y_STAGE], near)
+        n[EVALUATIONS] += 1
+        for i in range(m):
+            w[index(target + m * i + k)] = (w[index(near + nq + i)] - w[index(slope + nq + i)]) / nudge
+        return n[EVALUATION] == OK
+
+    @kernel
+    def jacobian(h, f, w, n, t, y, slope):
+        """Change of the rates with speeds and what follows them, and with displacements, at the state in y."""
+        nv, nq, shift = h[NV], h[NQ], vector(h, SHIFT)
+        for c in range(h[NY]):
+            w[index(h[Y_STAGE] + c)] = w[index(y + c)]
+        for k in range(rates(h)):
+            size, value = f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])], w[index(y + nq + k)]
+            nudged = value + NUDGE * (size + abs(value))
+            w[index(h[Y_STAGE] + nq + k)] = nudged
+            if not column(h, f, w, n, t, slope, k, nudged - value, matrix(h, BY_STATE)):
+                return False
+            w[index(h[Y_STAGE] + nq + k)] = value
+        for k in range(nv):
+            nudge = NUDGE * f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])]
+            for j in range(nv):
+                w[index(shift + j)] = nudge if j == k else 0.0
+            displace(h, w, y, shift, h[Y_STAGE], positions(h))
+            if not column(h, f, w, n, t, slope, k, nudge, matrix(h, BY_POSITION)):
+                return False
+        n[JACOBIANS] += 1
+        w[index(h[MEMORY] + VALID)], w[index(h[MEMORY] + LU_STEP)] = 1.0, 0.0
+        return True
+
+    @kernel
+    def place(h, w, step, out):
+        """State at the end of the step for the rates in NEW."""
+        _, _, beta, gamma = constants(h, w)
+        nq, nv, old, new, shift = h[NQ], h[NV], vector(h, SCALED), vector(h, NEW), vector(h, SHIFT)
+        for k in range(nv):
+            a, b, u = w[index(old + k)], w[index(new + k)], w[index(h[Y] + nq + k)]
+            w[index(shift + k)] = step * (u + step * ((0.5 - beta) * a + beta * b))
+            w[index(out + nq + k)] = u + step * ((1.0 - gamma) * a + gamma * b)
+        for k in range(nv, rates(h)):
+            w[index(out + nq + k)] = w[index(h[Y] + nq + k)] + step * w[index(new + k)]
+        displace(h, w, h[Y], shift, out, positions(h))
+
+    @kernel
+    def misfit(h, f, w, n, step):
+        """What the rates in NEW leave of the method's equations, into RESIDUAL; False without a slope."""
+        alpha_m, alpha_f, _, _ = constants(h, w)
+        nq, old, start_slope, slope = h[NQ], vector(h, SCALED), h[SLOPES], h[SLOPES] + h[NY] * ITERATE
+        place(h, w, step, h[Y_NEW])
+        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope)
+        n[EVALUATIONS] += 1
+        for i in range(rates(h)):
+            first, last = w[index(start_slope + nq + i)], w[index(slope + nq + i)]
+            if i < h[NV]:
+                wanted = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * w[index(old + i)]
+            else:
+                wanted = 0.5 * (first + last)
+            w[index(vector(h, RESIDUAL) + i)] = wanted - diagonal(h, w, i) * w[index(vector(h, NEW) + i)]
+        return n[EVALUATION] == OK
+
+    @kernel
+    def size_of(h, w, step, a):
+        """What rates from place a make of the state, in units of the tolerance."""
+        total, m = 0.0, rates(h)
+        for i in range(m):
+            scale = w[index(h[MAGNITUDE] + h[index(h[GROUPS] + h[NQ] + i)])]
+            total += (reach(h, w, step, i) * w[index(a + i)] / scale) ** 2
+        return np.sqrt(total / m)
+
+    @kernel
+    def iterate(h, f, w, n, step):
+        """Newton's iterations with the matrix as it is; their number, or 0 when they do not converge."""
+        residual, last_norm = vector(h, RESIDUAL), 0.0
+        for k in range(MOST_ITERATIONS):
+            if not misfit(h, f, w, n, step):
+                return 0
+            solve(h, w, residual)
+            for i in range(rates(h)):
+                w[index(vector(h, NEW) + i)] += w[index(residual + i)]
+            norm = size_of(h, w, step, residual)
+            verdict = converged(k, norm, last_norm, w[index(h[CONTROL] + RTOL)])
+            if verdict != 0:
+                return k + 1 if verdict > 0 else 0
+            last_norm = norm
+        return 0
+
+    @kernel
+    def shorten(h, f, w, n, step, norm):
+        """Take the correction, or the share of it that makes the misfit less; the misfit left, or -1."""
+        correction, new, residual = vector(h, CORRECTION), vector(h, NEW), vector(h, RESIDUAL)
+        share, there = 1.0, 0.0
+        for _ in range(MOST_HALVINGS):
+            for i in range(rates(h)):
+                w[index(new + i)] += (share - there) * w[index(correction + i)]
+            if misfit(h, f, w, n, step):
+                left = size_of(h, w, step, residual)
+                if left < (1.0 - 0.1 * share) * norm:
+                    return left
+            there = share
+            share *= 0.5
+        return -1.0
+
+    @kernel
+    def persist(h, f, w, n, step):
+        """Damped Newton iterations with a new matrix each: for friction that saturates within a step."""
+        t, enough = w[index(h[CONTROL] + TIME)] + step, limit(w[index(h[CONTROL] + RTOL)])
+        correction, residual = vector(h, CORRECTION), vector(h, RESIDUAL)
+        if not misfit(h, f, w, n, step):
+            return False
+        left = size_of(h, w, step, residual)
+        for _ in range(MOST_CORRECTIONS):
+            if not jacobian(h, f, w, n, t, h[Y_NEW], h[SLOPES] + h[NY] * ITERATE) or not factorise(h, w, step):
+                return False
+            for i in range(rates(h)):
+                w[index(correction + i)] = w[index(residual + i)]
+            solve(h, w, correction)
+            norm = size_of(h, w, step, correction)
+            left = shorten(h, f, w, n, step, left)
+            if norm <= enough or left == 0.0:
+                return True
+            if left < 0.0:
+                return False
+        return False
+
+    @kernel
+    def start(h, w, step):
+        """Rates at the start for a step of this length, and a first guess of those at its end."""
+        o, nq = h[MEMORY], h[NQ]
+        share, on = step / w[index(o + A_STEP)], step / w[index(o + STEP_BEFORE)]
+        for k in range(h[NV]):
+            now = w[index(h[SLOPES] + nq + k)]
+            a = now + share * (w[index(vector(h, OLD) + k)] - now)
+            w[index(vector(h, SCALED) + k)] = a
+            w[index(vector(h, NEW) + k)] = a + on * (now - w[index(before(h) + nq + k)])
+        for k in range(h[NV], rates(h)):
+            w[index(vector(h, NEW) + k)] = w[index(h[SLOPES] + nq + k)]
+
+    @kernel
+    def converge(h, f, w, n, step):
+        """Rates at the end of the step into NEW; False when no iteration converges.
+
+        With chosen steps a shorter one is the better remedy, with fixed steps it is patience.
+        """
+        o = h[MEMORY]
+        for _ in range(2):
+            fresh = w[index(o + VALID)] == 0.0
+            if fresh and not jacobian(h, f, w, n, w[index(h[CONTROL] + TIME)], h[Y], h[SLOPES]):
+                return False
+            if w[index(o + LU_STEP)] != step and not factorise(h, w, step):
+                return False
+            start(h, w, step)
+            count = iterate(h, f, w, n, step)
+            if count > 0:
+                w[index(o + VALID)] = 1.0 if count <= SLOW else 0.0
+                return True
+            w[index(o + VALID)] = 0.0
+            if fresh:
+                break
+        if w[index(h[CONTROL] + FIXED)] > 0.0:
+            start(h, w, step)
+            return persist(h, f, w, n, step)
+        return False
+
+    return place, converge

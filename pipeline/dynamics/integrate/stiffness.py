@@ -1,0 +1,66 @@
+"""Whether a step of an explicit method is limited by stability, not by accuracy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from pipeline.dynamics.integrate.state import STEEPEST, STIFF_STEPS
+from pipeline.dynamics.tables import CONTROL, GROUPS, MAGNITUDE, NQ, NV, NY, SLOPES, Y_NEW, Y_STAGE
+from pipeline.dynamics.vectors import index, kernel
+
+#: changes of state below this share of the tolerance are rounding, from which no rate can be told
+FELT = 1e-2
+
+
+@kernel
+def difference(h, w, first, count, a, b):
+    """Norm of the difference of two states or slopes at places a and b of w, variables `first` on, by tolerance."""
+    total = 0.0
+    for k in range(first, first + count):
+        change = w[index(a + k)] - w[index(b + k)]
+        total += (change / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + k)])]) ** 2
+    return np.sqrt(total)
+
+
+@kernel
+def steepness(h, w, last):
+    """Largest rate [1/s] that the equations show between the last stage and the end of the step.
+
+    Both are at the same time; the change of slope over the change of state estimates the spectral
+    radius (Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2). Taken of the
+    speeds alone it explodes where an oscillation's speeds happen to agree, so that it is at most the
+    geometric mean with that of the positions, which an oscillation makes its frequency.
+    """
+    end, stage = h[SLOPES] + h[NY] * last, h[SLOPES] + h[NY] * (last - 1)
+    speeds = difference(h, w, h[NQ], h[NV], h[Y_NEW], h[Y_STAGE])
+    if not speeds > FELT * np.sqrt(h[NV]):
+        return 0.0
+    rate = difference(h, w, h[NQ], h[NV], end, stage) / speeds
+    positions = difference(h, w, 0, h[NQ], h[Y_NEW], h[Y_STAGE])
+    if not positions > FELT * np.sqrt(h[NQ]):
+        return rate
+    return min(rate, np.sqrt(rate * difference(h, w, 0, h[NQ], end, stage) / positions))
+
+
+@kernel
+def unfelt(h, w, n, step):
+    """An implicit method, or one whose stages do not tell."""
+
+
+def detect(method: Any) -> Callable:
+    """The kernel feel(h, w, n, step) after an accepted step: notes its steepness, and whether that limits the step."""
+    if method.stability is None:
+        return unfelt
+    last, reach = method.last, method.stability
+
+    @kernel
+    def feel(h, w, n, step):
+        rate, c = steepness(h, w, last), h[CONTROL]
+        w[index(c + STEEPEST)] = max(w[index(c + STEEPEST)], rate)
+        if rate * step > reach:
+            n[STIFF_STEPS] += 1
+
+    return feel

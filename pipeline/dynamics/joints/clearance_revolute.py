@@ -1,0 +1,25 @@
+"""Pin in a journal with clearance: a circle in a circle, in the plane normal to the journal's axis.
+
+The axial motion and the tilt are held as a planar joint holds them (`joints.HELD`), by a force along the
+axis and moments across it at the pin's frame. The contact (`contact.forces`) acts in the middle of
+the bearing, where the two frames are; over-long bearings, which tilting pins touch at both rims, are
+not modelled.
+"""
+
+from __future__ import annotations
+
+from pipeline.dynamics.tables import AXES
+from pipeline.dynamics.vectors import at9, axis, dot, kernel, scale, sub
+
+
+@kernel
+def separation(w, outer, p):
+    """Offset of the pin's centre that closes the gap [m]: the part of p normal to the journal's axis."""
+    z = axis(at9(w, outer + AXES), 2)
+    return sub(p, scale(dot(z, p), z))
+
+
+class ClearanceRevolute:
+    """See the module's text."""
+
+    separation = staticmethod(separation)

@@ -1,0 +1,128 @@
+r"""Natural vibrations about an equilibrium, or about steady motion: :math:`\ddot z + D\dot z + Kz = 0`.
+
+Stiff contacts beside soft pendulums: a stiffness differenced along mixed directions would leave rounding of the stiff
+ones in the soft. So it is taken twice, the second time along the vibrations that the first gave, and the eigenvalue
+problem is solved in coordinates scaled by their own frequency.
+
+Source: Meirovitch, *Principles and Techniques of Vibrations*, ch. 4 (undamped), 6 and 11 (damped, gyroscopic).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.dynamics.linear.bench import Bench
+from pipeline.dynamics.linear.tangent import Tangent, damping, stiffness
+
+#: an eigenvalue of the stiffness within this many estimated errors of zero is zero
+NOTHING = 10.0
+#: the same, as a share of the largest eigenvalue
+NOTHING_BESIDE = 1e-13
+#: asymmetry below this share of the scaled stiffness is rounding
+NEGLIGIBLE = 1e-9
+#: a motion without stiffness is scaled by this share of the highest frequency
+LEAST_SCALE = 1e-6
+#: an eigenvalue with this share of imaginary part is real, it decays or grows without vibrating; likewise imaginary
+REAL = 1e-12
+
+
+@dataclass(frozen=True)
+class Vibrations:
+    """Small motions exp(lambda t) w, ascending in frequency; pairs of complex lambda once, with Im > 0.
+
+    value: lambda [1/s], complex, shape (n,).  shape: displacements w of the coordinates, complex, shape (nv, n), with
+    w^H M w = 1.  free: how many motions have no stiffness.
+    """
+
+    value: np.ndarray
+    shape: np.ndarray
+    free: int
+
+
+def vibrations(bench: Bench, at: Tangent) -> Vibrations:
+    """All small motions about a pose in balance."""
+    if not at.Z.shape[1]:
+        return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0)
+    motions = at.Z
+    for _ in range(2):
+        K, error = stiffness(bench, at, motions)
+        motions = motions @ _principal(_symmetric(K, error), _limp(K, error))[1]
+    K, error = stiffness(bench, at, motions)
+    D, rate_error = damping(bench, at, motions)
+    limp = _limp(K, error)
+    least = NOTHING_BESIDE * max(float(np.abs(D).max()), float(np.sqrt(np.abs(np.diag(K)).max())))
+    D[np.abs(D) <= np.maximum(NOTHING * rate_error[None, :], least)] = 0.0
+    K[:, limp], K[limp, :] = 0.0, 0.0
+    if _is_symmetric(K, error) and not np.any(D):
+        k, axes = _principal(_symmetric(K, error), limp)
+        # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
+        value, shape = np.sqrt(-k.astype(complex)), axes.astype(complex)
+    else:
+        value, shape = _damped(K, D, limp)
+    order = np.lexsort((np.abs(value), np.abs(value.imag)))
+    return Vibrations(value[order], motions @ shape[:, order], int(limp.sum()))
+
+
+def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Which motions have no stiffness as far as the differences can tell."""
+    own = np.abs(np.diag(K))
+    return own <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * own.max())
+
+
+def _scale(K: np.ndarray) -> np.ndarray:
+    own = np.sqrt(np.abs(np.diag(K)))
+    return np.maximum(own, LEAST_SCALE * own.max() or 1.0)
+
+
+def _is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
+    """Whether K is symmetric within the errors of its columns: then the forces have a potential."""
+    doubt = NOTHING * (error[:, None] + error[None, :]) + NEGLIGIBLE * np.outer(_scale(K), _scale(K))
+    return bool(np.all(np.abs(K - K.T) <= doubt))
+
+
+def _symmetric(K: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """Of the two values of an entry that of the column with the smaller error."""
+    better = np.where(error[:, None] < error[None, :], K.T, K)
+    return np.triu(better) + np.triu(better, 1).T
+
+
+def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and axes of a symmetric stiffness; limp motions have the eigenvalue 0.
+
+    A positive definite one goes by the singular values of its Cholesky factor, the frequencies themselves: rounding
+    is then relative to the highest frequency, not to its square.
+    """
+    firm = ~limp
+    inner = K[np.ix_(firm, firm)]
+    try:
+        axes, omega, _ = np.linalg.svd(np.linalg.cholesky(inner))
+        inner_k = omega**2
+    except np.linalg.LinAlgError:
+        inner_k, axes = np.linalg.eigh(inner)
+    k, full = np.zeros(len(K)), np.eye(len(K))
+    k[firm] = inner_k
+    full[np.ix_(firm, firm)] = axes
+    return k, full
+
+
+def _damped(K: np.ndarray, D: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair."""
+    loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
+    kept = np.ix_(~loose, ~loose)
+    K, D, scale = K[kept], D[kept], _scale(K)[~loose]
+    # coordinates z and z'/scale change at comparable rates
+    A = np.block([[np.zeros_like(K), np.diag(scale)], [-K / scale[None, :], -D]])
+    value, vectors = np.linalg.eig(A)
+    # displacements, not speeds: a creeping motion has none
+    inner = vectors[: len(K)] / scale[:, None]
+    real = np.abs(value.imag) <= REAL * np.abs(value)
+    lasting = np.abs(value.real) <= REAL * np.abs(value)
+    value = np.where(real, value.real, np.where(lasting, 1j * value.imag, value))
+    value[np.abs(value) <= REAL * np.abs(value).max(initial=0.0)] = 0.0
+    once = (value.imag > 0.0) | real
+    shape = np.zeros((len(loose), int(once.sum())), dtype=complex)
+    shape[~loose] = inner[:, once] / np.linalg.norm(inner[:, once], axis=0)
+    still = np.eye(len(loose), dtype=complex)[:, loose]
+    return np.concatenate([np.zeros(int(loose.sum()), dtype=complex), value[once]]), np.hstack([still, shape])

@@ -1,0 +1,84 @@
+"""The ledger of energy: what came in, what is stored, what was lost and to what; and that it closes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.errors import SolverError
+from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics.tables import BENT, CONTACT_LOSS, DRIVE_WORK, MODAL_LOSS, STORED, TOUCH_SIZE
+
+Seen = dict[str, np.ndarray]
+Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+#: rounding of the largest energies, which may cancel in the balance
+ROUNDING = 1e-12
+
+
+def series(built: Tables, seen: Seen) -> Variables:
+    """The variables of the ledger, total and by cause."""
+    ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
+    kinetic, potential, elastic = seen["energy"].T
+    contacts = len(built.system.contacts)
+    touch = seen["touch"].reshape(len(ledger), contacts, TOUCH_SIZE)
+    slots = ledger[:, CONTACT_LOSS : CONTACT_LOSS + 2 * contacts].reshape(len(ledger), contacts, 2)
+    # friction's slot is its work; what bent bristles still hold of it is not lost
+    damping, friction = slots[..., 0], slots[..., 1] - touch[..., BENT]
+    work, modal = ledger[:, DRIVE_WORK], ledger[:, MODAL_LOSS]
+    dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
+    balance = kinetic + potential + elastic + dissipated - work
+    loaded: Variables = {}
+    if built.system.scene.forces():
+        load_work, load_loss = ledger[:, built.packed.sizes["LOAD_SLOT"] :].T[:2]
+        dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
+        loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
+    found: Variables = {
+        "kinetic": (("time",), kinetic),
+        "potential": (("time",), potential),
+        "elastic": (("time",), elastic),
+        "dissipated": (("time",), dissipated),
+        "drive_work": (("time",), work),
+        "energy_error": (("time",), balance - balance[0]),
+        "constraint_error": (("time",), seen["residual"][:, 0]),
+        **loaded,
+    }
+    if built.layout.modes:
+        found["modal_damping_loss"] = (("time",), modal)
+    if contacts:
+        found["contact_elastic"] = (("time", "contact"), touch[..., STORED] + touch[..., BENT])
+        found["contact_damping_loss"] = (("time", "contact"), damping)
+        found["contact_friction_loss"] = (("time", "contact"), friction)
+    return found
+
+
+def require_closed(built: Tables, trajectory: Trajectory, seen: Seen) -> None:
+    """SolverError when the ledger is off by more than the scene's tolerance times the energy turned over."""
+    found = {name: values for name, (_, values) in series(built, seen).items()}
+    error = np.abs(found["energy_error"])
+    turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in found]
+    turned = max(float(np.ptp(found[n])) for n in turning)
+    turned = max(turned, float(found["kinetic"].max()))
+    largest = max(float(np.abs(found[n]).max()) for n in turning)
+    tolerance = built.system.scene.solver.ledger_tolerance
+    worst = int(np.argmax(error)) if np.isfinite(error).all() else int(np.argmin(np.isfinite(error)))
+    if error[worst] <= tolerance * turned + ROUNDING * largest:
+        return
+    first = int(np.argmax(~(error <= tolerance * turned + ROUNDING * largest)))
+    raise SolverError(
+        f"at t = {trajectory.time[first]:.6g} s: the ledger of energy does not close: it is off by up to "
+        f"{error[worst]:.3g} J where {turned:.3g} J are turned over (tolerance {tolerance:g}, "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(built, found, first)}; "
+        "a smaller rtol or step is the remedy, or the scene is beyond this integrator"
+    )
+
+
+def _losses(built: Tables, found: dict[str, np.ndarray], k: int) -> str:
+    parts = []
+    for c, (name, *_) in enumerate(built.system.contacts):
+        for cause in ("damping", "friction"):
+            parts.append(f"{found[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
+    if "modal_damping_loss" in found:
+        parts.append(f"{found['modal_damping_loss'][k]:.3g} J to modal damping")
+    if "load_loss" in found:
+        parts.append(f"{found['load_loss'][k]:.3g} J to the loads")
+    return ", ".join(parts) or "nothing"

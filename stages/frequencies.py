@@ -1,0 +1,31 @@
+"""The table that ``flexclear frequencies`` prints."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+
+def text(linear: xr.Dataset) -> str:
+    """Pose, residual and mobility, then frequency, damping and dominant part of every vibration (schema LINEAR)."""
+    a = linear.attrs
+    lines = [
+        f"{a['scene']} at t = {a['time']:.6g} s, drives {a['drives']}",
+        *_pose(linear),
+        f"equilibrium: largest unbalanced force {a['residual']:.3g} N after {a['iterations']} iterations",
+        f"mobility {a['mobility']}, {a['motions_without_stiffness']} without stiffness; "
+        f"{a['redundant_closure_rows']} redundant closure rows",
+        f"{'':>4} {'frequency':>14} {'damping':>10}  most kinetic energy in",
+        f"{'':>4} {'Hz':>14} {'ratio':>10}",
+    ]
+    share = linear["energy_share"].max("moving_body").values
+    columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "dominant")]
+    for number, hertz, damping, name, part in zip(*columns, share, strict=True):
+        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %)")
+    return "\n".join(lines) + "\n"
+
+
+def _pose(linear: xr.Dataset) -> list[str]:
+    if "drive_position" not in linear:
+        return []
+    places = zip(linear["drive"].values, linear["drive_position"].values, strict=True)
+    return ["drives at " + ", ".join(f"{name} = {value:.6g}" for name, value in places)]

@@ -1,0 +1,37 @@
+"""Beside stage 4: scene and bundles -> equilibrium in one pose and the natural vibrations about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from stages import s4_simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+    from pipeline.core.workflow.execute import Progress
+
+#: what the vibrations do not depend on
+LEFT_OUT = ("output", "ensemble")
+
+
+def params(
+    scene: Scene, time: float | None, drives: Mapping[str, float] | None, *, moving: bool, vibrations: bool
+) -> dict[str, Any]:
+    """The scene as the engine sees it, and where it is looked at."""
+    common = s4_simulate.params(scene)
+    table = {name: part for name, part in common["scene"].items() if name not in LEFT_OUT}
+    pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}
+    return {**common, "scene": table, "pose": pose}
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """The equilibrium (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); inputs are ``bundle/<body>``."""
+    from pipeline import dynamics
+
+    pose = params["pose"]
+    solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium
+    scene, bundles = s4_simulate.rebuild(params), s4_simulate.bundles(inputs)
+    return {"nc": solve(scene, bundles, progress, pose["time"], pose["drives"], pose["moving"])}

@@ -1,0 +1,92 @@
+"""Contacts under every integrator: a bouncing ball against one dimension, the mechanism against itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.analytic.mechanism_runs import Overrides, impacts, run
+from tests.reference import contact_solutions as exact
+
+BOUNCE, CSJ = "checks/bounce", "sps4/csj"
+STEP = 1e-5
+
+
+def solver(**keys: object) -> Overrides:
+    return tuple((f"solver.{key}", value) for key, value in keys.items())
+
+
+#: solver -> largest error of the six impact times [s] and speeds [m/s]; the ball bounces for a second
+BOUNCES = {
+    "dopri5": (solver(integrator="dopri5", rtol=1e-10), 1e-8, 1e-8),
+    # third-order dense output is not used where a step is repeated to end on the event
+    "radau": (solver(integrator="radau", rtol=1e-10), 1e-7, 1e-7),
+    # second order: the error per step is rtol, the number of steps goes with its cube root
+    "generalized-alpha": (solver(integrator="generalized-alpha", rtol=1e-9), 1e-5, 1e-5),
+    # 200 steps a contact of 2 ms, each begun anew: (step / contact time)^4 of a second's flight
+    "rk4": (solver(integrator="rk4", step=STEP), 1e-6, 1e-6),
+    "adams-bashforth-moulton": (solver(integrator="adams-bashforth-moulton", step=STEP), 1e-6, 1e-6),
+    "generalized-alpha fixed": (solver(integrator="generalized-alpha", step=STEP), 1e-4, 1e-4),
+}
+QUICK = ("dopri5", "radau")
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BOUNCES])
+def test_ball_bounces_as_in_one_dimension(name: str) -> None:
+    overrides, times, speeds = BOUNCES[name]
+    found = impacts(run(BOUNCE, overrides))
+    known = exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, 0.99)
+    assert found["start"] == pytest.approx([b.start for b in known], abs=times)
+    assert found["approach"] == pytest.approx([b.approach for b in known], abs=speeds)
+    assert found["separation"] == pytest.approx([b.separation for b in known], abs=speeds)
+
+
+@pytest.mark.slow
+def test_unlocated_events_lie_on_the_grid_and_latch_the_speed_there() -> None:
+    found = impacts(run(BOUNCE, solver(integrator="rk4", step=1e-4, events="at step ends")))
+    start, known = found["start"][0], exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, 0.2)[0]
+    assert start / 1e-4 == pytest.approx(round(start / 1e-4), abs=1e-6)
+    assert 0.0 < start - known.start <= 1e-4
+    # until the step's end the ball falls on freely
+    assert found["approach"][0] == pytest.approx(known.approach + 9.81 * (start - known.start), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_unlocated_events_cost_the_order() -> None:
+    """Ten times shorter steps make ten times smaller errors, not 10^4."""
+    known = exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, 0.2)[0]
+
+    def rebound_error(step: float, events: str) -> float:
+        made = impacts(run(BOUNCE, (*solver(integrator="rk4", step=step, events=events), ("time.end", 0.2))))
+        return float(abs(made["separation"][0] - known.separation))
+
+    late = [rebound_error(step, "at step ends") for step in (1e-4, 1e-6)]
+    located = [rebound_error(step, "located") for step in (1e-4, 1e-5)]
+    assert located[1] < 0.1 * located[0]
+    assert late[1] > 1e-7
+    assert located[1] < late[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "overrides, times",
+    [(solver(integrator="radau", rtol=1e-10), 1e-6), (solver(integrator="generalized-alpha", rtol=3e-10), 1e-5)],
+    ids=["radau", "generalized-alpha"],
+)
+def test_integrators_agree_on_the_mechanisms_impacts(overrides: Overrides, times: float) -> None:
+    """28 impacts in 0.18 s; perturbations grow two to ten times."""
+    found, known = impacts(run(CSJ, overrides)), impacts(run(CSJ, solver(rtol=1e-12)))
+    assert len(found["start"]) == len(known["start"])
+    assert found["start"] == pytest.approx(known["start"], abs=times)
+    assert np.abs(found["approach"] - known["approach"]).max() <= 1e3 * times  # accelerations of 1e3 m/s^2
+
+
+@pytest.mark.slow
+def test_the_papers_predictor_corrector_without_location_finds_other_impacts() -> None:
+    """At the paper's step of 1e-5 s: some mm/s off, and more impacts than there are."""
+    paper = run(CSJ, solver(integrator="adams-bashforth-moulton", step=STEP, events="at step ends"))
+    known = run(CSJ, solver(rtol=1e-12))
+    assert len(impacts(paper)["start"]) != len(impacts(known)["start"])
+    times = np.round(np.arange(0.0, 0.18, 1e-3), 9)
+    speeds = [d.sel(body="platform").sel(time=times, method="nearest").velocity.values for d in (paper, known)]
+    assert 1e-3 < np.abs(speeds[0] - speeds[1]).max() < 2e-2

@@ -1,0 +1,69 @@
+"""Every integrator has the order that it claims, on a tree and on a closed loop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.dynamics.integrate import NAMES
+from tests.analytic.integrator_scenes import NO_PROJECTION, SCENES, ledger_free, reference, trajectory
+
+#: integrator -> order, order of its dense output's error, steps per second at which errors are neither coarse nor
+#: rounding, tolerance of Newton's iterations
+CASES: dict[str, tuple[int, int, tuple[int, ...], float]] = {
+    "dop853": (8, 8, (20, 24, 28, 32), NO_PROJECTION),
+    "dopri5": (5, 5, (160, 240, 320), NO_PROJECTION),
+    "rk4": (4, 4, (80, 160, 320), NO_PROJECTION),
+    "adams-bashforth-moulton": (4, 4, (320, 640, 1280), NO_PROJECTION),
+    "generalized-alpha": (2, 2, (200, 400, 800), 1e-6),
+    "radau": (5, 4, (20, 40, 80), 1e-11),
+}
+MECHANISMS = ["double pendulum", pytest.param("spatial four-bar", marks=pytest.mark.slow)]
+
+
+def slope(steps: list[float], errors: list[float]) -> float:
+    return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
+
+
+def errors(name: str, integrator: str) -> tuple[list[float], list[float], list[float]]:
+    """Steps, errors at the end and largest errors between step ends, all against DOP853 at 1e-13."""
+    known, (_, _, per_second, rtol) = reference(name), CASES[integrator]
+    steps = [1.0 / k for k in per_second]
+    ends, dense = [], []
+    for step in steps:
+        made = trajectory(SCENES[name](), {"integrator": integrator, "step": step, "rtol": rtol})
+        error = np.abs(ledger_free(made.rows) - ledger_free(known)).max(axis=1)
+        ends.append(float(error[-1]))
+        dense.append(float(np.sqrt(np.mean(error[:-1] ** 2))))
+    return steps, ends, dense
+
+
+def test_every_integrator_is_measured() -> None:
+    assert set(CASES) == set(NAMES)
+
+
+@pytest.mark.parametrize("integrator", CASES)
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_order_is_as_claimed(name: str, integrator: str) -> None:
+    steps, ends, dense = errors(name, integrator)
+    order, between, *_ = CASES[integrator]
+    assert slope(steps, ends) == pytest.approx(order, abs=0.25)
+    # output times fall differently into the steps of each run, which scatters the error between them
+    assert slope(steps, dense) == pytest.approx(between, abs=0.6)
+
+
+#: integrator -> error that rtol 1e-7 leaves at most: some ten steps, through a motion that doubles errors a few times;
+#: of second order, hundreds of steps
+TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-4}
+
+
+@pytest.mark.parametrize("integrator", TOLERANCES)
+def test_tighter_tolerances_give_smaller_errors(integrator: str) -> None:
+    known, found = reference("double pendulum"), []
+    for rtol in (1e-5, 1e-7, 1e-9):
+        made = trajectory(SCENES["double pendulum"](), {"integrator": integrator, "rtol": rtol})
+        found.append(np.abs(ledger_free(made.rows) - ledger_free(known)).max())
+    # a hundredth of the tolerance: error per step of second order with a third-order estimate falls by 100^(2/3)
+    assert found[1] <= found[0] / 15.0
+    assert found[2] <= found[1] / 15.0
+    assert found[1] <= TOLERANCES[integrator]

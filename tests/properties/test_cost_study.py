@@ -1,0 +1,164 @@
+"""The price list of a scene, from made-up runs whose errors are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.quantities import Quantity
+from pipeline.post.cost import causes, page, price, split, statistics, work_precision
+from pipeline.post.cost.study import Point, assemble, resolved
+
+POSITION = Quantity("slider", "position")
+TIMES = Quantity("pin", "impact_times")
+SIZE = 2.0  # largest displacement of the made-up slider [m]
+
+
+def run(error: float, *, seconds=(0.2, 0.1, 0.3), evaluations=100, impacts=3, horizon=None) -> xr.Dataset:
+    """A slider that goes 2 m, off by `error`; with impacts off by `error` seconds."""
+    time = np.linspace(0.0, 1.0, 11)
+    position = np.zeros((11, 1, 3))
+    position[:, 0, 0] = SIZE * time + error * np.sin(np.pi * time)
+    data = {
+        "position": (("time", "body", "axis"), position),
+        "event_time": (("event",), 0.2 * (1 + np.arange(impacts)) + error),
+        "event_contact": (("event",), np.zeros(impacts, dtype=int)),
+        "event_kind": (("event",), np.ones(impacts)),
+        "event_approach_speed": (("event",), np.full(impacts, 0.5)),
+        "cpu_repeat": (("repeat",), np.array(seconds)),
+    }
+    if horizon is not None:
+        data["horizon"] = ((), horizon)
+    coordinates = {"time": time, "body": ["slider"], "contact": ["pin"]}
+    attributes = {
+        "evaluations": evaluations,
+        "compile_seconds": 1.0,
+        "peak_memory": 1e8,
+        "clearance": 1e-3,
+        "growth": 5.0,
+    }
+    return xr.Dataset(data, coordinates, attributes)
+
+
+def study(uncertainty: float = 1e-8, horizon: float | None = None, **extra: xr.Dataset):
+    """dop853 at three tolerances, rk4 at two steps of which one is refused."""
+    points = [Point("best", "reference", {}), Point("other", "confirmation", {})]
+    runs = {"best": run(0.0, horizon=horizon), "other": run(uncertainty)}
+    for k, (rtol, error) in enumerate(((1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-7))):
+        points.append(Point(f"d{k}", "tolerance", {"adaptive_integrator": "dop853", "rtol": rtol}))
+        runs[f"d{k}"] = run(error, evaluations=100 * (k + 1))
+    for step, made in ((1e-3, run(1e-4, evaluations=50)), (1e-2, xr.Dataset(attrs={"refused": "it blew up"}))):
+        points.append(Point(f"r{step}", "step", {"fixed_integrator": "rk4", "step": step}))
+        runs[f"r{step}"] = made
+    return assemble(points, runs, [POSITION, TIMES]), points, runs
+
+
+def test_errors_are_relative_to_the_size_of_the_quantity():
+    found, *_ = study()
+    error = found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-6)
+    assert float(error.sel(quantity="slider.position")) == pytest.approx(1e-5 / SIZE)
+    assert float(error.sel(quantity="pin.impact_times")) == pytest.approx(1e-5 / 0.6)  # last impact at 0.6 s
+
+
+def test_costs_are_medians_with_their_spread():
+    found, *_ = study()
+    assert float(found.cpu_seconds_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-3)) == 0.2
+    assert float(found.cpu_spread_by_tolerance.sel(adaptive_integrator="dop853", rtol=1e-3)) == pytest.approx(0.2)
+
+
+def test_refused_points_are_gaps_with_their_reason():
+    found, *_ = study()
+    assert np.isnan(found.error_by_step.sel(fixed_integrator="rk4", step=1e-2)).all()
+    assert "it blew up" in found.attrs["refused"]
+
+
+def test_errors_near_the_reference_cannot_be_told():
+    found, *_ = study(uncertainty=1e-7)
+    told = resolved(found, "tolerance").sel(adaptive_integrator="dop853", quantity="slider.position")
+    assert told.sel(rtol=1e-6).item()
+    assert not told.sel(rtol=1e-9).item()
+
+
+def test_errors_beyond_the_horizon_do_not_count():
+    all_of_it, *_ = study()
+    part, *_ = study(horizon=0.2)
+    pick = {"adaptive_integrator": "dop853", "rtol": 1e-3, "quantity": "slider.position"}
+    ratio = float(part.error_by_tolerance.sel(pick)) / float(all_of_it.error_by_tolerance.sel(pick))
+    assert ratio == pytest.approx(np.sin(0.2 * np.pi))
+
+
+def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheapest():
+    _, points, runs = study()
+    runs["d2"] = run(0.0, impacts=2, evaluations=1)
+    again = assemble(points, runs, [POSITION, TIMES])
+    assert np.isinf(again.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
+    chosen = price.cheapest(again, 1e-3)
+    assert chosen is not None
+    assert chosen.evaluations > 1
+
+
+def test_the_cheapest_way_to_each_accuracy():
+    found, *_ = study()
+    assert price.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
+    assert price.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
+    assert price.cheapest(found, 1e-12) is None
+    rows = price.price_list(found, "t").rows
+    assert rows[2][1] == "cannot be had"
+    assert "1.7e-07 at best" in rows[2][4]  # 1e-7 s of 0.6 s
+
+
+def test_the_pareto_front_holds_what_nothing_beats():
+    seconds, error = np.array([1.0, 2.0, 3.0, 4.0, np.nan]), np.array([1e-2, 1e-1, 1e-4, 1e-3, 1e-9])
+    assert work_precision.pareto(seconds, error).tolist() == [0, 2]
+
+
+def test_causes_come_from_pairs_that_differ_in_one_thing():
+    _, points, runs = study()
+    points += [
+        Point("as it stands", "sampling", {"interval": 0.1}),
+        Point("denser output", "sampling", {"interval": 0.01}),
+    ]
+    runs |= {"as it stands": run(1e-5), "denser output": run(1e-5)}
+    own = {"theory": "rayleigh", "mode_set": "craig-bampton", "modes": 1e3, "elements": 12, "own": True}
+    variants = {
+        "own": own,
+        "fine": {**own, "elements": 48, "own": False},
+        "shear": {**own, "theory": "timoshenko", "own": False},
+    }
+    for (key, factors), error in zip(variants.items(), (0.0, 3e-4, 2e-3), strict=True):
+        points.append(Point(key, "model", factors))
+        runs[key] = run(error)
+    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    assert found["time integration"] == pytest.approx(1e-5 / SIZE)
+    assert found["mesh"] == pytest.approx(3e-4 / SIZE)
+    assert found["beam theory"] == pytest.approx(2e-3 / SIZE)
+    assert found["modal truncation"] == 0.0
+    assert causes.dominant(found) == "beam theory"
+    located = split.causes_of(TIMES, points, runs, located=1e-12)["event location"]
+    assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
+
+
+def test_bootstrap_intervals_hold_the_mean_of_the_population_as_often_as_they_say():
+    random = np.random.default_rng(1)
+    hits = 0
+    for _ in range(200):
+        found = statistics.estimate(random.normal(size=16))
+        hits += found.low < 0.0 < found.high
+    # 95 % intervals of the percentile kind from 16 members cover 88 to 96 %
+    assert 0.85 < hits / 200 < 0.98
+
+
+def test_the_page_says_what_each_digit_costs():
+    found, *_ = study()
+    text = page.markdown((page.Studied("a/scene", found, ("| a table |",), {"Error": "x/y.png"}),), "docs/accuracy.md")
+    assert "flexclear cost a/scene --page docs/accuracy.md" in text
+    assert "0.001 takes rk4, step 0.001 s (50 evaluations)" in text
+    assert "1e-09 cannot be had" in text
+    assert "![Error of a/scene](x/y.png)" in text
+
+
+def test_figures_are_drawn():
+    found, *_ = study()
+    mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
+    assert set(work_precision.make("w", found, "t", (mark,))) == {"w.png", "w.svg"}

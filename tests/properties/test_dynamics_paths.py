@@ -1,0 +1,148 @@
+"""Frames on given paths: they go there, and the forces told are those that it takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.algebra import quaternion_to_matrix, rotation_vector_to_matrix
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly.driving import drive_laws
+from tests.analytic.mechanism_runs import TREE, run
+from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, scene, simulate
+
+
+def wave(amplitude: float, hertz: float, offset: float = 0.0) -> dict[str, Any]:
+    return {"type": "harmonic", "amplitude": [amplitude], "frequency": [f"{hertz} Hz"], "offset": offset}
+
+
+PLACE = {"x": wave(0.2, 1.0), "y": wave(0.1, 2.0, 0.3), "z": wave(-0.15, 1.5)}
+ANGLES = {"x": wave(0.8, 1.0, 0.1), "y": wave(0.6, 0.7), "z": wave(-1.2, 1.3)}
+TIP = frame((0.1, -0.05, 0.2), (0.4, 0.1, -0.3))
+
+
+def flying(**path: Any) -> dict[str, Any]:
+    bodies = {"base": ground(O=(0.0, 0.0, 0.0)), "b": body((0.0, 0.0, 0.0), mass=2.0, frames={"tip": TIP})}
+    drive = {"path": {"frame": "b.tip", **path}}
+    return scene(bodies, {}, end=0.5, drive=drive, load=GRAVITY, output={"interval": 0.01})
+
+
+def laws(table: dict[str, Any], time: np.ndarray, order: int = 0) -> np.ndarray:
+    """Derivatives of all prescribed components over time, shape (time, components)."""
+    made = drive_laws(Scene.model_validate(table), {})
+    return np.array([[law.value(float(t), order) for law in made] for t in time])
+
+
+def cardan(a: np.ndarray) -> np.ndarray:
+    parts = [rotation_vector_to_matrix(angle * axis) for angle, axis in zip(a, np.eye(3), strict=True)]
+    return parts[0] @ parts[1] @ parts[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angles", ["cardan", "rotation-vector"])
+def test_a_frame_follows_its_path_and_the_forces_are_newtons_and_eulers(angles: str) -> None:
+    table = flying(position=PLACE, rotation=ANGLES, angles=angles)
+    dataset = simulate(table)
+    time = dataset.time.values
+    prescribed, rates = laws(table, time), laws(table, time, 1)
+    assert dataset.frame_position.sel(frame="b.tip").values == pytest.approx(prescribed[:, :3], abs=1e-13)
+    turn = cardan if angles == "cardan" else rotation_vector_to_matrix
+    own = rotation_vector_to_matrix(np.array(TIP["rotation_vector"]))
+    R = quaternion_to_matrix(dataset["quaternion"].sel(body="b").values) @ own
+    assert pytest.approx(np.array([turn(a) for a in prescribed[:, 3:]]), abs=1e-12) == R
+    motion = dataset.sel(body="b")
+    force = 2.0 * (motion.acceleration.values - [0.0, 0.0, -9.81])
+    assert dataset.drive_force.values[:, :3] == pytest.approx(force, abs=1e-11)
+    # power of all six = power that the body takes up, by Newton and Euler in the world
+    world = R @ own.T @ np.diag([0.024, 0.04, 0.03]) @ own @ np.swapaxes(R, 1, 2)
+    omega, alpha = motion.angular_velocity.values, motion.angular_acceleration.values
+    spin = np.einsum("tij,tj->ti", world, omega)
+    moment = np.einsum("tij,tj->ti", world, alpha) + np.cross(omega, spin)
+    known = np.sum(force * motion.velocity.values, axis=1) + np.sum(moment * omega, axis=1)
+    assert np.sum(dataset.drive_force.values * rates, axis=1) == pytest.approx(known, abs=1e-10)
+    assert np.abs(dataset.energy_error.values).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_components_without_a_law_stay_free() -> None:
+    """Guided along x and about z only, the body falls, and y is free of force."""
+    dataset = simulate(flying(position={"x": PLACE["x"]}, rotation={"z": ANGLES["z"]}))
+    assert list(dataset.drive.values) == ["path.position.x", "path.rotation.z"]
+    acceleration = dataset.acceleration.sel(body="b").values
+    assert acceleration[:, 1] == pytest.approx(0.0, abs=1e-9)
+    assert acceleration[:, 2] == pytest.approx(-9.81, abs=1e-9)
+    assert 2.0 * acceleration[:, 0] == pytest.approx(dataset.drive_force.values[:, 0], abs=1e-9)
+    assert np.abs(dataset.energy_error.values).max() < 1e-8
+
+
+# Inverse dynamics ---------------------------------------------------------------------------------------------------
+
+IDEAL = "sps4/ideal"
+HALF = (("time.end", 0.09),)  # to the jump of the drives' jerk: one smooth spline per component
+
+
+def guided(known: xr.Dataset, actuators: tuple[str, ...], components: str = "zxyz") -> dict[str, Any]:
+    """The ideal mechanism with its platform on the path that `known` took, and undriven legs."""
+    R = quaternion_to_matrix(known["quaternion"].sel(body="platform").values)
+    height = known.frame_position.sel(frame="platform.C").values[:, 2]
+    angles = np.arctan2(-R[:, 1, 2], R[:, 2, 2]), np.arcsin(R[:, 0, 2]), np.arctan2(-R[:, 0, 1], R[:, 0, 0])
+    splines = [
+        {"type": "spline", "degree": 5, "time": list(known.time.values), "value": list(x)} for x in (height, *angles)
+    ]
+    table = load_scene(TREE / "scenes" / f"{IDEAL}.toml", dict(HALF)).model_dump(exclude_none=True)
+    path: dict[str, Any] = {"frame": "platform.C", "actuators": actuators, "position": {"z": splines[0]}}
+    if components == "zxyz":
+        path["rotation"] = dict(zip("xyz", splines[1:], strict=True))
+    table["drive"] = {"path": path}
+    return table
+
+
+@pytest.mark.slow
+def test_the_legs_forces_of_a_prescribed_platform_are_those_that_moved_it() -> None:
+    """Forwards the legs are driven and the platform follows; backwards its path is given and their forces asked."""
+    known = run(IDEAL, HALF)
+    legs = ("P1", "P2", "P3", "P4")
+    found = simulate(guided(known, legs))
+    assert list(found.drive.values) == list(legs)
+    forces = known.drive_force.sel(drive=list(legs)).values
+    assert len(found.time) == len(known.time)
+    # splines through recorded angles: rounding 1e-15 rad / (1e-4 s)^2 gives 1e-7 of 44 rad/s^2
+    assert found.drive_force.values == pytest.approx(forces, abs=1e-6 * np.abs(forces).max())
+    for name in ("joint_force", "position"):
+        assert found[name].values == pytest.approx(known[name].values, abs=1e-6 * np.abs(known[name]).values.max())
+    assert found.attrs["parameters"].count("actuators") == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "actuators, problem",
+    [
+        (("P1", "P2", "P3"), "cannot produce"),
+        (("P1", "P2", "P3", "P4", "Z"), "not unique"),
+        (("P1", "P2", "P3", "A1"), "no single coordinate"),
+        (("P1", "P2", "P3", "P9"), "no joint 'P9'"),
+    ],
+)
+def test_actuators_that_cannot_or_are_too_many_are_refused(actuators: tuple[str, ...], problem: str) -> None:
+    with pytest.raises(InputError, match=problem) as error:
+        simulate(guided(run(IDEAL, HALF), actuators))
+    assert "[drive.path.actuators" in str(error.value)
+
+
+def test_a_path_and_a_joint_drive_do_not_fight_unnoticed() -> None:
+    """The same freedom prescribed twice, by a path and by a drive, closes a loop of driven joints."""
+    table = scene(
+        {"base": ground(O=(0.0, 0.0, 0.0)), "b": body((0.0, 0.0, 0.0), frames={"O": frame((0.0, 0.0, 0.0))})},
+        {"slide": joint("prismatic", "base.O", "b.O")},
+        drive={
+            "slide": {"joint": "slide", "law": wave(0.1, 1.0)},
+            "path": {"frame": "b.O", "position": {"z": wave(0.1, 1.0)}},
+        },
+    )
+    with pytest.raises(InputError, match="closes a loop"):
+        simulate(table)

@@ -1,0 +1,190 @@
+"""The shortening of a bent beam: forms of the bundle against direct integration, and what loads on its ends do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import dynamics
+from pipeline.core.scene.load import load_scene, read_toml
+from pipeline.structure.fe import mesh
+from pipeline.structure.modes import bundle, solve
+from tests.analytic.mechanism_runs import TREE
+
+RECIPE = TREE / "meshes" / "checks" / "slender_beam.toml"
+
+
+@dataclass(frozen=True)
+class Reduced:
+    mesh: xr.Dataset
+    modes: xr.Dataset
+    bundle: xr.Dataset
+
+
+def reduce(reference: str, count: int | None, interfaces: tuple[str, ...] | None = None, **recipe: object) -> Reduced:
+    """A beam's bundle; `recipe` replaces whole parts of the recipe."""
+    grid = mesh.build({**read_toml(Path(RECIPE)), **recipe})
+    modes = solve(grid, reference, count, interfaces=interfaces)
+    return Reduced(grid, modes, bundle.build(grid, modes))
+
+
+def slopes_squared(reduced: Reduced, q: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places and v'^2 + w'^2 of cubic elements, at the middles of `points` parts of each element."""
+    x = reduced.mesh["node_position"].values[:, 0]
+    d = reduced.modes["shape"].values @ q
+    s = (np.arange(points) + 0.5) / points
+    at, total = [], []
+    for i in range(len(x) - 1):
+        h = x[i + 1] - x[i]
+        ends = np.array([-6 * s + 6 * s**2, h * (1 - 4 * s + 3 * s**2), 6 * s - 6 * s**2, h * (3 * s**2 - 2 * s)]) / h
+        v = np.array([d[i, 1], d[i, 5], d[i + 1, 1], d[i + 1, 5]]) @ ends
+        w = np.array([d[i, 2], -d[i, 4], d[i + 1, 2], -d[i + 1, 4]]) @ ends
+        at.append(x[i] + h * s)
+        total.append(v**2 + w**2)
+    return np.concatenate(at), np.concatenate(total)
+
+
+@pytest.mark.parametrize("first", ["root", "middle", "tip"])
+@pytest.mark.parametrize("reference", ["craig-bampton", "free-free"])
+def test_forms_are_what_the_shortened_axis_integrates_to(reference: str, first: str) -> None:
+    """Brute force: running sums of slopes, then of places, with the origin of the way at the first interface."""
+    frames = {"root": {"x": 0.0}, "middle": {"x": 0.25}, "tip": {"x": 1.0}}
+    other = "tip" if first != "tip" else "root"
+    reduced = reduce(reference, None, (first, other), elements=4, frames=frames)
+    q = np.random.default_rng(5).normal(size=reduced.bundle.sizes["mode"])
+    points = 4000
+    x, squares = slopes_squared(reduced, q, points)
+    width = 1.0 / len(x)
+    way = -width * (np.cumsum(squares) - 0.5 * squares)
+    edges = np.concatenate([[0.0], -width * np.cumsum(squares)])
+    at = {name: edges[round(part["x"] / width)] for name, part in frames.items()}
+    way = way - at[first]
+    line = 7850.0 * np.pi * 4e-6
+    # midpoint sums over 4000 parts per element: 1 / (24 * 4000^2) of the curvature of the squares
+    near = 1e-6
+    for name, weight in (("first", line), ("second", line * x)):
+        form = reduced.bundle[f"shortening_{name}_moment"].values
+        assert q @ form @ q == pytest.approx(np.sum(weight * way) * width, rel=near)
+        assert np.array_equal(form, form.T)
+    for name in frames:
+        form = reduced.bundle["frame_shortening"].sel(frame=name).values
+        assert q @ form @ q == pytest.approx(at[name] - at[first], rel=near, abs=1e-12)
+
+
+def test_stretching_and_twisting_shorten_nothing() -> None:
+    reduced = reduce("craig-bampton", 20)
+    plain = np.isin(reduced.modes["kind"].values, ["axial", "torsion"])
+    assert plain.any()
+    for name in ("shortening_first_moment", "shortening_second_moment"):
+        form = reduced.bundle[name].values
+        assert np.abs(form[plain]).max() < 1e-12 * np.abs(form).max()
+
+
+MAST = """
+title = "Mast"
+time.end = 1.0
+
+[load.gravity]
+type = "gravity"
+acceleration = [0.0, 0.0, -9.81]
+
+[body.ground]
+type = "ground"
+frames.axle = {}
+
+[body.hub]
+type = "rigid"
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+frames.axle = {}
+frames.seat = {}
+
+[body.beam]
+type = "flexible"
+mesh = "mast.toml"
+modes = { reference = "craig-bampton", count = 24 }
+stiffening = {}
+
+[body.head]
+type = "rigid"
+mass = 1.0
+inertia = [0.0, 0.0, 0.0]
+frames.seat = {}
+
+[joint.axle]
+type = "revolute"
+between = ["ground.axle", "hub.axle"]
+
+[joint.seat]
+type = "fixed"
+between = ["hub.seat", "beam.root"]
+
+[joint.head]
+type = "fixed"
+between = ["beam.tip", "head.seat"]
+
+[drive.axle]
+joint = "axle"
+law = { type = "constant" }
+"""
+
+
+def mast(tmp_path: Path, mass: float, modes: dict[str, object] | None = None, elements: int = 16) -> xr.Dataset:
+    """A light upright beam with a point mass on its top; a negative mass means that it hangs."""
+    light = {"density": 1.0, "youngs_modulus": 200e9, "poisson": 0.3}
+    (tmp_path / "mast.toml").write_text(RECIPE.read_text().replace('"7850 kg/m^3"', "1.0"))
+    (tmp_path / "scene.toml").write_text(MAST)
+    up = -9.81 if mass > 0.0 else 9.81
+    changes = {"body.head.mass": abs(mass), "load.gravity.acceleration": [0.0, 0.0, up]}
+    scene = load_scene(tmp_path / "scene.toml", changes if modes is None else {**changes, "body.beam.modes": modes})
+    kept = scene.flexible()["beam"].modes
+    reduced = reduce(kept.reference, kept.count, kept.interfaces, material=light, elements=elements)
+    return dynamics.frequencies(scene, {"beam": reduced.bundle}, lambda share, text: None)
+
+
+STIFFNESS = 200e9 * np.pi * 1.6e-11 / 4.0  #: E I [N m^2]
+CRITICAL = STIFFNESS * np.pi**2 / 4.0  #: Euler's load of the clamped-free column of 1 m [N]
+
+
+def side_stiffness(load: float) -> float:
+    """Force per deflection at the top of a clamped column that carries a dead load (negative: a pull) [N/m]."""
+    k = np.sqrt(abs(load) / STIFFNESS)
+    return load / (np.tan(k) / k - 1.0) if load > 0.0 else -load / (1.0 - np.tanh(k) / k)
+
+
+@pytest.mark.parametrize("share", [-5.0, -0.5, 0.3, 0.9])
+def test_a_load_on_its_top_softens_a_mast_and_a_pull_stiffens_it(tmp_path: Path, share: float) -> None:
+    """Beam-column theory, exact for a massless column: the load acts through the frame at its end alone."""
+    mass = share * CRITICAL / 9.81
+    found = mast(tmp_path, mass)
+    omega = 2.0 * np.pi * found.frequency.values[:2]
+    # the column's own 1.3e-5 kg move with a quarter of their mass and press with a third of their weight
+    near = 13e-6 / abs(mass) / (1.0 - max(share, 0.0)) + 1e-5
+    assert omega == pytest.approx([np.sqrt(side_stiffness(share * CRITICAL) / abs(mass))] * 2, rel=near)
+
+
+def test_a_mast_buckles_under_eulers_load(tmp_path: Path) -> None:
+    below, above = (mast(tmp_path, share * CRITICAL / 9.81) for share in (0.9999, 1.0001))
+    assert below.decay_rate.min() == 0.0
+    assert above.decay_rate.min() < 0.0
+
+
+@pytest.mark.parametrize(
+    "modes",
+    [
+        {"reference": "craig-bampton", "count": 24, "interfaces": ["tip", "root"]},
+        {"reference": "free-free", "count": 24},
+        {"reference": "craig-bampton", "count": 24, "interfaces": ["root"]},
+    ],
+    ids=["held at its top", "free-free", "cantilever"],
+)
+def test_where_the_body_frame_is_held_does_not_matter(tmp_path: Path, modes: dict[str, object]) -> None:
+    """Another origin of the shortening is another frame for the same motion."""
+    mass = 0.5 * CRITICAL / 9.81
+    usual, other = (mast(tmp_path, mass, kept, elements=4) for kept in (None, modes))
+    # four elements have 24 elastic coordinates, so all sets are complete; the fastest is 1e6 times the first
+    assert other.frequency.values[:2] == pytest.approx(usual.frequency.values[:2], rel=1e-5)

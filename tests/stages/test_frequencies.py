@@ -1,0 +1,90 @@
+"""Equilibria and natural frequencies through the stages: what the command prints, what is kept, what is refused."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline.core.errors import FlexclearError, InputError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import STORE
+from stages.__main__ import main
+from stages.graph import Graph
+
+#: makes one equilibrium in a fresh process and prints the own modules that it loaded
+LOADED = """
+import sys
+from pipeline.core.scene.load import load_scene
+from stages import s4_linear
+before = set(sys.modules)
+scene = load_scene(sys.argv[1])
+params = s4_linear.params(scene, None, None, moving=False, vibrations=True)
+s4_linear.run(params, {}, lambda share, text: None)
+print(*sorted(n for n in sys.modules.keys() - before if n.split(".")[0] in ("pipeline", "stages")))
+"""
+
+
+def path_of(root: Path, name: str) -> Path:
+    return root / "scenes" / "checks" / f"{name}.toml"
+
+
+def test_the_command_prints_pose_residual_and_mobility_then_the_table(
+    root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["frequencies", str(path_of(root, "pendulum")), "--at", "500 ms"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "checks/pendulum at t = 0.5 s, drives held"
+    assert lines[1].startswith("equilibrium: largest unbalanced force")
+    assert lines[2] == "mobility 1, 0 without stiffness; 0 redundant closure rows"
+    number, hertz, damping, owner, share = lines[-1].split(maxsplit=4)
+    assert (number, damping, owner, share) == ("1", "0", "bob", "(100 %)")
+    assert float(hertz) == pytest.approx(np.sqrt(9.81) / (2.0 * np.pi), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "at, said", [("3 kg", "'3 kg' is a mass"), ("soon", "not a number with a unit"), ("11", "0 to 10 s")]
+)
+def test_a_wrong_time_is_refused(root: Path, capsys: pytest.CaptureFixture[str], at: str, said: str) -> None:
+    assert main(["frequencies", str(path_of(root, "pendulum")), "--at", at]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_an_unknown_drive_is_refused(root: Path) -> None:
+    with pytest.raises(FlexclearError, match="there is no such drive") as told:
+        pipeline.equilibrium(path_of(root, "pendulum"), drives={"motor": 0.1})
+    assert told.value.exit_code == InputError.exit_code
+
+
+def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root: Path) -> None:
+    first, again = (pipeline.equilibrium(path_of(root, "pendulum")) for _ in range(2))
+    assert first.identical(again)
+    assert "frequency" not in first
+    assert first.attrs["Conventions"].startswith("CF-")
+    assert first.position.attrs["units"] == "m"
+    both = pipeline.frequencies(path_of(root, "pendulum"))
+    assert both.frequency.attrs["units"] == "Hz"
+    assert both.position.values == pytest.approx(first.position.values, abs=1e-14)
+
+
+def test_every_module_that_an_equilibrium_takes_is_in_its_key(root: Path) -> None:
+    path = path_of(root, "pendulum")
+    command = [sys.executable, "-c", LOADED, str(path)]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    task = Graph(load_scene(path)).linear()
+    closure = Sources(root).closure((task.run.partition(":")[0], STORE, *task.modules))
+    assert set(done.stdout.split()) <= closure.keys()
+
+
+def test_only_what_matters_is_in_the_key(root: Path) -> None:
+    """How often a run is recorded does not move an equilibrium; where it is looked at does."""
+    graphs = [Graph(load_scene(path_of(root, "pendulum"), o)) for o in ({}, {"output.interval": 0.1})]
+    usual, coarser = (g.linear(0.5).params for g in graphs)
+    assert usual == coarser
+    assert usual != graphs[0].linear(0.6).params
+    assert usual != graphs[0].linear(0.5, vibrations=False).params
