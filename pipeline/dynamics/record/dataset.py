@@ -18,6 +18,7 @@ from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.record import ledger
 from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
+from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.run import Run
 from pipeline.dynamics.tables import (
@@ -67,8 +68,9 @@ def dataset(run: Run) -> xr.Dataset:
         record = lookup("pipeline.dynamics.record", "stress", where="[output]")
         record(built, seen, run.scene.output.stress, variables, coordinates)
     variables.update(ledger.series(built, seen))
-    made = xr.Dataset(variables, coords=coordinates)
-    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_told(built, trajectory))
+    topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
+    made = xr.Dataset(variables | topological, coords=coordinates | named)
+    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run), **_told(built, trajectory))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
@@ -128,6 +130,15 @@ def _report(run: Run) -> dict[str, float | int]:
         "closure_residual_of_given_start": run.start_residual,
     }
     return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
+
+
+def _counts(run: Run) -> dict[str, str | int]:
+    """Redundancy, in words for the attributes."""
+    redundant = run.engine.mobility.redundant
+    found: dict[str, str | int] = {"redundant_closure_rows": redundant}
+    if redundant:
+        found["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+    return found
 
 
 def _motion(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
