@@ -119,6 +119,19 @@ def test_the_legs_forces_of_a_prescribed_platform_are_those_that_moved_it() -> N
 
 
 @pytest.mark.slow
+def test_legs_take_the_platform_where_a_scene_wants_it() -> None:
+    dataset = run("sps4/variants/guided", (("time.end", 0.09),))
+    last = dataset.isel(time=-1)
+    height = last.frame_position.sel(frame="platform.C").values
+    # the loops of the second run are closed to 1e-13 m
+    assert height == pytest.approx([0.0, 0.0, 0.36], abs=1e-12)
+    R = quaternion_to_matrix(last["quaternion"].sel(body="platform").values)
+    assert pytest.approx(cardan(np.radians([5.0, -8.0, 0.0])), abs=1e-11) == R
+    # from rest, without gravity and losses, all work of the legs is kinetic energy
+    assert dataset.drive_work.values == pytest.approx(dataset.kinetic.values, abs=1e-9 * float(dataset.kinetic.max()))
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "actuators, problem",
     [
