@@ -182,7 +182,7 @@ def test_a_planar_four_bar_in_space_moves_as_the_one_without_redundant_rows() ->
 
 
 def test_rows_are_chosen_anew_where_the_first_choice_fails() -> None:
-    """Bricard's loop turns far enough to make any four of its five rows nearly dependent; its answer shows nothing of it."""
+    """Bricard's loop turns far enough to make any four of its five rows nearly dependent; the answer hides it."""
     dataset = run("checks/bricard", (("time.end", 10.0), *TIGHT))
     assert dataset.condition.values.max() < 1e4
 

@@ -7,7 +7,18 @@ import numpy as np
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate.trajectory import Trajectory
-from pipeline.dynamics.tables import BENT, CONTACT_LOSS, DRIVE_WORK, MODAL_LOSS, STORED, TOUCH_SIZE
+from pipeline.dynamics.tables import (
+    BENT,
+    CONTACT_SLOTS,
+    DAMPING_LOSS,
+    DRIVE_WORK,
+    FRICTION_LOSS,
+    IMPULSE,
+    MODAL_LOSS,
+    PER_CONTACT,
+    STORED,
+    TOUCH_SIZE,
+)
 
 Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -21,9 +32,11 @@ def series(built: Tables, seen: Seen) -> Variables:
     kinetic, potential, elastic = seen["energy"].T
     contacts = len(built.system.contacts)
     touch = seen["touch"].reshape(len(ledger), contacts, TOUCH_SIZE)
-    slots = ledger[:, CONTACT_LOSS : CONTACT_LOSS + 2 * contacts].reshape(len(ledger), contacts, 2)
+    slots = ledger[:, CONTACT_SLOTS : CONTACT_SLOTS + PER_CONTACT * contacts].reshape(
+        len(ledger), contacts, PER_CONTACT
+    )
     # friction's slot is its work; what bent bristles still hold of it is not lost
-    damping, friction = slots[..., 0], slots[..., 1] - touch[..., BENT]
+    damping, friction = slots[..., DAMPING_LOSS], slots[..., FRICTION_LOSS] - touch[..., BENT]
     work, modal = ledger[:, DRIVE_WORK], ledger[:, MODAL_LOSS]
     dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
     balance = kinetic + potential + elastic + dissipated - work
@@ -47,6 +60,7 @@ def series(built: Tables, seen: Seen) -> Variables:
     if contacts:
         found["contact_elastic"] = (("time", "contact"), touch[..., STORED] + touch[..., BENT])
         found["contact_damping_loss"] = (("time", "contact"), damping)
+        found["contact_impulse"] = (("time", "contact"), slots[..., IMPULSE])
         found["contact_friction_loss"] = (("time", "contact"), friction)
     return found
 
