@@ -97,27 +97,9 @@ def place(name: str) -> int:
     return _PLACE[name]
 
 
-(
-    N_LINKS,
-    N_SITES,
-    N_FLEX,
-    N_CLOSURES,
-    N_CLOSURE_ROWS,
-    N_CONTACTS,
-    N_DRIVES,
-    NQ,
-    NV,
-    NY,
-    N_LEDGER,
-    N_PAIRS,
-    N_KNOWN_PAIRS,
-    N_GROUPS,
-    MASS_SIZE,
-    MOST_MODES,
-    N_LAWS,
-    N_LOADS,
-    N_TURNS,
-) = (place(name) for name in SIZES if name not in ELSEWHERE)
+_SIZES = [place(name) for name in SIZES if name not in ELSEWHERE]
+N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER = _SIZES[:11]
+N_PAIRS, N_KNOWN_PAIRS, N_GROUPS, MASS_SIZE, MOST_MODES, N_LAWS, N_LOADS, N_TURNS = _SIZES[11:]
 (
     LINKS,
     SITES,
@@ -144,48 +126,14 @@ def place(name: str) -> int:
     GRAVITY,
     FLOORS,
 ) = (place(name) for name in NUMBERS if name not in ELSEWHERE)
+# fmt: off
 (
-    X,
-    U,
-    DU,
-    LINK_FRAMES,
-    SITE_FRAMES,
-    JOINT,
-    OWN,
-    INERTIA,
-    WRENCH,
-    COLUMNS,
-    MOMENTA,
-    DEFORMATION,
-    BIAS,
-    MODAL_BIAS,
-    MODAL,
-    SCRATCH,
-    MASS,
-    FORCE,
-    ROWS,
-    RESIDUAL,
-    RESIDUAL_RATE,
-    MULTIPLIER,
-    TOUCH,
-    LAW,
-    LOAD,
-    TURN,
-    DRIVE_FORCE,
-    LEDGER_RATE,
-    POSITION_RATE,
-    Y,
-    Y_NEW,
-    Y_STAGE,
-    SLOPES,
-    DENSE,
-    MEMORY,
-    MAGNITUDE,
-    CORRECTION,
-    LATCHED,
-    WATCH,
-    CONTROL,
+    X, U, DU, LINK_FRAMES, SITE_FRAMES, JOINT, OWN, INERTIA, WRENCH, COLUMNS, MOMENTA, DEFORMATION, BIAS,
+    MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, ROWS, RESIDUAL, RESIDUAL_RATE, MULTIPLIER, TOUCH, LAW, LOAD,
+    TURN, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY, MAGNITUDE,
+    CORRECTION, LATCHED, WATCH, CONTROL,
 ) = (place(name) for name in WORK if name not in ELSEWHERE)
+# fmt: on
 
 # fields of a link, a flexible body, a port, a closure, a contact
 PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)

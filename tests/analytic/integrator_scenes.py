@@ -61,7 +61,7 @@ def spatial_four_bar() -> dict[str, Any]:
             "B": {"type": "spherical", "between": ["rocker.tip", "coupler.b"]},
         },
         "load": GRAVITY,
-        "time": {"end": 0.5},
+        "time": {"end": 1.2},
         "output": {"interval": 0.0173},
     }
 
@@ -82,7 +82,7 @@ def double_pendulum() -> dict[str, Any]:
             "Q": {"type": "revolute", "between": ["one.Q", "two.Q"]},
         },
         "load": GRAVITY,
-        "time": {"end": 0.5},
+        "time": {"end": 1.2},
         "output": {"interval": 0.0173},
     }
 

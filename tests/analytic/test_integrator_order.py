@@ -14,7 +14,7 @@ CASES: dict[str, tuple[int, int, tuple[int, ...], float]] = {
     "dop853": (8, 8, (20, 24, 28, 32), NO_PROJECTION),
     "dopri5": (5, 5, (160, 240, 320), NO_PROJECTION),
     "rk4": (4, 4, (80, 160, 320), NO_PROJECTION),
-    "adams-bashforth-moulton": (4, 4, (320, 640, 1280), NO_PROJECTION),
+    "adams-bashforth-moulton": (4, 4, (1280, 1920, 2560), NO_PROJECTION),
     "generalized-alpha": (2, 2, (200, 400, 800), 1e-6),
     "radau": (5, 4, (20, 40, 80), 1e-11),
 }
@@ -53,8 +53,8 @@ def test_order_is_as_claimed(name: str, integrator: str) -> None:
 
 
 #: integrator -> error that rtol 1e-7 leaves at most: some ten steps, through a motion that doubles errors a few times;
-#: of second order, hundreds of steps
-TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-4}
+#: of second order, a thousand steps, at speeds of some 10 rad/s
+TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-3}
 
 
 @pytest.mark.parametrize("integrator", TOLERANCES)

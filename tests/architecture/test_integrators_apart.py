@@ -9,13 +9,14 @@ import pytest
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.solver import OWNERS
 from pipeline.dynamics.assembly import fuse
+from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds
 from pipeline.dynamics.integrate import NAMES
 from pipeline.dynamics.integrate.method import Scheme, scheme_of
 from stages import s4_simulate
 
 PACKAGE = "pipeline.dynamics.integrate"
-KINDS = Kinds(("free",), ("hertz",), (), False, False)
+KINDS = Kinds(("free",), ContactKinds(("clearance-spherical",), ("hysteretic",)), False, False)
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {
     "dop853": {"dop853", "dop853_coefficients", "stages"},

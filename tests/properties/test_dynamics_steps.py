@@ -11,6 +11,7 @@ from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.integrate import trajectory as stepping
 from pipeline.dynamics.integrate.engine import consistent_start
+from pipeline.dynamics.run import observed
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
 FIXED = ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "generalized-alpha")
@@ -121,8 +122,6 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
     )
     start, _ = consistent_start(engine)
     made = stepping.integrate(engine, start, lambda share, text: None)
-    from pipeline.dynamics.run import observed
-
     kinetic, potential, _ = observed(engine, made)["energy"].T
     total = kinetic + potential
     lost = (total[0] - total[-5:].mean()) / np.ptp(potential)

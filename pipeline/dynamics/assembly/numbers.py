@@ -62,7 +62,7 @@ class Tables:
 def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
     """Place a system's links so that its joints fit, number it and fill its tables.
 
-    given: laws of prescribed coordinates that replace the scene's.
+    given: laws of prescribed coordinates, and of loads along joints as ``load.NAME``, that replace the scene's.
     """
     system = assembled(system, given)
     layout = number(system)
@@ -71,7 +71,7 @@ def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
     touching = [(layout.site(a), layout.site(b)) for _, _, a, b in system.contacts]
     closing = wiring.closures(layout, site_pairs)
     order = closing.pop("order")
-    loaded = loading.tabulate(system, layout)
+    loaded = loading.tabulate(system, layout, given)
     flexible_wiring, flexible_numbers = flexible.fill(layout)
     laws = drive_laws(system.scene, given)
     signs = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}

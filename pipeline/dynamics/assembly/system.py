@@ -126,7 +126,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
 
     closures = [(e, at(e.frame_a), at(e.frame_b)) for e in closing]
     contacts = [(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
-    length = _length(links, frames)
+    length = _length(scene, links, frames)
     return System(scene, bundles, frames, links, link_of, closures, contacts, origin, length)
 
 
@@ -204,8 +204,8 @@ def _centre_frame(scene: Scene, group: Group) -> Placement:
     return Placement(com, np.eye(3))
 
 
-def _length(links: list[Link], frames: Mapping[str, Frame]) -> float:
-    """Size of the mechanism [m]: the scale of what a length tolerance is relative to."""
+def _length(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
+    """Size of the mechanism [m], or of the clearance it moves in: what a length tolerance is relative to."""
     points = []
     for link in links:
         for name, place in link.places.items():
@@ -214,6 +214,7 @@ def _length(links: list[Link], frames: Mapping[str, Frame]) -> float:
                 points.append(link.start.of(Placement(link.inertia[1])).p)
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
+    size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)
     return size if size > 0.0 else 1.0
 
 

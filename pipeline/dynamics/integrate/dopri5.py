@@ -99,4 +99,5 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
     return begin_afresh, attempt, error, extend, keep_nothing
 
 
-METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True)
+# 3.25: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
+METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, stability=3.25)

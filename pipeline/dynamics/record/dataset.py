@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
+from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
@@ -52,7 +53,7 @@ def dataset(run: Run) -> xr.Dataset:
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
     _modes(built, seen, variables, coordinates)
-    _drives(built, seen, variables, coordinates)
+    _drives(built, seen, run.scene, variables, coordinates)
     _joint_coordinates(built, seen, variables, coordinates)
     if built.system.scene.forces():
         _loads(built, seen, variables, coordinates)
@@ -63,6 +64,9 @@ def dataset(run: Run) -> xr.Dataset:
         coordinates["twin_time"] = run.twin.time
         variables["twin_separation"] = (("twin_time",), run.twin.separation)
         variables["horizon"] = ((), np.array(run.twin.horizon))
+    if run.scene.output.stress is not None:
+        record = lookup("pipeline.dynamics.record", "stress", where="[output]")
+        record(built, seen, run.scene.output.stress, variables, coordinates)
     variables.update(ledger.series(built, seen))
     topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
     made = xr.Dataset(variables | topological, coords=coordinates | named)
@@ -181,15 +185,24 @@ def _modes(built: Tables, seen: Seen, variables: Variables, coordinates: dict[st
     variables["modal_velocity"] = (("time", "mode"), np.concatenate([s.u for s in states.values()], axis=1))
 
 
-def _drives(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+def _drives(built: Tables, seen: Seen, scene: Scene, variables: Variables, coordinates: dict[str, object]) -> None:
     names = built.system.drives
     if not names:
         return
     sign_of = {name: link.stage.sign for link in built.system.links if link.stage for name in link.drives}
     signs = np.array([sign_of[name] for name in names])
     coordinates["drive"] = names
-    variables["drive_force"] = (("time", "drive"), signs * seen["drive_force"])
-    variables["drive_position"] = (("time", "drive"), signs * seen["coordinate"][:, built.layout.nq :])
+    force, position = signs * seen["drive_force"], signs * seen["coordinate"][:, built.layout.nq :]
+    sharing = [name for name in built.system.scene.forces() if name not in scene.load]
+    if sharing:  # actuators beyond the freedoms, which the engine has as loads
+        from pipeline.dynamics.record.loads import along_coordinates
+
+        coordinates["drive"] = [*names, *sharing]
+        known = joint_coordinates(built, seen)
+        force = np.concatenate([force, along_coordinates(built, seen, sharing)], axis=1)
+        position = np.concatenate([position, np.stack([known[name][0] for name in sharing], axis=1)], axis=1)
+    variables["drive_force"] = (("time", "drive"), force)
+    variables["drive_position"] = (("time", "drive"), position)
 
 
 def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:

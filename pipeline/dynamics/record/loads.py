@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.dynamics.assembly.loading import describe, order
 from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.loads.fields import FORCE, MOMENT, VALUE, A, B
-from pipeline.dynamics.tables import FRAME_SIZE, LOAD_SIZE, OMEGA, ORIGIN, VELOCITY
+from pipeline.dynamics.loads.fields import AXIS, FORCE, MOMENT, SIDE, TURNING, VALUE, A, B
+from pipeline.dynamics.tables import AXES, FRAME_SIZE, LOAD_SIZE, OMEGA, ORIGIN, VELOCITY
 
 Seen = dict[str, np.ndarray]
 
@@ -39,16 +39,37 @@ def load_series(built: Tables, seen: Seen) -> dict[str, tuple[tuple[str, ...], n
     return {name: (dims, values[:, shown]) for name, (dims, values) in series.items()}
 
 
+def along_coordinates(built: Tables, seen: Seen, names: list[str]) -> np.ndarray:
+    """Force [N] or torque [N m] of loads along their joint coordinates, shape (time, names)."""
+    table, found = _table(seen), []
+    sites = seen["site_frame"].reshape(len(table), -1, FRAME_SIZE)
+    for name in names:
+        k = order(built.system.scene).index(name)
+        row = built.packed.table("LOADS")[k]
+        axes = sites[:, row[B] if row[SIDE] else row[A], AXES : AXES + 9].reshape(-1, 3, 3)
+        part = MOMENT if row[TURNING] else FORCE
+        found.append(np.einsum("ti,ti->t", axes[:, :, row[AXIS]], table[:, k, part : part + 3]))
+    return np.stack(found, axis=1)
+
+
 def on_body(built: Tables, seen: Seen, body: str) -> tuple[np.ndarray, np.ndarray]:
     """Sum of the loads on a body: moment about the kernels' origin, force; (time, 3) each."""
-    scene, frames, table = built.system.scene, built.system.frames, _table(seen)
-    moment, force = np.zeros((len(table), 3)), np.zeros((len(table), 3))
-    for k, name in enumerate(order(scene)):
-        for frame, sign in _ends(scene, name):
-            if frames[frame].body == body:
-                moment = moment + sign * table[:, k, MOMENT : MOMENT + 3]
-                force = force + sign * table[:, k, FORCE : FORCE + 3]
+    rows = len(_table(seen))
+    moment, force = np.zeros((rows, 3)), np.zeros((rows, 3))
+    for _, n, f in on_frames(built, seen, body):
+        moment, force = moment + n, force + f
     return moment, force
+
+
+def on_frames(built: Tables, seen: Seen, body: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Each load on a body: its frame, moment about the kernels' origin, force; (time, 3) each."""
+    scene, frames, table = built.system.scene, built.system.frames, _table(seen)
+    return [
+        (frame, sign * table[:, k, MOMENT : MOMENT + 3], sign * table[:, k, FORCE : FORCE + 3])
+        for k, name in enumerate(order(scene))
+        for frame, sign in _ends(scene, name)
+        if frames[frame].body == body
+    ]
 
 
 def _ends(scene: Any, name: str) -> list[tuple[str, float]]:
