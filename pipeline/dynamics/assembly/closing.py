@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.core.algebra import rotation_vector_to_matrix
+from pipeline.core.algebra import rotation_vector_to_matrix, skew
 from pipeline.core.errors import InputError
 from pipeline.dynamics.assembly.chain import path_positions
 from pipeline.dynamics.assembly.constraints import NONE, Constraint, constraints, demands, massless, prescribed
@@ -109,7 +109,7 @@ def misfit(system: System, joints: list[Constraint], poses: Sequence[Placement])
             values.append(np.where(force, residual / L, residual))
             block = np.zeros((len(wrench), 6 * len(system.links)))
             for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
-                moment = wrench[:, :3] - np.cross(centres[link], wrench[:, 3:])
+                moment = wrench[:, :3] - wrench[:, 3:] @ skew(centres[link]).T
                 block[:, 6 * link : 6 * link + 3] += sign * np.where(force[:, None], moment / L, moment)
                 block[:, 6 * link + 3 : 6 * link + 6] += sign * wrench[:, 3:]
             blocks.append(block)

@@ -8,7 +8,6 @@ ever. A selection keeps as many rows as the rank says; the others are only looke
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import qr
 
 from pipeline.dynamics import tables
 from pipeline.dynamics.assembly.numbers import Tables
@@ -28,6 +27,8 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each row kept is the one that stands
     out most from those before.
     """
+    from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
+
     kept, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
     if not count:
         return kept, 1.0

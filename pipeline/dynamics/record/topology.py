@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import KroghInterpolator
-from scipy.optimize import minimize_scalar
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.assembly import selection
@@ -96,6 +94,8 @@ def _passes(engine: Engine, trajectory: Trajectory, values: np.ndarray) -> list[
 
 def _pass_before(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int) -> Pass | None:
     """The pass between the regular rows k - 1 and k, if there is one."""
+    from scipy.optimize import minimize_scalar  # slow to import, and most runs pass nothing
+
     jacobian = _between(engine, trajectory, regular, k)
     U, _, Vt = np.linalg.svd(jacobian(0.0), full_matrices=False)
     B = U.T @ jacobian(1.0) @ Vt.T
@@ -119,6 +119,8 @@ def _between(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int
     On the polynomial that has the states and their rates at these rows and, where the motion is smooth, at their
     neighbours.
     """
+    from scipy.interpolate import KroghInterpolator
+
     times, first = trajectory.time, 1 + 2 * len(engine.built.system.contacts)
     start, end = float(times[regular[k - 1]]), float(times[regular[k]])
     engine.keep(trajectory.selection(int(regular[k])))
