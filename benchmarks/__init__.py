@@ -1,1 +1,1 @@
-"""Measurements of cost. `make bench` runs all of them; nothing here is cached or tested for speed."""
+"""Measurements of cost: `python -m benchmarks [group ...]`. Nothing here is cached or tested for speed."""

@@ -87,7 +87,10 @@ def _run(options: argparse.Namespace) -> None:
         run.check_target(options.out)
     graphs = run.graphs(options.scenes)
     place = run.workplace()
-    run.check(place.bring([task for graph in graphs for task in graph.up_to(options.to)]))
+    outcome = place.bring([task for graph in graphs for task in graph.up_to(options.to)])
+    run.check(outcome)
+    if options.to == "bundle":
+        print("\n\n".join(filter(None, (run.deficits(graph, place, outcome) for graph in graphs))))
     if options.out is not None:
         run.copy_run(graphs[0], place, options.out)
 

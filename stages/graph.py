@@ -10,14 +10,17 @@ from typing import Any
 
 from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
+from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s4_linear, s4_simulate, s6_render
+from stages import s1_mesh, s2_modes, s3_bundle, s4_linear, s4_simulate, s6_render
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
 #: artifacts as figures refer to them, ``<scene>:<artifact>[/<body>]``, and the stage that makes each
-ARTIFACTS = {name: name for name in STAGES} | {"run": "simulate"}
+ARTIFACTS = {name: name for name in STAGES} | {"run": "simulate", "tight": "tight", "fine-modes": "fine_modes"}
+#: how much tighter the tolerance of `tight` is, and how many times more elements `fine-modes` has
+TIGHTER, FINER = 1e-2, 4
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,12 @@ class Graph:
                 "bundle",
                 body,
                 "stages.s3_bundle:run",
-                {},
+                s3_bundle.params(self.scene, body),
                 {"mesh": self.mesh[body], "modes": self.modes[body]},
-                s1_mesh.modules(Path(part.mesh)),
+                (
+                    *s1_mesh.modules(Path(part.mesh)),
+                    *s3_bundle.modules(self.scene, body, s1_mesh.kind_of(Path(part.mesh))),
+                ),
             )
             for body, part in self.scene.flexible().items()
         }
@@ -141,6 +147,17 @@ class Graph:
             whose = f"'{body}'" if body else "the whole scene"
             raise InputError(where, f"there is no {name} of {whose}", suggestion(body, tasks))
         return tasks[body]
+
+    @cached_property
+    def tight(self) -> Task:
+        """The same run at a tighter tolerance, to tell the error of `simulate` by."""
+        change = {"solver.rtol": TIGHTER * self.scene.solver.rtol, "accuracy": None}
+        return Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
+
+    @cached_property
+    def fine_modes(self) -> dict[str, Task]:
+        """The modes on a finer mesh, to tell the error of `modes` by; by flexible body."""
+        return Graph(self.scene, shown=False, recipe={**self.recipe, "elements": FINER}).modes
 
     def _bundles(self) -> dict[str, Task]:
         return {f"bundle/{body}": task for body, task in self.bundle.items()}

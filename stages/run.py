@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,11 +78,20 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     results under results/runs.  Raises FlexclearError.
     """
     place = place or workplace()
+    import_module("pipeline.core.artifacts.modal")  # gives the dataset its accessor
     task = Graph(scene, shown=_as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
     return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+
+
+def deficits(graph: Graph, place: Workplace, outcome: Outcome) -> str:
+    """What the scene's bundles lack, one table for each flexible body."""
+    from pipeline.core.artifacts.deficits import table
+
+    bundles = {body: place.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
+    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in bundles.items())
 
 
 def linear(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stages import s1_mesh
 from stages.families import module
 
 if TYPE_CHECKING:
@@ -18,24 +20,34 @@ CONDITIONS = "pipeline.structure.modes.reference"
 
 def params(body: FlexibleBody) -> dict[str, Any]:
     """Which coordinates are kept; nothing else of the body."""
-    return body.modes.model_dump(mode="json", exclude={"source"})
+    return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
 
 
 def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
-    """Module of the reference condition; InputError when there is none of that name."""
-    return (module(CONDITIONS, body.modes.reference, where=where),)
+    """Modules of the reference conditions and of the kind of body; InputError when there is none of that name."""
+    names = [body.modes.reference, *([body.modes.of] if body.modes.of else [])]
+    return (*(module(CONDITIONS, name, where=where) for name in names), *s1_mesh.modules(Path(body.mesh)))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The modes (schema MODES)."""
+    """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
     from pipeline.structure import modes
+    from pipeline.structure.modes import paraview
+    from pipeline.structure.modes.select import Wanted
 
-    interfaces = params["interfaces"]
-    return {
-        "nc": modes.solve(
-            inputs["mesh"],
-            params["reference"],
-            params["count"],
-            interfaces=None if interfaces is None else tuple(interfaces),
-        )
-    }
+    count = params.get("count")
+    result = modes.solve(
+        inputs["mesh"],
+        params["reference"],
+        interfaces=params.get("interfaces"),
+        wanted=Wanted(
+            count=None if count == "all" else count,
+            up_to=params.get("up_to"),
+            compliance=params.get("compliance"),
+            mass=params.get("mass"),
+        ),
+        held=params.get("held", ()),
+        of=params.get("of"),
+        progress=progress,
+    )
+    return {"nc": result, "vtu": paraview.vtu(result)}

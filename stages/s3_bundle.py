@@ -3,16 +3,45 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from pipeline.core.registry import lookup
+from stages.families import module
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.scene.schema import Scene
     from pipeline.core.workflow.execute import Progress
+
+STRESS = "pipeline.structure.stress"
+SHORTENING = "pipeline.structure.modes.geometric_stiffness"
+WHERE = "[output] stress"
+
+
+def params(scene: Scene, body: str) -> dict[str, Any]:
+    """Whether stresses shall be recovered and bending shall shorten the body; nothing where the scene asks for neither."""
+    asked = {"stress": True} if body in (scene.output.stress or ()) else {}
+    return asked | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
+
+
+def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
+    """Module that recovers stresses of this kind of body; InputError when there is none."""
+    asked = params(scene, body)
+    stress = (module(STRESS, kind, where=WHERE),) if "stress" in asked else ()
+    return (*stress, *((SHORTENING,) if "stiffening" in asked else ()))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The bundle (schema BUNDLE)."""
     from pipeline.structure.modes import bundle
 
-    return {"nc": bundle.build(inputs["mesh"], inputs["modes"])}
+    progress(None, "inertia integrals")
+    mesh, modes = inputs["mesh"], inputs["modes"]
+    extra: dict[str, Any] = {}
+    if params.get("stress"):
+        extra |= lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)(mesh, modes)
+    if params.get("stiffening"):
+        extra |= import_module(SHORTENING).variables(mesh, modes)
+    return {"nc": bundle.build(mesh, modes, extra)}

@@ -93,6 +93,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
             where = f"[joint.{name}.friction]"
             found.add(module(f"{DYNAMICS}.contact.friction", contact.friction.law, where=where))
     found |= {module(f"{DYNAMICS}.drives", law, where="law") for law in laws}
+    if scene.output.stress is not None:
+        found.add(module(f"{DYNAMICS}.record", "stress", where="[output]"))
     for name, load in scene.load.items():
         found.add(module(f"{DYNAMICS}.loads", load.type, where=f"[load.{name}]"))
     return tuple(sorted(found))

@@ -1,8 +1,8 @@
-"""How long the runs of some scenes take, measured warm, one after the other in one process."""
+"""How long the runs of some scenes take, warm, one after the other: at equal error, and at equal steps."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from stages.s4_simulate import rebuild
@@ -10,40 +10,89 @@ from stages.s4_simulate import rebuild
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.scene.schema import Scene
     from pipeline.core.workflow.execute import Progress
 
 #: each scene is run so often; the median of three is not moved by one disturbed run
 REPEATS = 3
+#: equal error: of the velocity of the body with most joints, relative, over this first share of the run, where
+#: all scenes can still be predicted point by point
+EQUAL_ERROR, SHARE = 1e-6, 0.05
+#: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]
+STEP = 1e-5
+METHOD = "adams-bashforth-moulton"
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """CPU time [s] of warm runs, ``cpu_seconds(scene, repeat)``, and ``evaluations(scene)`` of each.
+    """CPU time [s] of warm runs, evaluations, and the settings: ``equal_*`` at equal error, ``step_*`` at equal steps.
 
-    params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``.
+    params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``.  A scene that the
+    fixed step cannot integrate has NaN there, and the reason in the attribute `refused`.
     """
-    import time
-
     import numpy as np
     import xarray as xr
 
+    from pipeline.core.errors import SolverError
+
+    names = list(params)
+    ways = ("equal", "step")
+    seconds = {way: np.full((len(names), REPEATS), np.nan) for way in ways}
+    evaluations = {way: np.full(len(names), np.nan) for way in ways}
+    tolerance, refused = np.full(len(names), np.nan), []
+    for i, name in enumerate(names):
+        scene = rebuild(params[name])
+        simulate = _simulation({body: inputs[f"{name}:bundle/{body}"] for body in scene.flexible()})
+        progress(i / len(names), f"timing {name}")
+        tolerance[i] = equal_tolerance(scene, simulate)
+        for way, edit in (("equal", {"solver.rtol": float(tolerance[i])}), ("step", {"solver": _paper_solver(scene)})):
+            try:
+                evaluations[way][i], seconds[way][i] = _timed(_edited(scene, edit), simulate)
+            except SolverError as error:
+                refused.append(f"{name}: {error}")
+    data: dict[str, Any] = {"equal_rtol": (("scene",), tolerance)}
+    for way in ways:
+        data[f"{way}_cpu_seconds"] = (("scene", "repeat"), seconds[way], {"units": "s"})
+        data[f"{way}_evaluations"] = (("scene",), evaluations[way], {"units": "1"})
+    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": SHARE, "step": STEP}
+    attributes["refused"] = "; ".join(refused)
+    return {"nc": xr.Dataset(data, coords={"scene": names}, attrs=attributes)}
+
+
+def equal_tolerance(scene: Scene, simulate: Callable[[Scene], xr.Dataset]) -> float:
+    """The tolerance at which a scene has the common error over the first share of its run."""
+    velocity = next(q.name for q in scene.wanted() if q.kind == "velocity")
+    end = scene.time.start + SHARE * (scene.time.end - scene.time.start)
+    probe = _edited(scene, {"time.end": end, "accuracy": {velocity: {"relative": EQUAL_ERROR}}})
+    return float(simulate(probe).attrs["accuracy_rtol"])
+
+
+def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:
+    from pipeline.core.scene.load import edited
+
+    return edited(scene, {"accuracy": None, "ensemble": None, **edit})
+
+
+def _paper_solver(scene: Scene) -> dict[str, Any]:
+    """The paper's method; contacts are noticed at the ends of steps."""
+    return {"integrator": METHOD, "step": STEP} | ({"events": "at step ends"} if scene.contacts() else {})
+
+
+def _simulation(bundles: Mapping[str, xr.Dataset]) -> Callable[[Scene], xr.Dataset]:
     from pipeline import dynamics
 
     def silent(fraction: float | None, text: str) -> None:
         """Reports would be part of what is measured."""
 
-    names = list(params)
-    seconds, evaluations = np.zeros((len(names), REPEATS)), np.zeros(len(names), dtype=np.int64)
-    for i, name in enumerate(names):
-        scene = rebuild(params[name])
-        bundles = {body: inputs[f"{name}:bundle/{body}"] for body in scene.flexible()}
-        evaluations[i] = dynamics.simulate(scene, bundles, silent).attrs["evaluations"]  # compiles, if need be
-        for repeat in range(REPEATS):
-            progress((i + repeat / REPEATS) / len(names), f"timing {name}")
-            begun = time.process_time()
-            dynamics.simulate(scene, bundles, silent)
-            seconds[i, repeat] = time.process_time() - begun
-    data = {
-        "cpu_seconds": (("scene", "repeat"), seconds, {"units": "s", "long_name": "processor time of a warm run"}),
-        "evaluations": (("scene",), evaluations, {"units": "1", "long_name": "right-hand sides evaluated"}),
-    }
-    return {"nc": xr.Dataset(data, coords={"scene": names}, attrs={"Conventions": "CF-1.11"})}
+    return lambda scene: dynamics.simulate(scene, bundles, silent)
+
+
+def _timed(scene: Scene, simulate: Callable[[Scene], xr.Dataset]) -> tuple[int, list[float]]:
+    """Evaluations of a run, and its processor times; a first run compiles, if need be."""
+    import time
+
+    evaluations, seconds = int(simulate(scene).attrs["evaluations"]), []
+    for _ in range(REPEATS):
+        begun = time.process_time()
+        simulate(scene)
+        seconds.append(time.process_time() - begun)
+    return evaluations, seconds

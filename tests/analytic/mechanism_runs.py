@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
-from pipeline.core.scene.load import load_scene, read_toml
-from pipeline.core.scene.parts import Modes
+from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
+from stages import s1_mesh, s2_modes, s3_bundle
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
@@ -27,16 +28,23 @@ def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
 
 def bundles(scene: Scene) -> dict[str, xr.Dataset]:
     """The reduced flexible bodies of a scene, through stages 1 to 3."""
-    return {name: _bundle(body.mesh, body.modes) for name, body in scene.flexible().items()}
+    return {name: _bundle(body.mesh, *_asked(scene, name)) for name, body in scene.flexible().items()}
+
+
+def _asked(scene: Scene, body: str) -> tuple[str, str]:
+    """What stages 2 and 3 are told of a body, as text that a cache can compare."""
+    return json.dumps(s2_modes.params(scene.flexible()[body])), json.dumps(s3_bundle.params(scene, body))
 
 
 @cache
-def _bundle(recipe: str, modes: Modes) -> xr.Dataset:
-    from pipeline.structure.fe import mesh
-    from pipeline.structure.modes import bundle, solve
+def _bundle(recipe: str, modes: str, bundle: str) -> xr.Dataset:
+    mesh = s1_mesh.run(s1_mesh.params(Path(recipe)), {}, _quiet)["nc"]
+    found = {"mesh": mesh, "modes": s2_modes.run(json.loads(modes), {"mesh": mesh}, _quiet)["nc"]}
+    return s3_bundle.run(json.loads(bundle), found, _quiet)["nc"]
 
-    grid = mesh.build(read_toml(Path(recipe)))
-    return bundle.build(grid, solve(grid, modes.reference, modes.count, interfaces=modes.interfaces))
+
+def _quiet(share: float | None, text: str) -> None:
+    """Nobody watches."""
 
 
 def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:

@@ -8,8 +8,8 @@ import xarray as xr
 
 from pipeline.structure.fe import mesh
 from pipeline.structure.modes import bundle, solve
+from tests.analytic.beam_models import RECIPE
 from tests.analytic.beam_solutions import PAPER_ROD, cantilever_compliance
-from tests.analytic.test_beam_frequencies import RECIPE
 
 
 def compliance(data: xr.Dataset, frame: str) -> np.ndarray:

@@ -4,25 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import scipy.linalg
-import xarray as xr
 
-from pipeline.structure.fe import beam, mesh
+from pipeline.structure.fe import beam
 from pipeline.structure.modes import closed_form, solve
+from tests.analytic.beam_models import BENDING, build, frequencies
 from tests.analytic.beam_solutions import PAPER_ROD, Rod, element_stiffness, rayleigh_frequencies
-
-RECIPE = {
-    "elements": 12,
-    "shape": {"type": "straight-beam", "length": PAPER_ROD.length},
-    "material": {
-        "density": PAPER_ROD.density,
-        "youngs_modulus": PAPER_ROD.youngs_modulus,
-        "poisson": PAPER_ROD.poisson,
-    },
-    "section": {"type": "circle", "radius": PAPER_ROD.radius},
-    "frames": {"bottom": {"x": 0.0}, "top": {"x": PAPER_ROD.length}},
-    "interfaces": ["bottom", "top"],
-}
 
 # Finite-element frequencies [Hz] of the paper's rod from a program of other authorship that shares no code with
 # this one: consistent Rayleigh mass, cubic deflections; keys are the ends (C clamped, F free, P pinned) and elements.
@@ -58,44 +44,24 @@ EXACT = {
 SOLVERS = 1e-9
 
 
-def build(elements: int) -> xr.Dataset:
-    return mesh.build(RECIPE | {"elements": elements})
-
-
-def without_rotary(rod: xr.Dataset) -> xr.Dataset:
-    """Euler-Bernoulli in bending; the polar moment stays, or torsion would have no mass."""
-    return rod.assign(inertia_moment=rod["inertia_moment"] * np.array([1.0, 0.0, 0.0]))
-
-
-def in_plane(rod: xr.Dataset, ends: str, count: int) -> np.ndarray:
-    """Frequencies [Hz] of the bending in y alone, with the ends held as the letters say."""
-    held = {"F": (), "P": (0,), "C": (0, 1)}
-    matrices = beam.assemble(rod)
-    nodes = rod.sizes["node"]
-    plane = np.stack([6 * np.arange(nodes) + 1, 6 * np.arange(nodes) + 5], axis=1)
-    fixed = [plane[node, k] for node, end in zip((0, -1), ends, strict=True) for k in held[end]]
-    free = np.setdiff1d(plane.ravel(), fixed)
-    K, M = (matrix.toarray()[np.ix_(free, free)] for matrix in (matrices.stiffness, matrices.mass))
-    values = scipy.linalg.eigvalsh(K, M)[2 if ends == "FF" else 0 :]
-    return np.sqrt(values[:count]) / (2.0 * np.pi)
-
-
 @pytest.mark.parametrize("ends, elements", RAYLEIGH_ELEMENTS)
 def test_rayleigh_elements_agree_with_an_independent_program(ends: str, elements: int) -> None:
     expected = RAYLEIGH_ELEMENTS[ends, elements]
-    np.testing.assert_allclose(in_plane(build(elements), ends, len(expected)), expected, rtol=SOLVERS)
+    np.testing.assert_allclose(
+        frequencies(build(elements=elements), BENDING, ends, len(expected)), expected, rtol=SOLVERS
+    )
 
 
 @pytest.mark.parametrize("ends, elements", EULER_ELEMENTS)
 def test_euler_elements_agree_with_an_independent_program(ends: str, elements: int) -> None:
     expected = EULER_ELEMENTS[ends, elements]
-    found = in_plane(without_rotary(build(elements)), ends, len(expected))
+    found = frequencies(build(elements=elements, theory="euler-bernoulli"), BENDING, ends, len(expected))
     np.testing.assert_allclose(found, expected, rtol=SOLVERS)
 
 
 @pytest.mark.parametrize("ends, theory", EXACT)
-def test_closed_forms_agree_with_an_independent_program(ends: closed_form.Ends, theory: str) -> None:
-    exact = solve(build(12), ends, 7)[f"exact_{theory.replace('-', '_')}"].values
+def test_closed_forms_agree_with_an_independent_program(ends: str, theory: str) -> None:
+    exact = solve(build(elements=12), ends, 7)[f"exact_{theory.replace('-', '_')}"].values
     # bending pairs, torsion after the second
     np.testing.assert_allclose(exact[[0, 2, 5]], EXACT[ends, theory], rtol=1e-11)
     np.testing.assert_array_equal(exact[[0, 2, 5]], exact[[1, 3, 6]])
@@ -103,7 +69,7 @@ def test_closed_forms_agree_with_an_independent_program(ends: closed_form.Ends, 
 
 @pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
 @pytest.mark.parametrize("radius", [0.003, 0.01, 0.03])
-def test_closed_form_equals_the_boundary_determinant(ends: closed_form.Ends, radius: float) -> None:
+def test_closed_form_equals_the_boundary_determinant(ends: str, radius: float) -> None:
     """Half-span equations against the plain 4x4 determinant of the whole span."""
     rod = Rod(length=0.24, radius=radius, youngs_modulus=7.17e10, density=2740.0, poisson=0.33)
     span = closed_form.Span(
@@ -118,7 +84,7 @@ def test_closed_form_equals_the_boundary_determinant(ends: closed_form.Ends, rad
 
 
 @pytest.mark.parametrize("ends", ["free-free", "fixed-fixed"])
-def test_a_shear_stiff_timoshenko_rod_is_a_rayleigh_rod(ends: closed_form.Ends) -> None:
+def test_a_shear_stiff_timoshenko_rod_is_a_rayleigh_rod(ends: str) -> None:
     """The difference is first order in 1/(kappa G A), so it falls a thousandfold with it."""
     rayleigh = closed_form.Span(0.24, 563.0, 0.86, rotary=2.1e-5)
     exact = closed_form.bending(rayleigh, ends, 6)
@@ -134,7 +100,7 @@ def test_a_shear_stiff_timoshenko_rod_is_a_rayleigh_rod(ends: closed_form.Ends) 
 def test_bending_converges_from_above_at_order_four(ends: str) -> None:
     exact = rayleigh_frequencies(PAPER_ROD, ends, 2)
     elements = np.array([8, 16, 32])
-    error = np.array([in_plane(build(n), ends, 2) / exact - 1.0 for n in elements])
+    error = np.array([frequencies(build(elements=n), BENDING, ends, 2) / exact - 1.0 for n in elements])
     assert error.min() > 0.0
     # 32 elements leave 3e-7 of the first mode, far above the determinant's own 1e-10
     for mode in range(2):
@@ -148,7 +114,7 @@ def test_torsion_and_extension_converge_from_above_at_order_two(ends: str, kind:
     elements = np.array([8, 16, 32])
     error = []
     for n in elements:
-        modes = solve(build(n), ends, 8)
+        modes = solve(build(elements=n), ends, 8)
         place = list(modes["kind"].values).index(kind)
         error.append(float(modes["frequency"][place] / modes["exact_rayleigh"][place]) - 1.0)
     assert min(error) > 0.0
@@ -156,7 +122,7 @@ def test_torsion_and_extension_converge_from_above_at_order_two(ends: str, kind:
 
 
 def test_exact_torsion_and_extension_are_the_waves_travel_time() -> None:
-    modes = solve(build(12), "free-free", 9)
+    modes = solve(build(elements=12), "free-free", 9)
     kinds = modes["kind"].values
     for theory in ("exact_euler_bernoulli", "exact_rayleigh", "exact_timoshenko"):
         exact = modes[theory].values
@@ -169,7 +135,7 @@ def test_exact_torsion_and_extension_are_the_waves_travel_time() -> None:
 @pytest.mark.parametrize("elements", [12, 256])
 def test_every_cell_has_the_textbook_stiffness(elements: int) -> None:
     """Also far from the origin, where elements built from global monomials lose six digits."""
-    stiffness = beam.assemble(build(elements)).stiffness.toarray()
+    stiffness = beam.assemble(build(elements=elements)).stiffness.toarray()
     h = PAPER_ROD.length / elements
     expected = element_stiffness(PAPER_ROD, h)
     scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
@@ -182,7 +148,7 @@ def test_every_cell_has_the_textbook_stiffness(elements: int) -> None:
 
 
 def test_no_rigid_motion_stores_energy() -> None:
-    matrices = beam.assemble(build(64))
+    matrices = beam.assemble(build(elements=64))
     rigid = beam.rigid_vectors(matrices)
     force = matrices.stiffness @ rigid
     # each row sums terms of the size of the row's largest entry

@@ -233,9 +233,14 @@ def modes(frequency: tuple[float, ...], kinds: tuple[str, ...]) -> xr.Dataset:
     """A made-up artifact of schema MODES with the given frequencies."""
     shape = np.zeros((13, 6, len(frequency)))
     shape[:, :3] = rod_shapes(len(frequency))
+    place = np.zeros((13, 3))
+    place[:, 0] = np.linspace(0.0, 0.24, 13)
     data = {
         "frequency": (("mode",), np.array(frequency)),
         "shape": (("node", "dof", "mode"), shape),
+        "node_position": (("node", "axis"), place),
+        "cell": (("cell", "corner"), np.stack([np.arange(12), np.arange(1, 13)], axis=1)),
+        "vector": (("unknown", "mode"), shape.reshape(-1, len(frequency))),
         "kind": (("mode",), np.array(kinds)),
     }
     return conform(xr.Dataset(data), MODES)
@@ -246,7 +251,11 @@ def timing() -> xr.Dataset:
     scenes = ["sps4/ideal", "sps4/far_free", "sps4/far_fixed", "sps4/csj", "sps4/far_csj_free", "sps4/far_csj_fixed"]
     seconds = np.outer([0.004, 0.02, 0.02, 0.04, 0.3, 0.4], [1.0, 1.1, 0.9])
     data = {
-        "cpu_seconds": (("scene", "repeat"), seconds),
-        "evaluations": (("scene",), np.array([1e3, 2e3, 2e3, 2e4, 5e4, 6e4])),
+        "equal_cpu_seconds": (("scene", "repeat"), seconds),
+        "equal_evaluations": (("scene",), np.array([1e3, 2e3, 2e3, 2e4, 5e4, 6e4])),
+        "equal_rtol": (("scene",), np.full(6, 1e-8)),
+        "step_cpu_seconds": (("scene", "repeat"), np.where(np.arange(6)[:, None] == 2, np.nan, 5.0 * seconds)),
+        "step_evaluations": (("scene",), np.full(6, 36e3)),
     }
-    return xr.Dataset(data, {"scene": scenes})
+    attributes = {"equal_error": 1e-6, "share": 0.05, "step": 1e-5, "refused": "sps4/far_fixed: unstable"}
+    return xr.Dataset(data, {"scene": scenes}, attributes)

@@ -18,7 +18,7 @@ from pipeline.post.plotting import shape_figure
 from tests.paper.material import everything
 
 TREE = Path(pipeline.__file__).parent.parent
-ARTIFACTS = {"run", "post", "ensemble", "modes", "bundle", "timing"}
+ARTIFACTS = {"run", "tight", "post", "ensemble", "modes", "fine-modes", "bundle", "timing"}
 #: their layout takes seconds, and the module that draws them is also tested through others
 SIMILAR = {"fig11": "fig12", "fig13": "fig12", "fig14": "fig16", "fig15": "fig16"}
 

@@ -4,18 +4,35 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 import xarray as xr
 
 from pipeline.core.errors import InputError, SolverError
 from pipeline.structure.fe import beam, mesh
-from pipeline.structure.modes import eigen, reference, select, solve
+from pipeline.structure.fe.model import Model
+from pipeline.structure.kinds.kind import of_mesh, silent
+from pipeline.structure.modes import eigen, normal, reference, select, solve
+from pipeline.structure.modes.statics import Flexibility, support
 
 ROOT = Path(__file__).parents[2]
-WHOLE = [("free-free", 7), ("free-free", 8), ("free-free", 13), ("fixed-fixed", 7), ("craig-bampton", 13)]
+WHOLE = [
+    ("free-free", 7),
+    ("free-free", 8),
+    ("free-free", 13),
+    ("fixed-fixed", 7),
+    ("cantilever", 8),
+    ("pinned-pinned", 8),
+    ("craig-bampton", 13),
+    ("craig-chang", 19),
+    ("residual-flexibility", 19),
+]
+#: conditions that take more than a count; tests/analytic/test_modes_conditions.py
+WITH_MORE = {"constrained", "mean-axis"}
 #: more elements than the dense limit allows, so that the sparse solver is at work; nodes at 60 mm and 120 mm
 MANY = 4 * (eigen.DENSE_LIMIT // (4 * beam.N_DOFS) + 1)
 
@@ -31,7 +48,7 @@ def paper_rod() -> xr.Dataset:
 
 def test_no_reference_condition_is_left_out() -> None:
     """A condition added to the family has to appear in these tests."""
-    assert {name for name, _ in WHOLE} == set(reference.NAMES)
+    assert {name for name, _ in WHOLE} | WITH_MORE == set(reference.NAMES)
 
 
 @pytest.mark.parametrize("condition, count", WHOLE)
@@ -155,15 +172,26 @@ def test_sparse_and_dense_solver_agree(monkeypatch: pytest.MonkeyPatch, conditio
     assert np.all(np.abs(sparse["shape"].values - dense["shape"].values).max(axis=(0, 1)) < 1e-6 * scale)
 
 
-def test_a_missed_mode_is_noticed() -> None:
-    """Sylvester's count sees a frequency that an eigensolver left out."""
-    matrices = beam.assemble(rod())
-    free = np.arange(6, matrices.size)
-    K, M = matrices.stiffness[free][:, free], matrices.mass[free][:, free]
-    values, _ = eigen.lowest(K, M, 8, shift=0.0)
-    eigen._nothing_missed(K, M, values)
+@pytest.mark.parametrize("held", [True, False])
+def test_a_missed_mode_is_noticed(held: bool) -> None:
+    """Sylvester's count sees a frequency that an eigensolver left out, of a held as of a free body."""
+    model = of_mesh(rod()).assemble(rod())
+    rows = model.interfaces[0].motion if held else sp.csr_array((0, model.size))
+    values = normal.lowest(model, rows, 8, support_of(model), silent).values
+    normal._nothing_missed(model, rows, values, *gap(values))
+    fewer = np.delete(values, 2)
     with pytest.raises(SolverError, match="the eigensolver found"):
-        eigen._nothing_missed(K, M, np.delete(values, 2))
+        normal._nothing_missed(model, rows, fewer, *gap(fewer))
+
+
+def support_of(model: Model) -> Callable[[], Flexibility]:
+    return lambda: support(model, lambda share: None)
+
+
+def gap(values: np.ndarray) -> tuple[int, float]:
+    found = eigen.gap(values)
+    assert found is not None
+    return found
 
 
 def test_rigid_modes_are_told_by_a_gap() -> None:

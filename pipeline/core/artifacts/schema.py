@@ -6,27 +6,32 @@ reads one may rely on this page.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import xarray as xr
+
+from pipeline.core.artifacts.body_schema import DEFICITS, MATRICES, SOLID, STRESS
+from pipeline.core.artifacts.variable import Schema, Variable
+
+__all__ = [
+    "BUNDLE",
+    "DEFICITS",
+    "ENSEMBLE",
+    "MATRICES",
+    "MESH",
+    "MODES",
+    "RUN",
+    "SOLID",
+    "STRESS",
+    "Schema",
+    "Variable",
+    "conform",
+]
 
 CONVENTIONS = "CF-1.11"
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """One variable of an artifact. `optional` ones are absent where the scene has no such part."""
-
-    dims: tuple[str, ...]
-    units: str
-    long_name: str
-    optional: bool = False
-
-
-Schema = dict[str, Variable]
 _V = Variable
 
 #: stage 1: nodes and two-node beam cells in the mesh frame
@@ -66,11 +71,14 @@ MESH: Schema = {
 }
 
 #: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
-MODES: Schema = {
+MODES: Schema = DEFICITS | {
     "frequency": _V(("mode",), "Hz", "natural frequency of the kept coordinate in the reduced basis"),
     "shape": _V(
         ("node", "dof", "mode"), "kg-0.5", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"
     ),
+    "node_position": _V(("node", "axis"), "m", "node position in the mesh frame"),
+    "cell": _V(("cell", "corner"), "1", "node indices of each drawn cell"),
+    "vector": _V(("unknown", "mode"), "kg-0.5", "mass-normalised shape, every unknown of the model"),
     "rigid_frequency": _V(("rigid_mode",), "Hz", "frequencies of the removed rigid-body modes", optional=True),
     "kind": _V(("mode",), "1", "bending, torsion or axial by share of kinetic energy"),
     "exact_euler_bernoulli": _V(
@@ -85,50 +93,56 @@ MODES: Schema = {
 }
 
 #: stage 3: all that the dynamics needs of a flexible body, in its body frame
-BUNDLE: Schema = {
-    "mass": _V((), "kg", "mass"),
-    "first_moment": _V(("axis",), "kg m", "integral of rho X"),
-    "second_moment": _V(("axis", "axis2"), "kg m2", "integral of rho X X^T"),
-    "modal_first_moment": _V(("axis", "mode"), "kg0.5", "integral of rho S"),
-    "position_mode_moment": _V(("axis", "axis2", "mode"), "kg0.5 m", "integral of rho X_k S_lj"),
-    "mode_mode_moment": _V(("axis", "axis2", "mode", "mode2"), "1", "integral of rho S_ki S_lj"),
-    "modal_mass": _V(("mode", "mode2"), "1", "modal mass matrix"),
-    "modal_stiffness": _V(("mode", "mode2"), "rad2 s-2", "modal stiffness matrix"),
-    "frequency": _V(("mode",), "Hz", "natural frequency of the coordinate"),
-    "frame_position": _V(("frame", "axis"), "m", "undeformed origin of the named frame in the body frame"),
-    "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, named frame to body frame, undeformed"),
-    "frame_translation_shape": _V(
-        ("frame", "axis", "mode"), "kg-0.5", "displacement of the frame per modal coordinate, body axes"
-    ),
-    "frame_rotation_shape": _V(
-        ("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"
-    ),
-    "shortening_first_moment": _V(
-        ("mode", "mode2"),
-        "m-1",
-        "integral of rho times the displacement along x that bending causes, second derivative",
-        optional=True,
-    ),
-    "shortening_second_moment": _V(
-        ("mode", "mode2"),
-        "1",
-        "integral of rho x times the displacement along x that bending causes, second derivative",
-        optional=True,
-    ),
-    "frame_shortening": _V(
-        ("frame", "mode", "mode2"),
-        "kg-1 m-1",
-        "displacement of the frame along x that bending causes, second derivative by modal coordinates",
-        optional=True,
-    ),
-    "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
-    "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
-    "shape_translation": _V(("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"),
-    "shape_rotation": _V(
-        ("node", "axis", "mode"), "kg-0.5 m-1", "node rotation vector per modal coordinate, body axes"
-    ),
-    "radius": _V(("cell",), "m", "radius of the drawn section"),
-}
+BUNDLE: Schema = (
+    DEFICITS
+    | STRESS
+    | {
+        "mass": _V((), "kg", "mass"),
+        "first_moment": _V(("axis",), "kg m", "integral of rho X"),
+        "second_moment": _V(("axis", "axis2"), "kg m2", "integral of rho X X^T"),
+        "modal_first_moment": _V(("axis", "mode"), "kg0.5", "integral of rho S"),
+        "position_mode_moment": _V(("axis", "axis2", "mode"), "kg0.5 m", "integral of rho X_k S_lj"),
+        "mode_mode_moment": _V(("axis", "axis2", "mode", "mode2"), "1", "integral of rho S_ki S_lj"),
+        "modal_mass": _V(("mode", "mode2"), "1", "modal mass matrix"),
+        "modal_stiffness": _V(("mode", "mode2"), "rad2 s-2", "modal stiffness matrix"),
+        "frequency": _V(("mode",), "Hz", "natural frequency of the coordinate"),
+        "frame_position": _V(("frame", "axis"), "m", "undeformed origin of the named frame in the body frame"),
+        "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, named frame to body frame, undeformed"),
+        "frame_translation_shape": _V(
+            ("frame", "axis", "mode"), "kg-0.5", "displacement of the frame per modal coordinate, body axes"
+        ),
+        "frame_rotation_shape": _V(
+            ("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"
+        ),
+        "shortening_first_moment": _V(
+            ("mode", "mode2"),
+            "m-1",
+            "integral of rho times the displacement along x that bending causes, second derivative",
+            optional=True,
+        ),
+        "shortening_second_moment": _V(
+            ("mode", "mode2"),
+            "1",
+            "integral of rho x times the displacement along x that bending causes, second derivative",
+            optional=True,
+        ),
+        "frame_shortening": _V(
+            ("frame", "mode", "mode2"),
+            "kg-1 m-1",
+            "displacement of the frame along x that bending causes, second derivative by modal coordinates",
+            optional=True,
+        ),
+        "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
+        "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
+        "shape_translation": _V(
+            ("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"
+        ),
+        "shape_rotation": _V(
+            ("node", "axis", "mode"), "kg-0.5 m-1", "node rotation vector per modal coordinate, body axes"
+        ),
+        "radius": _V(("cell",), "m", "radius of the drawn section"),
+    }
+)
 
 #: stage 4: one run
 RUN: Schema = {
@@ -171,6 +185,22 @@ RUN: Schema = {
     "load_power": _V(
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
     ),
+    "section_force": _V(
+        ("time", "section", "axis"),
+        "N",
+        "N, Qy, Qz: force of the far part of the rod on the near one, axes of the section (x along the rod)",
+        optional=True,
+    ),
+    "section_moment": _V(
+        ("time", "section", "axis"), "N m", "T, My, Mz: its moment about the section's centre, likewise", optional=True
+    ),
+    "peak_axial_stress": _V(
+        ("time", "section"),
+        "Pa",
+        "axial stress of the section that is largest in size, tension positive",
+        optional=True,
+    ),
+    "peak_von_mises_stress": _V(("time", "section"), "Pa", "largest von Mises stress of the section", optional=True),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
@@ -294,6 +324,8 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
             result = result.assign_coords({dim: list(AXES)})
     if "quat" in result.dims:
         result = result.assign_coords(quat=list(QUATERNION))
+    if "bound_frequency" in result.coords:
+        result["bound_frequency"].attrs = {"units": "Hz", "long_name": "frequency of the load"}
     if "time" in result.coords:
         result["time"].attrs = {"units": "s", "long_name": "time"}
     result.attrs = {"Conventions": CONVENTIONS, **attributes}

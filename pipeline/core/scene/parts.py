@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+import math
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.fields import (
@@ -19,6 +20,7 @@ from pipeline.core.scene.fields import (
     Time,
     Velocity,
 )
+from pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
 
@@ -45,16 +47,46 @@ class RigidBody(Part):
     frames: dict[str, Pose] = Field(default_factory=dict)
 
 
-class Modes(Part):
-    """Which elastic coordinates a flexible body keeps.
+def _hertz(value: Any) -> float:
+    """A frequency [Hz]: a bare number, or text with a unit."""
+    number = f"{value} Hz" if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+    return quantity(number, "angular velocity") / (2.0 * math.pi)
 
-    count: number of elastic coordinates, static (constraint) modes included.
-    interfaces: the recipe's frames that a Craig-Bampton basis keeps; default: the recipe's own list.
+
+Frequency = Annotated[
+    float, BeforeValidator(_hertz), WithJsonSchema({"type": ["number", "string"], "description": "frequency in Hz"})
+]
+
+
+class Modes(Part):
+    """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many.
+
+    count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis.
+    up_to: highest frequency of the normal modes that are kept, e.g. "5000 Hz".
+    compliance: least share of the static compliance between the interfaces, in each of the six directions.
+    mass: least share of the body's mass that moves with the basis, in each direction.
+    interfaces: the recipe's frames that a basis is built for; default: the recipe's own list.
+    held: motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes.
+    of: the reference whose shapes "mean-axis" is based on.
     """
 
     reference: str
-    count: Annotated[int, Field(ge=1)]
+    count: Annotated[int, Field(ge=1)] | Literal["all"] | None = None
+    up_to: Annotated[Frequency, Positive] | None = None
+    compliance: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    mass: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
     interfaces: tuple[str, ...] | None = None
+    held: tuple[FrameName, ...] = ()
+    of: str | None = None
+
+    @model_validator(mode="after")
+    def _one_choice(self) -> Modes:
+        ways = ("count", "up_to", "compliance", "mass")
+        given = [name for name in ways if getattr(self, name) is not None]
+        if len(given) != 1:
+            shown = "nothing does" if not given else f"{' and '.join(given)} do"
+            raise ValueError(f"one of {', '.join(ways)} says how many modes are kept; here {shown}")
+        return self
 
 
 class RatioPerMode(Part):

@@ -37,9 +37,13 @@ class TimeSpan(Part):
 
 
 class Output(Part):
-    """Regular output interval; drive breaks and events are always added."""
+    """Regular output interval; drive breaks and events are always added.
+
+    stress: flexible bodies whose section forces and peak stresses are recorded.
+    """
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4
+    stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
 
 
 class Ensemble(Part):
@@ -130,6 +134,14 @@ class Scene(Part):
                 quantities.parse(name, self.owners())
             except ValueError as error:
                 raise ValueError(f"accuracy.{name}: {error}") from None
+        return self
+
+    @model_validator(mode="after")
+    def _stressed_bodies_are_flexible(self) -> Scene:
+        for name in self.output.stress or ():
+            if name not in self.flexible():
+                known = ", ".join(self.flexible()) or "none"
+                raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
         return self
 
     def owners(self) -> dict[str, tuple[str, ...]]:

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.schema import RUN, conform
+from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import state
@@ -62,6 +63,9 @@ def dataset(run: Run) -> xr.Dataset:
         coordinates["twin_time"] = run.twin.time
         variables["twin_separation"] = (("twin_time",), run.twin.separation)
         variables["horizon"] = ((), np.array(run.twin.horizon))
+    if run.scene.output.stress is not None:
+        record = lookup("pipeline.dynamics.record", "stress", where="[output]")
+        record(built, seen, run.scene.output.stress, variables, coordinates)
     variables.update(ledger.series(built, seen))
     made = xr.Dataset(variables, coords=coordinates)
     result = conform(made, RUN, **attributes(run.scene), **_report(run), **_told(built, trajectory))

@@ -41,14 +41,22 @@ def load_series(built: Tables, seen: Seen) -> dict[str, tuple[tuple[str, ...], n
 
 def on_body(built: Tables, seen: Seen, body: str) -> tuple[np.ndarray, np.ndarray]:
     """Sum of the loads on a body: moment about the kernels' origin, force; (time, 3) each."""
-    scene, frames, table = built.system.scene, built.system.frames, _table(seen)
-    moment, force = np.zeros((len(table), 3)), np.zeros((len(table), 3))
-    for k, name in enumerate(order(scene)):
-        for frame, sign in _ends(scene, name):
-            if frames[frame].body == body:
-                moment = moment + sign * table[:, k, MOMENT : MOMENT + 3]
-                force = force + sign * table[:, k, FORCE : FORCE + 3]
+    rows = len(_table(seen))
+    moment, force = np.zeros((rows, 3)), np.zeros((rows, 3))
+    for _, n, f in on_frames(built, seen, body):
+        moment, force = moment + n, force + f
     return moment, force
+
+
+def on_frames(built: Tables, seen: Seen, body: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Each load on a body: its frame, moment about the kernels' origin, force; (time, 3) each."""
+    scene, frames, table = built.system.scene, built.system.frames, _table(seen)
+    return [
+        (frame, sign * table[:, k, MOMENT : MOMENT + 3], sign * table[:, k, FORCE : FORCE + 3])
+        for k, name in enumerate(order(scene))
+        for frame, sign in _ends(scene, name)
+        if frames[frame].body == body
+    ]
 
 
 def _ends(scene: Any, name: str) -> list[tuple[str, float]]:

@@ -34,6 +34,13 @@ def joint_wrenches(
     return result
 
 
+def path_wrenches(built: Tables, seen: dict[str, np.ndarray]) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """For every frame that a drive leads along a path: its name, moment about the kernels' origin, force."""
+    found, drives = _tree(built, seen), built.system.scene.drive
+    paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
+    return [(frame, *found[edge]) for edge, frame in paths.items() if edge in found]
+
+
 def _tree(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
     found = {}
     table = seen["link_wrench"].reshape(len(seen["link_wrench"]), -1, 6)

@@ -11,6 +11,8 @@ from pipeline.post.plotting.table import files
 NEEDS = (
     "sps4/frequencies/fixed_square:modes/rod",
     "sps4/frequencies/fixed_circle:modes/rod",
+    "sps4/frequencies/fixed_square:fine-modes/rod",
+    "sps4/frequencies/fixed_circle:fine-modes/rod",
 )
 
 

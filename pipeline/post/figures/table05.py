@@ -11,6 +11,8 @@ from pipeline.post.plotting.table import files
 NEEDS = (
     "sps4/frequencies/free_square:modes/rod",
     "sps4/frequencies/free_circle:modes/rod",
+    "sps4/frequencies/free_square:fine-modes/rod",
+    "sps4/frequencies/free_circle:fine-modes/rod",
 )
 
 

@@ -37,9 +37,13 @@ def paper(head: str, values: MaximumError) -> Column:
     return Column(head, tuple(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS))
 
 
-def single(head: str, deviation: Deviation) -> Column:
-    """The column of one run."""
-    return Column(head, tuple(number(factor * getattr(deviation, name)) for _, name, factor, _ in ROWS))
+def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
+    """The column of one run, +- what it changes when the run is made at a tighter tolerance."""
+    cells = []
+    for _, name, factor, _ in ROWS:
+        value, other = factor * getattr(deviation, name), factor * getattr(tighter, name)
+        cells.append(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}")
+    return Column(head, tuple(cells))
 
 
 def several(head: str, deviations: Sequence[Deviation]) -> Column:
@@ -68,6 +72,13 @@ def ratios(deviation: Deviation, printed: MaximumError) -> dict[str, float]:
         for _, ours, factor, name in ROWS
         if name is not None
     }
+
+
+#: what the +- of `single` means, for the notes of a table
+MEANING = (
+    "± of a single run: how much the value changes at a hundred times tighter tolerance, the error of its time "
+    "integration; the model's own errors (assumed geometry, mode set) are not in it."
+)
 
 
 def comparison(who: str, deviation: Deviation, printed: MaximumError) -> str:

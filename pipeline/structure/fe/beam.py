@@ -1,12 +1,17 @@
-r"""Spatial Euler-Bernoulli beams of two nodes and twelve degrees of freedom.
+r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in any theory and place.
 
-Axial and twist linear, deflections cubic; consistent mass with rotary inertia (Rayleigh):
+.. math:: 2U = \int EA\,u'^2 + GJ\,\varphi'^2 + E(I_z \psi_v'^2 + I_y \psi_w'^2 + 2I_{yz}\psi_v'\psi_w')
+               + \kappa_y GA\gamma_y^2 + \kappa_z GA\gamma_z^2 ,\qquad
+          2T = \int \rho A(\dot u^2+\dot v^2+\dot w^2) + \rho I_p\dot\varphi^2
+               + \rho (I_z \dot\psi_v^2 + I_y \dot\psi_w^2 + 2I_{yz}\dot\psi_v\dot\psi_w)
 
-.. math:: 2U = \int EA\,u'^2 + GJ\,\varphi'^2 + EI_z v''^2 + EI_y w''^2 ,\qquad
-          2T = \int \rho A(\dot u^2+\dot v^2+\dot w^2) + \rho I_p\dot\varphi^2 + \rho I_z \dot v'^2 + \rho I_y \dot w'^2
-
+Without shear deformation (Euler-Bernoulli, Rayleigh) the section's slope is that of the axis, :math:`\psi = v'`,
+and deflections are Hermite cubics; `kinematics` has the choices. Extension and twist are linear or quadratic in a
+cell. Sections that change along a cell are integrated at its Gauss points.
 Source: Wang & Wang (2019), sec. 3.2 (12-dof spatial beam elements); Przemieniecki (1968), ch. 5 and 11.
-Vectors are ordered node by node: ux uy uz rx ry rz, with rz = dv/dx and ry = -dw/dx.
+
+Vectors are ordered node by node, ux uy uz rx ry rz in axes of the mesh frame (for a rod along x: rz = dv/dx,
+ry = -dw/dx); the unknowns inside the cells come after all nodes and are zero in every rigid motion.
 """
 
 from __future__ import annotations
@@ -17,99 +22,78 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 import xarray as xr
-from skfem import Basis, BilinearForm, ElementComposite, ElementLineP1, MeshLine
+from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
-from pipeline.structure.fe.hermite import LocalHermite
+from pipeline.core.algebra import skew
+from pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
+from pipeline.structure.fe.quadrature import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
 DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")
 N_DOFS = len(DOFS)
-
-#: cubic times cubic, the highest product of the mass
-INTEGRATION_ORDER = 6
+#: degree of the extension and of the twist in a cell by the recipe's word
+DEGREE = {"linear": 1, "quadratic": 2}
 
 
 @dataclass(frozen=True)
 class Beam:
-    """Stiffness and mass of a free beam, shape (ndof, ndof), and what field evaluation needs.
-
-    `to_fields` maps a vector in node order to scikit-fem's order and slopes, shape (ndof, ndof).
-    """
+    """Stiffness and mass of a free beam, shape (ndof, ndof), and what field evaluation needs."""
 
     stiffness: sp.csr_array
     mass: sp.csr_array
+    kinematics: Kinematics
     basis: Basis
-    to_fields: sp.csr_array
-    node_position: np.ndarray  #: [m], shape (nodes, 3)
+    to_fields: sp.csr_array  #: vector to scikit-fem's order, rod axes and slopes, shape (ndof, ndof)
+    node_position: np.ndarray  #: [m], mesh frame, shape (nodes, 3)
+    axes: np.ndarray  #: R_MR, rod axes (x along the rod) to mesh frame, shape (3, 3)
+    component: np.ndarray  #: index in DOFS of each unknown, in rod axes, shape (ndof,)
+    along: np.ndarray  #: place of each unknown along the rod [m], shape (ndof,)
 
     @property
     def size(self) -> int:
         """Number of degrees of freedom."""
         return self.mass.shape[0]
 
-
-@dataclass(frozen=True)
-class Motion:
-    """Motion of the sections at the quadrature points per unit of each vector.
-
-    weight: ds [m], shape (cells, points).  x: place [m], likewise.
-    translation: of the axis [1], rotation: of the section [rad/m], shape (3, cells, points, vectors).
-    """
-
-    weight: np.ndarray
-    x: np.ndarray
-    translation: np.ndarray
-    rotation: np.ndarray
+    @property
+    def nodal_size(self) -> int:
+        """Number of degrees of freedom of the nodes, which open every vector."""
+        return N_DOFS * len(self.node_position)
 
 
 def assemble(mesh: xr.Dataset) -> Beam:
-    """Matrices of a mesh (schema MESH) whose cells lie along x."""
-    basis = _basis(mesh)
-    to_fields = _node_order(basis)
-    points = basis.dx.shape
-    second, rotary = mesh["second_moment"].values, mesh["inertia_moment"].values
-    E, G, rho, A = (mesh[name].values for name in ("youngs_modulus", "shear_modulus", "density", "area"))
-    stiffness = {"axial": E * A, "twist": G * second[:, 0], "about_y": E * second[:, 1], "about_z": E * second[:, 2]}
-    twist, about_y, about_z = rho * rotary.T
-    mass = {"line": rho * A, "twist": twist, "about_y": about_y, "about_z": about_z}
-    K = _stiffness.assemble(basis, **_at_points(stiffness, points))
-    M = _mass.assemble(basis, **_at_points(mass, points))
-    return Beam(
-        _in_node_order(K, to_fields), _in_node_order(M, to_fields), basis, to_fields, mesh["node_position"].values
-    )
+    """Matrices of a beam mesh (schema MESH)."""
+    kinematics = THEORIES[mesh.attrs["theory"]]
+    basis = _basis(mesh, kinematics)
+    axes = mesh["rod_rotation"].values
+    component, along, order = _unknowns(mesh, basis, kinematics)
+    to_fields = order @ _to_rod_axes(axes, mesh.sizes["node"], len(component))
+    K = _in_vector_order(_form(kinematics, _strain_energy).assemble(basis, **_stiffness(mesh)), to_fields)
+    M = _in_vector_order(_form(kinematics, _kinetic_energy).assemble(basis, **_inertia(mesh)), to_fields)
+    mass = sp.csr_array(M + _lumped(mesh, len(component)))
+    return Beam(K, mass, kinematics, basis, to_fields, mesh["node_position"].values, axes, component, along)
 
 
-@BilinearForm
-def _stiffness(u: Any, t: Any, v: Any, w: Any, du: Any, dt: Any, dv: Any, dw: Any, p: Any) -> Any:
-    stretch = p["axial"] * u.grad[0] * du.grad[0] + p["twist"] * t.grad[0] * dt.grad[0]
-    return stretch + p["about_z"] * v.hess[0][0] * dv.hess[0][0] + p["about_y"] * w.hess[0][0] * dw.hess[0][0]
+def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_array:
+    r"""Stiffness that a tension N gives to the deflections, :math:`\int N (v'^2 + w'^2)\,dx`, shape (ndof, ndof).
 
-
-@BilinearForm
-def _mass(u: Any, t: Any, v: Any, w: Any, du: Any, dt: Any, dv: Any, dw: Any, p: Any) -> Any:
-    translation = p["line"] * (u * du + v * dv + w * dw)
-    slopes = p["about_z"] * v.grad[0] * dv.grad[0] + p["about_y"] * w.grad[0] * dw.grad[0]
-    return translation + p["twist"] * t * dt + slopes
-
-
-def section_motion(beam: Beam, vectors: np.ndarray) -> Motion:
-    """Section motion for vectors in node order, shape (ndof, n), at points that integrate products exactly."""
-    fields = [beam.basis.interpolate(column) for column in (beam.to_fields @ vectors).T]
-    translation = [(u, v, w) for u, _, v, w in fields]
-    rotation = [(t, -w.grad[0], v.grad[0]) for _, t, v, w in fields]
-    x = np.asarray(beam.basis.global_coordinates())[0]
-    axes = (1, 2, 3, 0)
-    return Motion(beam.basis.dx, x, np.array(translation).transpose(axes), np.array(rotation).transpose(axes))
+    axial_force: N [N], tension positive, of each cell, shape (cells,), or at its Gauss points, shape (cells, points).
+    The axis alone is counted: no term of the twist (Wagner) and none of masses beside the axis.
+    Source: Przemieniecki (1968), ch. 15.
+    """
+    beam = assemble(mesh)
+    force = np.asarray(axial_force, dtype=float)
+    force = np.broadcast_to(force.reshape(len(force), -1), beam.basis.dx.shape)
+    form = _form(beam.kinematics, _work_of_tension)
+    return _in_vector_order(form.assemble(beam.basis, force=force), beam.to_fields)
 
 
 def rigid_vectors(beam: Beam) -> np.ndarray:
     """Three translations and three rotations about the mesh origin, shape (ndof, 6)."""
-    x = beam.node_position[:, 0]
-    vectors = np.zeros((len(x), N_DOFS, 6))
+    nodes = len(beam.node_position)
+    vectors = np.zeros((nodes, N_DOFS, 6))
     vectors[:, range(6), range(6)] = 1.0
-    vectors[:, 2, 4] = -x  # about y: w falls along x
-    vectors[:, 1, 5] = x
-    return vectors.reshape(-1, 6)
+    vectors[:, :3, 3:] = -skew(beam.node_position)  # e x X = -X x e
+    return np.concatenate([vectors.reshape(-1, 6), np.zeros((beam.size - nodes * N_DOFS, 6))])
 
 
 def node_dofs(nodes: np.ndarray) -> np.ndarray:
@@ -117,27 +101,121 @@ def node_dofs(nodes: np.ndarray) -> np.ndarray:
     return (N_DOFS * np.asarray(nodes)[:, None] + np.arange(N_DOFS)).ravel()
 
 
-def _basis(mesh: xr.Dataset) -> Basis:
-    x = np.ascontiguousarray(mesh["node_position"].values[:, 0])
-    line = MeshLine(x[None, :], mesh["cell"].values.T.copy())
-    element = ElementComposite(ElementLineP1(), ElementLineP1(), LocalHermite(), LocalHermite())
-    # the composite's own degree would be the sum of its parts
-    return Basis(line, element, intorder=INTEGRATION_ORDER)
+def in_rod_axes(beam: Beam, vectors: Any) -> Any:
+    """Vectors, dense or sparse of shape (ndof, n), with the nodes' components turned to rod axes."""
+    return _to_rod_axes(beam.axes, len(beam.node_position), beam.size) @ vectors
 
 
-def _node_order(basis: Basis) -> sp.csr_array:
-    """Signed permutation from node order to scikit-fem's: rows are u, twist, v, dv/dx, w, dw/dx of each node."""
-    u, twist, v, v_x, w, w_x = basis.nodal_dofs
-    rows = np.stack([u, v, w, twist, w_x, v_x], axis=1).ravel()
-    signs = np.tile([1.0, 1.0, 1.0, 1.0, -1.0, 1.0], basis.nodal_dofs.shape[1])
-    return sp.csr_array((signs, (rows, np.arange(rows.size))), shape=(rows.size, rows.size))
+def at_points(mesh: xr.Dataset, name: str) -> np.ndarray:
+    """A section constant at the Gauss points, shape (cells, points) or (cells, points, 3)."""
+    values = mesh[name].values[:, None]
+    profile = f"{name}_profile"
+    if profile in mesh:
+        return values * mesh[profile].values
+    return np.broadcast_to(values, (values.shape[0], len(POINTS), *values.shape[2:]))
 
 
-def _in_node_order(matrix: Any, to_fields: sp.csr_array) -> sp.csr_array:
+def per_point(mesh: xr.Dataset, name: str) -> np.ndarray:
+    """A constant of the cells (zero where the mesh has none), shape (cells, points)."""
+    if name not in mesh:
+        return np.zeros((mesh.sizes["cell"], len(POINTS)))
+    return np.repeat(mesh[name].values[:, None], len(POINTS), axis=1)
+
+
+def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
+    E, G = per_point(mesh, "youngs_modulus"), per_point(mesh, "shear_modulus")
+    area, second = at_points(mesh, "area"), at_points(mesh, "second_moment")
+    found = {
+        "stretch": E * area,
+        "twist": G * second[..., 0],
+        "bend_w": E * second[..., 1],
+        "bend_v": E * second[..., 2],
+        "bend_both": E * per_point(mesh, "product_moment"),
+    }
+    if mesh.attrs["theory"] == "timoshenko":
+        share = at_points(mesh, "shear_coefficient")
+        found |= {"shear_v": G * area * share[..., 1], "shear_w": G * area * share[..., 2]}
+    return found
+
+
+def _inertia(mesh: xr.Dataset) -> dict[str, np.ndarray]:
+    rho, rotary = per_point(mesh, "density"), at_points(mesh, "inertia_moment")
+    return {
+        "line": rho * at_points(mesh, "area"),
+        "twist": rho * rotary[..., 0],
+        "slope_w": rho * rotary[..., 1],
+        "slope_v": rho * rotary[..., 2],
+        "slope_both": rho * per_point(mesh, "inertia_product"),
+    }
+
+
+def _form(kinematics: Kinematics, density: Any) -> BilinearForm:
+    """The form of an energy density of trial and test fields."""
+    n = len(kinematics.component)
+    return BilinearForm(lambda *a: density(kinematics, a[:n], a[n : 2 * n], a[2 * n]))
+
+
+def _strain_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
+    a, b = kinematics.strains(trial), kinematics.strains(test)
+    coupled = a["bend_v"] * b["bend_w"] + a["bend_w"] * b["bend_v"]
+    return sum(p[name] * a[name] * b[name] for name in a) + p["bend_both"] * coupled
+
+
+def _kinetic_energy(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
+    (s, (t, v, w)), (ds, (dt, dv, dw)) = kinematics.section(trial), kinematics.section(test)
+    translation = p["line"] * sum(x * dx for x, dx in zip(s, ds, strict=True))
+    slopes = p["slope_v"] * v * dv + p["slope_w"] * w * dw + p["slope_both"] * (v * dw + w * dv)
+    return translation + p["twist"] * t * dt + slopes
+
+
+def _work_of_tension(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> Any:
+    (_, v, w), (_, dv, dw) = kinematics.section(trial)[0], kinematics.section(test)[0]
+    return p["force"] * (v.grad[0] * dv.grad[0] + w.grad[0] * dw.grad[0])
+
+
+def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
+    # along the rod from its own start: far from the mesh origin lengths of cells would lose digits
+    line = MeshLine(mesh["abscissa"].values[None, :].copy(), mesh["cell"].values.T.copy())
+    extension, twist = (DEGREE[mesh.attrs[name]] for name in ("extension", "torsion"))
+    element = ElementComposite(*kinematics.elements(extension, twist))
+    return Basis(line, element, quadrature=(POINTS[None, :], WEIGHTS))
+
+
+def _unknowns(mesh: xr.Dataset, basis: Basis, kinematics: Kinematics) -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
+    """Component and place of each unknown, and the signed permutation from vectors to scikit-fem's order."""
+    x, cells = mesh["abscissa"].values, mesh["cell"].values
+    place = np.argsort(NODE_COMPONENT)
+    nodal = basis.nodal_dofs[place].T.ravel()
+    inside = [c for e, c in zip(basis.elem.elems, kinematics.component, strict=True) for _ in range(e.interior_dofs)]
+    interior = basis.interior_dofs.T.ravel() if inside else np.empty(0, dtype=int)
+    rows = np.concatenate([nodal, interior])
+    component = np.concatenate([np.tile(np.arange(N_DOFS), len(x)), np.tile(np.array(inside, dtype=int), len(cells))])
+    along = np.concatenate([np.repeat(x, N_DOFS), np.repeat(x[cells].mean(axis=1), len(inside))])
+    signs = np.where(component == 4, NODE_SIGN[-1], 1.0)
+    order = sp.csr_array((signs, (rows, np.arange(rows.size))), shape=(rows.size, rows.size))
+    return component, along, order
+
+
+def _to_rod_axes(axes: np.ndarray, nodes: int, size: int) -> sp.csr_array:
+    turn = sp.kron(sp.eye_array(2 * nodes), axes.T)
+    return sp.csr_array(sp.block_diag([turn, sp.eye_array(size - N_DOFS * nodes)]))
+
+
+def _lumped(mesh: xr.Dataset, size: int) -> sp.csr_array:
+    """Masses tied rigidly to nodes: with the offset r of the centre of mass, v = u + theta x r."""
+    entries: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = [(np.empty(0), np.empty(0, int), np.empty(0, int))]
+    for k in range(mesh.sizes.get("lump", 0)):
+        m, J, r = (mesh[f"lump_{name}"].values[k] for name in ("mass", "inertia", "offset"))
+        motion = np.hstack([np.eye(3), -skew(r)])
+        block = m * motion.T @ motion
+        block[3:, 3:] += J
+        dofs = node_dofs(mesh["lump_node"].values[[k]])
+        entries.append((block.ravel(), np.repeat(dofs, N_DOFS), np.tile(dofs, N_DOFS)))
+    values, rows, columns = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return sp.csr_array((values, (rows, columns)), shape=(size, size))
+
+
+def _in_vector_order(matrix: Any, to_fields: sp.csr_array) -> sp.csr_array:
     result = to_fields.T @ sp.csr_array(matrix) @ to_fields
     # quadrature sums in another order above and below the diagonal; exact symmetry is what eigensolvers expect
     return sp.csr_array(0.5 * (result + result.T))
-
-
-def _at_points(per_cell: dict[str, np.ndarray], shape: tuple[int, ...]) -> dict[str, np.ndarray]:
-    return {name: np.broadcast_to(value[:, None], shape) for name, value in per_cell.items()}

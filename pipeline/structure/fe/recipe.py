@@ -2,83 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import ValidationError
 
 from pipeline.core.errors import InputError, InputErrors
 from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import Density, Length, Number, Part, Pressure, Source
+from pipeline.core.scene.fields import Part, Source
 from pipeline.core.scene.load import read_toml
+from pipeline.structure.fe import section_recipe
+from pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
+from pipeline.structure.fe.exchange.recipe import MatricesRecipe
+from pipeline.structure.fe.solid.recipe import SolidRecipe
 
-Positive = Field(gt=0.0)
-
-
-class StraightBeam(Part):
-    """A beam along x of the mesh frame, from x = 0 to `length`, cut into equal elements."""
-
-    type: Literal["straight-beam"]
-    length: Annotated[Length, Positive]
-
-
-class Isotropic(Part):
-    """A linear elastic, isotropic material."""
-
-    density: Annotated[Density, Positive]
-    youngs_modulus: Annotated[Pressure, Positive]
-    poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)]
-
-    @property
-    def shear_modulus(self) -> float:
-        """E / (2 (1 + nu)) [Pa]."""
-        return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
-
-
-class CircleSection(Part):
-    """Full circle."""
-
-    type: Literal["circle"]
-    radius: Annotated[Length, Positive]
-
-
-class EqualAreaSquare(Part):
-    """The square with the area of the stiffness section; lends its second moments to the mass only."""
-
-    type: Literal["equal-area-square"]
-
-
-class NodeFrame(Part):
-    """A named frame at a node: z along the beam (x of the mesh frame), x = mesh y, y = mesh z."""
-
-    x: Length
-
-
-class Recipe(Part):
-    """A beam to be meshed.
-
-    section: gives area and stiffness.  inertia_section: gives the second moments of the mass; default: `section`.
-    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
-    """
-
-    title: str = ""
-    elements: Annotated[int, Field(ge=1, le=100_000)]
-    shape: StraightBeam
-    material: Isotropic
-    section: CircleSection
-    inertia_section: Annotated[CircleSection | EqualAreaSquare, Field(discriminator="type")] | None = None
-    frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _interfaces_are_frames(self) -> Recipe:
-        for name in self.interfaces:
-            if name not in self.frames:
-                raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, self.frames)}")
-        if len(set(self.interfaces)) < len(self.interfaces):
-            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
-        return self
+#: every kind of recipe; `Recipe` is any of them
+Recipe = StraightBeamRecipe | SegmentedBeamRecipe | SolidRecipe | MatricesRecipe
+#: recipe model by `shape.type`
+MODELS: dict[str, type[Recipe]] = {
+    "straight-beam": StraightBeamRecipe,
+    "segmented-beam": SegmentedBeamRecipe,
+    "cylinder": SolidRecipe,
+    "block": SolidRecipe,
+    "mesh-file": SolidRecipe,
+    "matrices": MatricesRecipe,
+}
+#: parts whose sources are told first; the others follow in the order of the model
+FIRST = ("shape", "material", "section", "end_section", "inertia_section")
 
 
 def read_recipe(path: str | Path) -> dict[str, Any]:
@@ -89,14 +40,24 @@ def read_recipe(path: str | Path) -> dict[str, Any]:
 def parse(table: Mapping[str, Any], place: str) -> Recipe:
     """The recipe that a table holds; `place` opens every message of an InputError."""
     try:
-        return Recipe.model_validate(dict(table))
+        return _model(table, place).model_validate(dict(table))
     except ValidationError as error:
         raise InputErrors([_input_error(place, e) for e in error.errors()]) from None
 
 
+def _model(table: Mapping[str, Any], place: str) -> type[Recipe]:
+    shape = table.get("shape")
+    name = shape.get("type") if isinstance(shape, Mapping) else None
+    if name is None:
+        raise InputError(f"{place} [shape.type]", "is missing", "known: " + ", ".join(MODELS))
+    if not isinstance(name, str) or name not in MODELS:
+        raise InputError(f"{place} [shape.type]", f"no shape is called {name!r}", suggestion(str(name), MODELS))
+    return MODELS[name]
+
+
 def _input_error(place: str, error: Any) -> InputError:
     # pydantic names the chosen member of a union in the path; the file does not
-    key = ".".join(str(k) for k in error["loc"] if k not in ("circle", "equal-area-square"))
+    key = ".".join(str(k) for k in error["loc"] if k not in section_recipe.TYPES and k not in MODELS)
     known = {"extra_forbidden": "unknown key", "missing": "is missing"}
     message = known.get(error["type"], error["msg"].removeprefix("Value error, "))
     value = error.get("input")
@@ -104,16 +65,26 @@ def _input_error(place: str, error: Any) -> InputError:
     return InputError(f"{place} [{key}]" if key else place, message + shown)
 
 
-def sources(recipe: Recipe) -> str:
+def sources(recipe: Part) -> str:
     """All `source` entries on one line, ``part: text; part.key: text``."""
-    found = dict(_flat("recipe", recipe.source))
-    parts: dict[str, Part | None] = {"shape": recipe.shape, "material": recipe.material, "section": recipe.section}
-    parts["inertia_section"] = recipe.inertia_section
-    parts |= {f"frames.{name}": frame for name, frame in recipe.frames.items()}
-    for name, part in parts.items():
-        if part is not None:
-            found |= _flat(name, part.source)
+    found = _flat("recipe", recipe.source)
+    names = [name for name in type(recipe).model_fields if name != "source"]
+    for name in sorted(names, key=lambda name: FIRST.index(name) if name in FIRST else len(FIRST)):
+        for place, part in _parts(name, getattr(recipe, name)):
+            found |= _flat(place, part.source)
     return "; ".join(f"{name}: {text}" for name, text in found.items())
+
+
+def _parts(place: str, value: object) -> Iterator[tuple[str, Part]]:
+    """Every part at and below a place."""
+    if isinstance(value, Part):
+        yield place, value
+        value = {name: getattr(value, name) for name in type(value).model_fields}
+    elif isinstance(value, tuple):
+        value = dict(enumerate(value))
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _parts(f"{place}.{name}", inner)
 
 
 def _flat(name: str, source: Source | None) -> dict[str, str]:

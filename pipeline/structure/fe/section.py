@@ -1,44 +1,105 @@
-"""Cross sections: the numbers that a beam element needs of them."""
+"""Cross sections: the numbers that a beam element needs of them.
+
+Every function takes floats, or arrays of one shape for a section that changes along the rod.
+"""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from scipy.special import zeta
+
+Value = float | np.ndarray
+
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Section constants about the centroid, in principal axes y and z of the mesh frame.
+    """Section constants about the centroid, axes y and z of the rod.
 
-    `torsion` is St. Venant's constant, not the polar moment; the two agree for a circle only.
+    `torsion` is St. Venant's constant, not the polar moment; the two agree for circles and tubes only.
     """
 
-    area: float  #: A [m^2]
-    torsion: float  #: J [m^4]
-    second_y: float  #: int z^2 dA [m^4]
-    second_z: float  #: int y^2 dA [m^4]
+    area: Value  #: A [m^2]
+    torsion: Value  #: J [m^4]
+    second_y: Value  #: int z^2 dA [m^4]
+    second_z: Value  #: int y^2 dA [m^4]
+    product: Value = 0.0  #: int y z dA [m^4]
 
     @property
-    def polar(self) -> float:
+    def polar(self) -> Value:
         """Polar moment, int (y^2 + z^2) dA [m^4]."""
         return self.second_y + self.second_z
 
 
-def circle(radius: float) -> Section:
+def circle(radius: Value) -> Section:
     """Full circle; radius [m]."""
     area, second = math.pi * radius**2, math.pi * radius**4 / 4.0
     return Section(area, 2.0 * second, second, second)
 
 
-def square(side: float) -> Section:
-    """Full square; side [m].  St. Venant constant: Timoshenko & Goodier, *Theory of Elasticity*, sec. 109."""
-    # J/side^4 = 1/3 - (64/pi^5) sum tanh(k pi/2)/k^5 over odd k; terms fall as k^-5, 60 of them reach 1e-11
-    series = math.fsum(math.tanh(k * math.pi / 2.0) / k**5 for k in range(1, 121, 2))
-    torsion = (1.0 / 3.0 - 64.0 / math.pi**5 * series) * side**4
-    second = side**4 / 12.0
-    return Section(side**2, torsion, second, second)
+def tube(radius: Value, inner_radius: Value) -> Section:
+    """Circular tube; outer and inner radius [m]."""
+    area = math.pi * (radius**2 - inner_radius**2)
+    second = math.pi * (radius**4 - inner_radius**4) / 4.0
+    return Section(area, 2.0 * second, second, second)
+
+
+def rectangle(width: Value, height: Value) -> Section:
+    """Full rectangle; width along y, height along z [m]."""
+    area = width * height
+    return Section(area, rectangle_torsion(width, height), area * height**2 / 12.0, area * width**2 / 12.0)
+
+
+def square(side: Value) -> Section:
+    """Full square; side [m]."""
+    return rectangle(side, side)
+
+
+def rectangle_torsion(width: Value, height: Value) -> Value:
+    """St. Venant's constant J [m^4] of a rectangle.
+
+    With b the longer side and a the shorter one,
+    ``J = b a^3 [1/3 - 64 a/(pi^5 b) sum tanh(k pi b / 2a) / k^5]`` over odd k.
+    Source: Timoshenko & Goodier, *Theory of Elasticity*, sec. 109.
+    """
+    long, short = np.maximum(width, height), np.minimum(width, height)
+    slope = math.pi * long / (2.0 * short)
+    # sum of 1/k^5 over odd k, less what tanh falls short of one; 1 - tanh x = 2 / (exp(2x) + 1) dies out at once:
+    # 2 exp(-k pi) is below rounding from k = 13 on, even for the square
+    short_of_one = sum(2.0 / (np.exp(np.minimum(2.0 * k * slope, 700.0)) + 1.0) / k**5 for k in range(1, 15, 2))
+    series = 31.0 / 32.0 * zeta(5) - short_of_one
+    torsion = long * short**3 * (1.0 / 3.0 - 64.0 / math.pi**5 * short / long * series)
+    return torsion if np.ndim(torsion) else float(torsion)
 
 
 def circle_shear_coefficient(poisson: float) -> float:
-    """Cowper's kappa of a full circle, ``6 (1 + nu) / (7 + 6 nu)``; Cowper (1966), J. Appl. Mech. 33."""
+    """Shear coefficient of a full circle, ``6 (1 + nu) / (7 + 6 nu)``.
+
+    Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
+    """
     return 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson)
+
+
+def tube_shear_coefficient(poisson: float, ratio: Value) -> Value:
+    """Shear coefficient of a tube with the inner over the outer radius m = `ratio`.
+
+    ``6 (1 + nu) (1 + m^2)^2 / [(7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2]``.
+    Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
+    """
+    square_of_sum = (1.0 + ratio**2) ** 2
+    return (
+        6.0
+        * (1.0 + poisson)
+        * square_of_sum
+        / ((7.0 + 6.0 * poisson) * square_of_sum + (20.0 + 12.0 * poisson) * ratio**2)
+    )
+
+
+def rectangle_shear_coefficient(poisson: float) -> float:
+    """Shear coefficient of a rectangle, the same along both sides, ``10 (1 + nu) / (12 + 11 nu)``.
+
+    Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
+    """
+    return 10.0 * (1.0 + poisson) / (12.0 + 11.0 * poisson)

@@ -2,34 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import BUNDLE, conform
-from pipeline.structure.fe import beam as beams
-from pipeline.structure.modes import geometric_stiffness
-from pipeline.structure.modes.inertia_integrals import integrate
-
-ATTRIBUTES = ("title", "reference", "count", "interfaces", "section", "inertia_section", "source")
+from pipeline.core.artifacts.schema import BUNDLE, DEFICITS, conform
+from pipeline.structure.fe.model import Integrals, Model
+from pipeline.structure.kinds.kind import of_mesh
 
 
-def build(mesh: xr.Dataset, modes: xr.Dataset) -> xr.Dataset:
+def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None = None) -> xr.Dataset:
     """The reduced bundle (schema BUNDLE) of a mesh and its modes.
+
+    extra: further variables, as those of stress recovery.
 
     The body frame is the mesh frame when nothing deforms; how it follows the deformation is what the
     reference condition of the modes says.  Units per modal coordinate: q in sqrt(kg) m.
     """
-    beam = beams.assemble(mesh)
-    shape = modes["shape"].values
-    n = shape.shape[-1]
-    integrals = integrate(mesh, beam, shape.reshape(-1, n))
-    square = ("mode", "mode2")
-    nodes = mesh["frame_node"].values
-    translation, rotation = shape[:, :3], shape[:, 3:]
+    model = of_mesh(mesh).assemble(mesh)
+    vectors = modes["vector"].values
+    data = _integrals(model.integrate(vectors)) | _frames(model, vectors) | _drawn(model, vectors)
     omega = 2.0 * np.pi * modes["frequency"].values
-    data: dict[str, Any] = {
+    data["modal_stiffness"] = (("mode", "mode2"), np.diag(omega**2))
+    data["frequency"] = (("mode",), modes["frequency"].values)
+    lacks = {name: modes[name] for name in DEFICITS}
+    return conform(
+        xr.Dataset(data | lacks | dict(extra or {}), coords={"frame": modes["frame"].values}), BUNDLE, **modes.attrs
+    )
+
+
+def _integrals(integrals: Integrals) -> dict[str, Any]:
+    square = ("mode", "mode2")
+    return {
         "mass": ((), integrals.mass),
         "first_moment": (("axis",), integrals.first_moment),
         "second_moment": (("axis", "axis2"), integrals.second_moment),
@@ -37,19 +43,25 @@ def build(mesh: xr.Dataset, modes: xr.Dataset) -> xr.Dataset:
         "position_mode_moment": (("axis", "axis2", "mode"), integrals.position_mode_moment),
         "mode_mode_moment": (("axis", "axis2", *square), integrals.mode_mode_moment),
         "modal_mass": (square, np.einsum("kkij->ij", integrals.mode_mode_moment)),
-        "modal_stiffness": (square, np.diag(omega**2)),
-        "frequency": (("mode",), modes["frequency"].values),
-        "frame_position": (("frame", "axis"), mesh["frame_position"].values),
-        "frame_rotation": (("frame", "axis", "axis2"), mesh["frame_rotation"].values),
-        "frame_translation_shape": (("frame", "axis", "mode"), translation[nodes]),
-        "frame_rotation_shape": (("frame", "axis", "mode"), rotation[nodes]),
-        "node_position": (("node", "axis"), mesh["node_position"].values),
-        "cell": (("cell", "corner"), mesh["cell"].values),
-        "shape_translation": (("node", "axis", "mode"), translation),
-        "shape_rotation": (("node", "axis", "mode"), rotation),
-        # drawn as a round rod of the true area, whatever the section
-        "radius": (("cell",), np.sqrt(mesh["area"].values / np.pi)),
     }
-    data |= geometric_stiffness.variables(mesh, beam, shape.reshape(-1, n), tuple(modes.attrs["interfaces"].split()))
-    attributes = {name: modes.attrs[name] for name in ATTRIBUTES}
-    return conform(xr.Dataset(data, coords={"frame": mesh["frame"].values}), BUNDLE, **attributes)
+
+
+def _frames(model: Model, vectors: np.ndarray) -> dict[str, Any]:
+    moved = np.stack([frame.motion @ vectors for frame in model.interfaces])
+    return {
+        "frame_position": (("frame", "axis"), np.stack([frame.position for frame in model.interfaces])),
+        "frame_rotation": (("frame", "axis", "axis2"), np.stack([frame.rotation for frame in model.interfaces])),
+        "frame_translation_shape": (("frame", "axis", "mode"), moved[:, :3]),
+        "frame_rotation_shape": (("frame", "axis", "mode"), moved[:, 3:]),
+    }
+
+
+def _drawn(model: Model, vectors: np.ndarray) -> dict[str, Any]:
+    drawn, n = model.drawn, vectors.shape[1]
+    return {
+        "node_position": (("node", "axis"), drawn.position),
+        "cell": (("cell", "corner"), drawn.cell),
+        "shape_translation": (("node", "axis", "mode"), (drawn.translation @ vectors).reshape(-1, 3, n)),
+        "shape_rotation": (("node", "axis", "mode"), (drawn.rotation @ vectors).reshape(-1, 3, n)),
+        "radius": (("cell",), drawn.radius),
+    }

@@ -21,24 +21,27 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.fe.beam import Beam, section_motion
+from pipeline.core.errors import InputError
+from pipeline.structure.fe import beam as beams
+from pipeline.structure.fe.quadrature import POINTS
 
 
-def variables(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, interfaces: tuple[str, ...]) -> dict[str, Any]:
-    """The bundle's optional variables on shortening, from vectors in node order, shape (ndof, n).
+def variables(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:
+    """The bundle's optional variables on shortening, of a beam's mesh (schema MESH) and its modes (schema MODES).
 
-    interfaces: named frames; at the first the body frame is held (x0); without any, at the lower end.
+    The body frame is held at the first of the modes' interfaces (x0); without any, at the lower end.
+    Raises InputError for a body whose shortening is not along x of its frame, or not given by its axis alone.
     """
-    motion = section_motion(beam, vectors)
-    x = mesh["node_position"].values[:, 0]
+    _require_plain_rod(mesh)
+    x, vectors = mesh["abscissa"].values, modes["vector"].values
     ends = np.sort(x[mesh["cell"].values], axis=1)
+    s = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * POINTS
     node = {str(n): int(k) for n, k in zip(mesh["frame"].values, mesh["frame_node"].values, strict=True)}
+    interfaces = modes.attrs["interfaces"].split()
     x0 = x[node[interfaces[0]]] if interfaces else x.min()
     line = mesh["density"].values * mesh["area"].values
-    slopes = motion.rotation[1:]
-    beyond = [_beyond(ends, motion.x, x0, line, power) for power in (0, 1)]
-    first, second = (-_form(motion.weight * load, slopes) for load in beyond)
-    at_frames = [-_form(motion.weight * _between(ends, x0, x[k]), slopes) for k in mesh["frame_node"].values]
+    first, second = (-_form(mesh, vectors, _beyond(ends, s, x0, line, power)) for power in (0, 1))
+    at_frames = [-_form(mesh, vectors, _between(ends, x0, x[k])) for k in mesh["frame_node"].values]
     square = ("mode", "mode2")
     return {
         "shortening_first_moment": (square, first),
@@ -47,9 +50,19 @@ def variables(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, interfaces: tup
     }
 
 
-def _form(weight: np.ndarray, slopes: np.ndarray) -> np.ndarray:
-    """Int weight (v'_i v'_j + w'_i w'_j), exactly symmetric; slopes: rotations about y and z, (2, cells, points, n)."""
-    result = np.einsum("cq,kcqi,kcqj->ij", weight, slopes, slopes, optimize=True)
+def _require_plain_rod(mesh: xr.Dataset) -> None:
+    where, remedy = "[body] stiffening", "remove stiffening, or describe the body by a straight rod along x"
+    if "abscissa" not in mesh:
+        raise InputError(where, "shortening is known of beams, not of this kind of body", remedy)
+    if not np.allclose(mesh["rod_rotation"].values, np.eye(3), rtol=0.0, atol=1e-12):
+        raise InputError(where, "the rod does not lie along x of its mesh frame", remedy)
+    if "area_profile" in mesh or "lump_mass" in mesh:
+        raise InputError(where, "the rod is tapered or carries lumped masses", remedy)
+
+
+def _form(mesh: xr.Dataset, vectors: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Int weight (v'_i v'_j + w'_i w'_j) dx, exactly symmetric; weight: of cells or at their Gauss points."""
+    result = vectors.T @ (beams.geometric_stiffness(mesh, weight) @ vectors)
     return 0.5 * (result + result.T)
 
 

@@ -18,6 +18,21 @@ MARGIN = 8
 
 
 @dataclass(frozen=True, slots=True)
+class Wanted:
+    """What decides the number of coordinates; nothing at all means every one that the mesh has.
+
+    count: elastic coordinates, static ones included.  up_to: highest normal frequency kept [Hz].
+    compliance: least share of the static compliance between the interfaces, in each direction.
+    mass: least share of the mass that moves with the basis, in each direction.
+    """
+
+    count: int | None = None
+    up_to: float | None = None
+    compliance: float | None = None
+    mass: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Request:
     """How many normal modes a basis of `count` coordinates needs, of `available` ones.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,55 +12,91 @@ import xarray as xr
 from pipeline.core.artifacts.schema import MODES, conform
 from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup, suggestion
-from pipeline.structure.fe import beam as beams
-from pipeline.structure.modes import eigen, exact, orient
-from pipeline.structure.modes.basis import Basis
+from pipeline.structure.fe.model import Interface, Model
+from pipeline.structure.kinds.kind import Kind, Progress, of_mesh, silent
+from pipeline.structure.modes import basis, deficits, eigen, orient
+from pipeline.structure.modes.condition import Condition, Given, check
+from pipeline.structure.modes.select import Wanted
+from pipeline.structure.modes.statics import Flexibility, support
 
 REFERENCES = "pipeline.structure.modes.reference"
+CARRIED = ("title", "section", "inertia_section", "source")
 
 
 def solve(
-    mesh: xr.Dataset, reference: str, count: int | None = None, interfaces: Sequence[str] | None = None
+    mesh: xr.Dataset,
+    reference: str,
+    count: int | None = None,
+    interfaces: Sequence[str] | None = None,
+    *,
+    wanted: Wanted | None = None,
+    held: Sequence[str] = (),
+    of: str | None = None,
+    progress: Progress = silent,
 ) -> xr.Dataset:
     """Modes (schema MODES): mass-normalised, ascending, oriented and signed the same in every process.
 
-    mesh: schema MESH.  reference: a name of `pipeline.structure.modes.reference`.
-    count: number of elastic coordinates, constraint modes included; None for a complete basis.
-    interfaces: named frames; None for the recipe's own list.
+    mesh: what a kind of body built.  reference: a name of `pipeline.structure.modes.reference`.
+    count: number of elastic coordinates, static ones included; None for a complete basis.
+    wanted: other ways to choose.
+    interfaces: named frames; None for the recipe's own list.  held, of: see `condition.Given`.
     Raises InputError for an unknown reference or frame, a count beyond the mesh, or one that cuts a cluster
     of equal frequencies (with the two nearest whole counts).
     """
-    condition = lookup(REFERENCES, reference, where="modes.reference")
+    find = lookup(REFERENCES, reference, where="modes.reference")
+    kind = of_mesh(mesh)
+    progress(None, "assembling")
+    model = kind.assemble(mesh)
     names = tuple(mesh.attrs["interfaces"].split()) if interfaces is None else tuple(interfaces)
-    beam = beams.assemble(mesh)
-    basis: Basis = condition(beam, count, _nodes(mesh, names))
-    values, vectors = eigen.rediagonalise(beam.stiffness, beam.mass, basis.vectors)
-    vectors = orient.orient(beam, values, vectors)
-    families = orient.family(beam, vectors)
-    vectors = orient.signed(vectors, families)
-    data: dict[str, Any] = {
+    given = Given(tuple(_frame(model, name) for name in names), tuple(held), of)
+    condition: Condition = find(model, given)
+    check(model, condition)
+
+    @cache
+    def flexibility() -> Flexibility:
+        return support(model, lambda share: progress(share, f"factorising {model.size} coordinates"))
+
+    body = basis.Body(model, condition, given.interfaces, flexibility, progress)
+    shapes = basis.build(body, wanted or Wanted(count=count))
+    values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes.vectors)
+    vectors = orient.orient(model, values, vectors)
+    families = orient.family(model, vectors)
+    vectors = orient.signed(model, vectors, families)
+    data = _variables(model, values, vectors) | _words(kind, mesh, model, reference, families, vectors)
+    if shapes.rigid_frequency.size:
+        data["rigid_frequency"] = (("rigid_mode",), shapes.rigid_frequency)
+    lacks, attributes = deficits.measure(flexibility(), vectors, progress)
+    attributes |= {name: mesh.attrs[name] for name in CARRIED}
+    attributes |= {"reference": reference, "count": len(values), "interfaces": " ".join(names)}
+    attributes["rigid_motion"] = condition.note
+    return conform(xr.Dataset(data | lacks), MODES, **attributes)
+
+
+def _frame(model: Model, name: str) -> Interface:
+    known = {frame.name: frame for frame in model.interfaces}
+    if name not in known:
+        raise InputError("modes.interfaces", f"the mesh has no frame called '{name}'", suggestion(name, known))
+    return known[name]
+
+
+def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[str, Any]:
+    n = vectors.shape[1]
+    moved = [(motion @ vectors).reshape(-1, 3, n) for motion in (model.drawn.translation, model.drawn.rotation)]
+    return {
         "frequency": (("mode",), eigen.frequency(values)),
-        "shape": (("node", "dof", "mode"), vectors.reshape(-1, beams.N_DOFS, len(values))),
-        "kind": (("mode",), np.array([name.partition("_")[0] for name in families])),
+        "shape": (("node", "dof", "mode"), np.concatenate(moved, axis=1)),
+        "vector": (("unknown", "mode"), vectors),
+        "node_position": (("node", "axis"), model.drawn.position),
+        "cell": (("cell", "corner"), model.drawn.cell),
+        "dof": (("dof",), ["ux", "uy", "uz", "rx", "ry", "rz"]),
+        "frame": (("frame",), [frame.name for frame in model.interfaces]),
     }
-    if basis.rigid_frequency.size:
-        data["rigid_frequency"] = (("rigid_mode",), basis.rigid_frequency)
-    for theory, hertz in exact.columns(mesh, reference, families).items():
+
+
+def _words(
+    kind: Kind, mesh: xr.Dataset, model: Model, reference: str, families: list[str], vectors: np.ndarray
+) -> dict[str, Any]:
+    data: dict[str, Any] = {"kind": (("mode",), np.array(kind.words(model, families, vectors)))}
+    for theory, hertz in kind.exact(mesh, reference, families).items():
         data[theory] = (("mode",), hertz)
-    attributes = {name: mesh.attrs[name] for name in ("title", "section", "inertia_section", "source")}
-    return conform(
-        xr.Dataset(data, coords={"dof": list(beams.DOFS)}),
-        MODES,
-        reference=reference,
-        count=len(values),
-        interfaces=" ".join(names),
-        **attributes,
-    )
-
-
-def _nodes(mesh: xr.Dataset, names: tuple[str, ...]) -> tuple[int, ...]:
-    known = [str(name) for name in mesh["frame"].values]
-    for name in names:
-        if name not in known:
-            raise InputError("modes.interfaces", f"the mesh has no frame called '{name}'", suggestion(name, known))
-    return tuple(int(mesh["frame_node"].sel(frame=name)) for name in names)
+    return data

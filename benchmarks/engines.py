@@ -1,0 +1,133 @@
+"""Scenes with their bundles and compiled engines, and the states at which they are evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.measure import once
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.parts import ClearanceSpherical, IdealJoint
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.integrate.engine import Engine, consistent_start
+from pipeline.dynamics.integrate.trajectory import Trajectory, integrate
+from pipeline.dynamics.run import engine_of, observed
+from pipeline.dynamics.tables import MODE, NORMAL_FORCE, TOUCH_SIZE
+from stages.graph import Graph
+from stages.run import check, find_scene, workplace
+
+#: the scenes of the paper, from the least to the fullest
+SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A scene and the bundles of its flexible bodies."""
+
+    name: str
+    scene: Scene
+    bundles: Mapping[str, xr.Dataset]
+
+    def engine(self) -> Engine:
+        """Its compiled engine."""
+        return engine_of(self.scene, self.bundles, silent)
+
+    def with_scene(self, name: str, scene: Scene) -> Mechanism:
+        """The same bundles under an edited scene."""
+        return Mechanism(name, scene, {body: self.bundles[body] for body in scene.flexible()})
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of a run: time [s], per contact its mode and impact rate [m/s], state vector."""
+
+    t: float
+    modes: np.ndarray
+    latched: np.ndarray
+    y: np.ndarray
+
+
+def silent(fraction: float | None, text: str) -> None:
+    """Reports would be part of what is measured."""
+
+
+def mechanism(name: str) -> Mechanism:
+    """``scenes/sps4/<name>.toml`` with up-to-date bundles; FlexclearError when these cannot be made."""
+    scene = load_scene(find_scene(f"sps4/{name}"))
+    place, tasks = workplace(), Graph(scene).bundle
+    outcome = place.bring(list(tasks.values()), jobs=1)
+    check(outcome)
+    return Mechanism(name, scene, {body: place.store.load(outcome.records[id(task)]) for body, task in tasks.items()})
+
+
+def edit_joint(scene: Scene, name: str, **changes: object) -> Scene:
+    """A copy of a scene with some fields of one joint changed."""
+    return scene.model_copy(update={"joint": scene.joint | {name: scene.joint[name].model_copy(update=changes)}})
+
+
+def without_friction(scene: Scene) -> Scene:
+    """A copy whose clearance joints have no friction."""
+    for name, joint in scene.joint.items():
+        if isinstance(joint, ClearanceSpherical):
+            scene = edit_joint(scene, name, friction=None)
+    return scene
+
+
+def without_clearance(scene: Scene) -> Scene:
+    """A copy whose clearance joints are ideal ones."""
+    ideal = {
+        name: IdealJoint(type="spherical", between=joint.between)
+        for name, joint in scene.joint.items()
+        if isinstance(joint, ClearanceSpherical)
+    }
+    return scene.model_copy(update={"joint": scene.joint | ideal})
+
+
+def damped(scene: Scene, ratio: float) -> Scene:
+    """A copy whose flexible bodies have a modal damping ratio."""
+    bodies = {name: body.model_copy(update={"damping": ratio}) for name, body in scene.flexible().items()}
+    return scene.model_copy(update={"body": scene.body | bodies})
+
+
+def with_tolerance(scene: Scene, rtol: float, interval: float) -> Scene:
+    """A copy with another tolerance and output interval [s]."""
+    solver = scene.solver.model_copy(update={"rtol": rtol})
+    return scene.model_copy(update={"solver": solver, "output": scene.output.model_copy(update={"interval": interval})})
+
+
+def trajectory(engine: Engine) -> Trajectory:
+    """A whole run of an engine, from its consistent start."""
+    return integrate(engine, consistent_start(engine)[0], silent)
+
+
+def states(engine: Engine, run: Trajectory) -> dict[str, State]:
+    """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
+    contacts = engine.built.packed.sizes["N_CONTACTS"]
+    modes = run.rows[:, 1 : 1 + contacts]
+    found = {"free": np.flatnonzero(~np.any(modes == 1.0, axis=1))}
+    if contacts:
+        touches = observed(engine, run)["touch"].reshape(len(modes), contacts, TOUCH_SIZE)
+        found["in contact"] = np.flatnonzero(np.all(touches[:, :, NORMAL_FORCE] > 0.0, axis=1))
+    # the middle of the candidates: at the very start much is zero
+    return {name: _state(run.rows[rows[len(rows) // 2]], contacts) for name, rows in found.items()}
+
+
+def _state(row: np.ndarray, contacts: int) -> State:
+    return State(float(row[0]), row[1 : 1 + contacts], row[1 + contacts : 1 + 2 * contacts], row[1 + 2 * contacts :])
+
+
+def set_state(engine: Engine, state: State) -> None:
+    """Put contact modes, impact rates and the pieces of the drives as they are in a state."""
+    n, contacts = engine.n, len(state.modes)
+    n[n[MODE] : n[MODE] + contacts] = state.modes
+    engine.view("LATCHED", contacts)[:] = state.latched
+    engine.select_pieces(state.t)
+
+
+def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
+    """Processor time of one evaluation of the right-hand side [s], from `repeat` of them in compiled code."""
+    set_state(engine, state)
+    return once(lambda: engine.evaluate(state.y, state.t, repeat)) / repeat

@@ -1,0 +1,83 @@
+"""Times that mean something on a machine whose speed drifts: interleaved, repeated, told with their spread."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+import numpy as np
+
+PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn")
+
+
+@dataclass(frozen=True)
+class Times:
+    """Repeats of one measurement [s]; those of equal index in two measurements were made side by side."""
+
+    seconds: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        """Median [s]."""
+        return float(np.median(self.seconds))
+
+    @property
+    def spread(self) -> float:
+        """Half the range of the middle half of the repeats, as a share of the median."""
+        low, high = np.percentile(self.seconds, (25, 75))
+        return float(0.5 * (high - low) / self.median)
+
+    def over(self, other: Times) -> float:
+        """Median of the ratios to another measurement, pair by pair: a slow moment of the machine slows both."""
+        return float(np.median(np.array(self.seconds) / np.array(other.seconds)))
+
+
+def once(task: Callable[[], object]) -> float:
+    """Processor time of one call [s]: on one thread that is the time it takes on a machine without other work."""
+    begun = time.process_time()
+    task()
+    return time.process_time() - begun
+
+
+def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:
+    """Each task, which returns its own time [s], once per round, one after the other; a first round does not count."""
+    found: dict[str, list[float]] = {name: [] for name in tasks}
+    for number in range(rounds + 1):
+        for name, task in tasks.items():
+            seconds = task()
+            if number:
+                found[name].append(seconds)
+    return {name: Times(tuple(values)) for name, values in found.items()}
+
+
+def slope(x: Sequence[float], y: Sequence[float]) -> float:
+    """Exponent p of the best fit y = C x^p."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])
+
+
+def machine() -> dict[str, object]:
+    """Processor model and versions; no name of the machine."""
+    return {"cpu": _processor(), "versions": {"python": platform.python_version(), **_versions()}}
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            continue
+    return found

@@ -1,0 +1,117 @@
+"""All runs brought up to date through the store, and the numbers of the verdict taken from them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import pipeline
+from benchmarks.reference_conditions import design, statics
+from benchmarks.reference_conditions.cases import BODY
+from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, PLACES, RIGID, TIMES, Case
+from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from stages.run import Workplace, check
+
+Row = dict[str, Any]
+#: vibrations of the mechanism that are compared
+VIBRATIONS = 6
+
+
+def bring(cases: list[Case], place: Workplace) -> dict[Case, xr.Dataset]:
+    """Datasets of the cases, from the cache where fresh."""
+    tasks = {case: design.task(case) for case in cases}
+    outcome = place.bring(list(tasks.values()))
+    check(outcome)
+    return {case: place.store.load(outcome.records[id(task)]) for case, task in tasks.items()}
+
+
+def identity(case: Case) -> Row:
+    """What a row is about."""
+    reference = case.condition not in (FULL, RIGID)
+    return {
+        "place_mm": case.place,
+        "condition": case.condition,
+        "count": case.count if reference else 0,
+        "finer": case.finer,
+    }
+
+
+def static_rows() -> Iterator[Row]:
+    """Shares of the static compliance, over all whole counts; and the full rod's own."""
+    for place in PLACES:
+        yield {"place_mm": place, "condition": FULL, "count": 0} | statics.full(place)
+        for condition in CONDITIONS:
+            for count in statics.whole_counts(place, condition, max(design.COUNTS)):
+                shares = statics.shares(Case(place, condition, count))
+                yield {"place_mm": place, "condition": condition, "count": count} | shares
+
+
+def mesh_rows() -> Iterator[Row]:
+    """Frequencies of the Craig-Bampton set on finer meshes, the finest last."""
+    for finer in design.FINER:
+        found = statics.clamped_frequencies(finer, COUNT)
+        yield {"elements": finer * statics.rod(1).sizes["cell"], "frequency": found.tolist()}
+
+
+def frequency_rows() -> Iterator[Row]:
+    """Lowest frequencies [Hz] of the assembled mechanism, drives held, at each of `TIMES`."""
+    for where in PLACES:
+        sets = [Case(where, c, design.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
+        for case in sets:
+            for time in TIMES:
+                found = pipeline.frequencies(design.scene(case), time)["undamped_frequency"].values
+                elastic = np.sort(found[found > 1.0])[:VIBRATIONS]
+                yield identity(case) | {"time": time, "frequency": elastic.tolist()}
+
+
+def far_rows(place: Workplace) -> Iterator[Row]:
+    """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
+    runs = bring(design.far(), place)
+    for case, run in runs.items():
+        rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
+        effect = max_deviation(run, rigid, BODY)
+        row = identity(case) | _deviation(effect) | {name: run.attrs[name] for name in ("evaluations", "seconds")}
+        yield row | {
+            "force": _largest(run, rigid),
+            "force_error": _largest(run, full) / _largest(full, rigid),
+            "velocity_error": max_deviation(run, full, BODY).velocity / max_deviation(full, rigid, BODY).velocity,
+        }
+
+
+def clearance_rows(place: Workplace, members: int) -> Iterator[Row]:
+    """Clearance at A1: means and standard deviations over the members of each set, one run of the rigid rod."""
+    runs = bring(design.clearance(members), place)
+    rigid = bring([Case(where, RIGID) for where in PLACES], place)
+    for case, run in runs.items():
+        ideal = rigid[Case(case.place, RIGID)]
+        costs = {name: run.attrs[name] for name in ("evaluations", "seconds")}
+        if case.condition == RIGID:
+            spread = {"peak_force": [run.attrs["peak_force"]], "impacts": [run.attrs["impacts"]]}
+            effects = [max_deviation(run, ideal, BODY)]
+            acceleration = [float(np.abs(run["acceleration"].values[:, 0, 2]).max())]
+        else:
+            spread = {"peak_force": run["peak_force"].values[:, 0], "impacts": run["impact_count"].values[:, 0]}
+            effects = ensemble_deviations(run, ideal, BODY)
+            acceleration = np.abs(run["acceleration"].values[:, :, 0, 2]).max(axis=1).tolist()
+        spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}
+        yield identity(case) | costs | _statistics(spread | {"acceleration": acceleration}) | {"members": len(effects)}
+
+
+def _deviation(effect: Deviation) -> Row:
+    return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
+
+
+def _largest(run: xr.Dataset, other: xr.Dataset) -> float:
+    """Largest difference of the force at A1 [N]."""
+    return float(np.linalg.norm(run["joint_force"].values - other["joint_force"].values, axis=1).max())
+
+
+def _statistics(series: dict[str, Any]) -> Row:
+    found = {}
+    for name, values in series.items():
+        found[name] = float(np.mean(values))
+        found[f"{name}_std"] = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return found

@@ -1,0 +1,84 @@
+"""What a bundle lacks, in words and as a table, from the bundle alone.
+
+The simulate stage may ask `warnings` with the frames at which joints and drives act on the body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+#: a share of the static compliance below this is worth a warning
+ENOUGH = 0.9
+WIDTH = 9
+
+
+def table(bundle: xr.Dataset) -> str:
+    """The deficits of a bundle (schema BUNDLE) as lines of text."""
+    a = bundle.attrs
+    resolved = float(a["resolved_frequency"])
+    first = float(a["first_free_frequency"])
+    lines = [
+        f"{a['title'] or 'flexible body'}: {a['reference']}, {a['count']} coordinates",
+        f"  rigid motion: {a['rigid_motion']}",
+        f"  frequencies of the free body within 1 %: up to {resolved:.6g} Hz"
+        if resolved
+        else f"  frequencies of the free body within 1 %: not even the first, {first:.6g} Hz",
+        "  static compliance, per cent of the full model, axes of the frame",
+        _row("frame", "held", bundle["direction"].values.tolist()),
+    ]
+    names = [str(name) for name in bundle["frame"].values]
+    for name in names:
+        for held in [other for other in names if other != name] + [name]:
+            share = bundle["compliance_share"].sel(frame=name, frame_held=held).values
+            shown = [_percent(value) for value in share]
+            lines.append(_row(name, "nothing" if held == name else held, shown))
+    lines += ["  largest error of a frame's motion under a unit load on it, m/N and rad/(N m)"]
+    lines.append(_row("frame", "load, Hz", bundle["direction"].values.tolist()))
+    for name in names:
+        for hertz in bundle["bound_frequency"].values:
+            bound = bundle["error_bound"].sel(frame=name, bound_frequency=hertz).values
+            lines.append(_row(name, f"{hertz:.5g}", [f"{value:.2e}" for value in bound]))
+    total = bundle["effective_mass"].sum("mode").values
+    lines += ["  effective mass of all modes, kg and kg m2"]
+    lines.append(_row("", "", [f"{value:.3g}" for value in total]))
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _row(frame: str, held: str, values: Sequence[object]) -> str:
+    return f"  {frame:<14} {held:<10}" + "".join(f"{value!s:>{WIDTH + 1}}" for value in values)
+
+
+def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the body") -> list[str]:
+    """Sentences about static compliance that is missing between the frames at which forces act.
+
+    frames_used: named frames of the bundle.  A single frame is judged with nothing held.
+    """
+    used = list(dict.fromkeys(frames_used))
+    pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
+    found = []
+    for name, held in pairs:
+        both = bundle["compliance_share"].sel(frame=[name, held], frame_held=[held, name]).values
+        share = bundle["direction"].copy(data=np.minimum(both[0, 0], both[1, 1]))
+        low = share.where(share < ENOUGH, drop=True)
+        if low.size == 0:
+            continue
+        where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"
+        amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(low["direction"].values, low.values, strict=True))
+        found.append(
+            f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
+            f"({amounts} of the full model's); joints there find the body too stiff. Static shapes mend that, "
+            f'as modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
+        )
+    return found
+
+
+def _percent(share: float) -> str:
+    """Per cent with three digits; rounding is nothing."""
+    return f"{100.0 * share:.3g}" if share > 1e-9 else "0"
+
+
+def _listed(names: Sequence[str]) -> str:
+    return "[" + ", ".join(f'"{name}"' for name in names) + "]"

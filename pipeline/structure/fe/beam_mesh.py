@@ -1,0 +1,161 @@
+"""Nodes, two-node cells, section constants, lumped masses and named frames of a beam recipe."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.artifacts.schema import MESH, conform
+from pipeline.core.errors import InputError
+from pipeline.structure.fe import section_recipe
+from pipeline.structure.fe.beam_recipe import (
+    SAME_PLACE,
+    Segment,
+    SegmentedBeamRecipe,
+    StraightBeamRecipe,
+    segments,
+)
+from pipeline.structure.fe.quadrature import POINTS
+from pipeline.structure.fe.recipe import sources
+
+#: columns: x, y, z of a named frame in rod axes; z runs along the beam
+FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+#: constants that a taper changes, each with a profile
+TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
+
+
+def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Dataset:
+    """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest)."""
+    parts = segments(recipe)
+    x = _nodes(parts)
+    R_MR = quaternion_to_matrix(recipe.pose.as_quaternion())
+    position = np.array(recipe.pose.position) + np.outer(x, R_MR[:, 0])
+    cells = np.arange(len(x) - 1)
+    names = list(recipe.frames)
+    nodes = np.array([_node_at(x, recipe.frames[name].x, f"{place} [frames.{name}.x]") for name in names])
+    data: dict[str, Any] = {
+        "node_position": (("node", "axis"), position),
+        "abscissa": (("node",), x),
+        "rod_rotation": (("axis", "axis2"), R_MR),
+        "cell": (("cell", "corner"), np.stack([cells, cells + 1], axis=1)),
+        "frame_node": (("frame",), nodes),
+        "frame_position": (("frame", "axis"), position[nodes]),
+        "frame_rotation": (("frame", "axis", "axis2"), np.tile(R_MR @ FRAME_ROTATION, (len(names), 1, 1))),
+    }
+    data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, place)
+    return conform(xr.Dataset(data, coords={"frame": names}), MESH, **_attributes(recipe, parts))
+
+
+def _nodes(parts: tuple[Segment, ...]) -> np.ndarray:
+    """Places of the nodes along the rod [m]."""
+    pieces = [np.linspace(s.start, s.end, s.elements + 1) for s in parts]
+    return np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
+
+
+def _constants(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Segment, ...]) -> dict[str, Any]:
+    """Material and section constants of the cells; at the middle of a tapered one, with profiles about it."""
+    tapers = any(part.end_section is not None for part in parts)
+    pieces = [_segment_constants(recipe, part, tapers) for part in parts]
+    found = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    for name in ("product_moment", "inertia_product"):
+        if not found[name].any():
+            del found[name]
+    if np.isnan(found["shear_coefficient"]).any():
+        for name in ("shear_coefficient", "shear_coefficient_profile"):
+            found.pop(name, None)
+    dims = {name: ("cell", "axis") if values.ndim == 2 else ("cell",) for name, values in found.items()}
+    dims |= {f"{name}_profile": ("cell", "point", *dims[name][1:]) for name in TAPERED if name in found}
+    return {name: (dims[name], values) for name, values in found.items()}
+
+
+def _segment_constants(
+    recipe: StraightBeamRecipe | SegmentedBeamRecipe, part: Segment, tapers: bool
+) -> dict[str, np.ndarray]:
+    n, material = part.elements, part.material or recipe.material
+    middle = _section(recipe, part, (np.arange(n) + 0.5) / n)
+    found = middle | {
+        name: np.full(n, getattr(material, name)) for name in ("youngs_modulus", "shear_modulus", "density")
+    }
+    if tapers:
+        points = _section(recipe, part, ((np.arange(n)[:, None] + POINTS) / n).ravel())
+        for name in TAPERED:
+            at_points = points[name].reshape(n, len(POINTS), *points[name].shape[1:])
+            at_middle = middle[name][:, None]
+            # without rotary inertia the middle is zero, and so is every point
+            found[f"{name}_profile"] = np.divide(
+                at_points, at_middle, out=np.ones_like(at_points), where=at_middle != 0.0
+            )
+    return found
+
+
+def _section(recipe: StraightBeamRecipe | SegmentedBeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
+    """Section constants at the shares s of a segment, each of shape (s,) or (s, 3)."""
+    stiffness = section_recipe.constants(part.section, part.end_section, s)
+    polar, about_y, about_z, product = section_recipe.inertia(part.section, part.end_section, part.inertia_section, s)
+    if recipe.theory == "euler-bernoulli":
+        about_y = about_z = product = 0.0
+    poisson = (part.material or recipe.material).poisson
+    kappa = section_recipe.shear_coefficient(part.section, part.end_section, s, poisson) or (np.nan, np.nan)
+    return {
+        "area": _each(s, stiffness.area),
+        "second_moment": _each(s, stiffness.torsion, stiffness.second_y, stiffness.second_z),
+        "product_moment": _each(s, stiffness.product),
+        "inertia_moment": _each(s, polar, about_y, about_z),
+        "inertia_product": _each(s, product),
+        "shear_coefficient": _each(s, 1.0, *kappa),
+    }
+
+
+def _each(s: np.ndarray, *values: Any) -> np.ndarray:
+    columns = np.stack([np.broadcast_to(np.asarray(value, dtype=float), s.shape) for value in values], axis=-1)
+    return columns if len(values) > 1 else columns[:, 0]
+
+
+def _lumps(
+    recipe: StraightBeamRecipe | SegmentedBeamRecipe, x: np.ndarray, R_MR: np.ndarray, place: str
+) -> dict[str, Any]:
+    if not recipe.masses:
+        return {}
+    masses = recipe.masses
+    inertia = np.array([mass.inertia for mass in masses.values()])
+    nodes = [_node_at(x, mass.x, f"{place} [masses.{name}.x]") for name, mass in masses.items()]
+    return {
+        "lump_node": (("lump",), np.array(nodes)),
+        "lump_mass": (("lump",), np.array([mass.mass for mass in masses.values()])),
+        "lump_offset": (("lump", "axis"), np.array([mass.com for mass in masses.values()]) @ R_MR.T),
+        "lump_inertia": (("lump", "axis", "axis2"), R_MR @ inertia @ R_MR.T),
+    }
+
+
+def _attributes(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Segment, ...]) -> dict[str, str]:
+    return {
+        "title": recipe.title,
+        "section": _types(part.section for part in parts),
+        "inertia_section": _types(part.inertia_section or part.section for part in parts),
+        "interfaces": " ".join(recipe.interfaces),
+        "theory": recipe.theory,
+        "torsion": recipe.torsion,
+        "extension": recipe.extension,
+        "source": sources(recipe),
+    }
+
+
+def _types(found: Any) -> str:
+    return " ".join(dict.fromkeys(section.type for section in found))
+
+
+def _node_at(x: np.ndarray, place: float, where: str) -> int:
+    """Index of the node at `place` [m]; what lies between nodes would need interpolated constraints."""
+    nearest = int(np.argmin(np.abs(x - place)))
+    if abs(x[nearest] - place) <= SAME_PLACE * x[-1]:
+        return nearest
+    near = sorted(np.argsort(np.abs(x - place))[:2])
+    shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in near)
+    raise InputError(
+        where,
+        f"{place * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}",
+        f"move the {'mass' if '[masses.' in where else 'frame'} to a node or choose another number of elements",
+    )

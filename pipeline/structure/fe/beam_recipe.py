@@ -1,0 +1,199 @@
+"""Recipes of beams: straight rods, uniform, tapered or stepped, with masses on them, anywhere in space."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.core.registry import suggestion
+from pipeline.core.scene.fields import Density, Inertia, Length, Mass, Number, Part, Pose, Position, Pressure
+from pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
+
+Positive = Field(gt=0.0)
+Elements = Annotated[int, Field(ge=1, le=100_000)]
+#: places along a rod that differ by less than this share of its length are the same; they come from decimal text
+SAME_PLACE = 1e-9
+
+
+class Isotropic(Part):
+    """A linear elastic, isotropic material."""
+
+    density: Annotated[Density, Positive]
+    youngs_modulus: Annotated[Pressure, Positive]
+    poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)]
+
+    @property
+    def shear_modulus(self) -> float:
+        """E / (2 (1 + nu)) [Pa]."""
+        return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
+
+
+class StraightBeam(Part):
+    """A beam along x of the rod frame, from x = 0 to `length`, cut into equal elements."""
+
+    type: Literal["straight-beam"]
+    length: Annotated[Length, Positive]
+
+
+class Segment(Part):
+    """A piece of a stepped rod, cut into equal elements.
+
+    end_section: the section at `end` when it tapers linearly from `section`, of the same type.
+    material: where it differs from the recipe's.
+    """
+
+    start: Length
+    end: Length
+    elements: Elements
+    section: StiffnessSection
+    end_section: StiffnessSection | None = None
+    inertia_section: InertiaSection | None = None
+    material: Isotropic | None = None
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Segment:
+        if not self.start < self.end:
+            raise ValueError(f"a segment ends after it starts, not at {self.end:g} m after {self.start:g} m")
+        check_taper(self.section, self.end_section)
+        return self
+
+
+class SegmentedBeam(Part):
+    """A beam along x of the rod frame, from x = 0 to `length`, of segments that cover it without gap or overlap."""
+
+    type: Literal["segmented-beam"]
+    length: Annotated[Length, Positive]
+    segments: tuple[Segment, ...]
+
+    @model_validator(mode="after")
+    def _covered(self) -> SegmentedBeam:
+        close = SAME_PLACE * self.length
+        ends = [("the rod", 0.0, 0.0), *((f"segment {k}", s.start, s.end) for k, s in enumerate(self.segments))]
+        ends.append(("the rod's end", self.length, self.length))
+        for (before, _, end), (after, start, _) in pairwise(ends):
+            if abs(start - end) > close:
+                kind = "a gap" if start > end else "an overlap"
+                raise ValueError(
+                    f"segments cover the rod from 0 to {self.length:g} m in their order; between {before} "
+                    f"({end:g} m) and {after} ({start:g} m) there is {kind}"
+                )
+        return self
+
+
+class LumpedMass(Part):
+    """A body tied rigidly to the node at `x` (a ball, a stem).
+
+    com: its centre of mass seen from the node, inertia: about that centre; both in axes of the rod frame.
+    """
+
+    x: Length
+    mass: Annotated[Mass, Positive]
+    com: Position = (0.0, 0.0, 0.0)
+    inertia: Inertia = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+class NodeFrame(Part):
+    """A named frame at a node: z along the beam (x of the rod frame), x = y of the rod, y = z of the rod."""
+
+    x: Length
+
+
+class BeamRecipe(Part):
+    """What all beams have.
+
+    theory: of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too.
+    torsion, extension: degree of the twist and of the axial displacement in an element.
+    pose: of the rod frame in the mesh frame.
+    masses: lumped masses by name.
+    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
+    """
+
+    title: str = ""
+    theory: Literal["euler-bernoulli", "rayleigh", "timoshenko"] = "rayleigh"
+    torsion: Literal["linear", "quadratic"] = "linear"
+    extension: Literal["linear", "quadratic"] = "linear"
+    pose: Pose = Pose()
+    masses: dict[str, LumpedMass] = Field(default_factory=dict)
+    frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
+    interfaces: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _interfaces_are_frames(self) -> BeamRecipe:
+        for name in self.interfaces:
+            if name not in self.frames:
+                raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, self.frames)}")
+        if len(set(self.interfaces)) < len(self.interfaces):
+            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
+        return self
+
+
+class StraightBeamRecipe(BeamRecipe):
+    """A uniform or linearly tapered rod.
+
+    section: gives area and stiffness.  end_section: the one at the far end of a linear taper, of the same type.
+    inertia_section: gives the second moments of the mass; default: `section`.
+    """
+
+    elements: Elements
+    shape: StraightBeam
+    material: Isotropic
+    section: StiffnessSection
+    end_section: StiffnessSection | None = None
+    inertia_section: InertiaSection | None = None
+
+    @model_validator(mode="after")
+    def _sections_fit(self) -> StraightBeamRecipe:
+        check_taper(self.section, self.end_section)
+        check_shear(self.theory, "section", self.section)
+        return self
+
+
+class SegmentedBeamRecipe(BeamRecipe):
+    """A rod whose section changes in steps."""
+
+    shape: SegmentedBeam
+    material: Isotropic
+
+    @model_validator(mode="after")
+    def _shear_known(self) -> SegmentedBeamRecipe:
+        for k, segment in enumerate(self.shape.segments):
+            check_shear(self.theory, f"shape.segments.{k}.section", segment.section)
+        return self
+
+
+def segments(recipe: StraightBeamRecipe | SegmentedBeamRecipe) -> tuple[Segment, ...]:
+    """The recipe's segments, one for a straight beam."""
+    if isinstance(recipe, SegmentedBeamRecipe):
+        return recipe.shape.segments
+    whole = Segment(
+        start=0.0,
+        end=recipe.shape.length,
+        elements=recipe.elements,
+        section=recipe.section,
+        end_section=recipe.end_section,
+        inertia_section=recipe.inertia_section,
+    )
+    return (whole,)
+
+
+def check_taper(start: Any, end: Any | None) -> None:
+    """ValueError unless `end` is None or a section that `start` can taper to."""
+    if end is None:
+        return
+    if start.type not in DIMENSIONS:
+        raise ValueError(f"a {start.type} section has no dimensions to taper; cut the rod into segments")
+    if end.type != start.type:
+        raise ValueError(f"a taper keeps the type of the section; it cannot go from {start.type} to {end.type}")
+    if end.shear_coefficient is not None:
+        raise ValueError("the shear coefficient of a taper is said once, in `section`")
+
+
+def check_shear(theory: str, place: str, section: Any) -> None:
+    """ValueError when a Timoshenko beam has a section without shear coefficient."""
+    if theory == "timoshenko" and section.type == "general" and section.shear_coefficient is None:
+        raise ValueError(
+            f"{place}: a Timoshenko beam needs the shear coefficient of a general section; "
+            "give shear_coefficient, or choose the theory 'rayleigh'"
+        )

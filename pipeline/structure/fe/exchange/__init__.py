@@ -1,0 +1,1 @@
+"""Matrices of other finite element codes, in and out."""

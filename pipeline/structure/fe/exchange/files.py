@@ -1,0 +1,144 @@
+"""Mass and stiffness matrices in files: npz (with everything of a model) and MatrixMarket with a table of unknowns."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.io
+import scipy.sparse as sp
+
+from pipeline.core.errors import InputError
+from pipeline.structure.fe.model import Model
+
+COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz", "internal")
+COLUMNS = ("node", "x", "y", "z", "component")
+#: bodies with more unknowns are exported without their integrals, which are then taken from the mass matrix
+MOMENTS_UP_TO = 1500
+
+
+@dataclass(frozen=True)
+class Table:
+    """What the rows of the matrices are, in units of the file.
+
+    node: number, shape (n,).  component: index into COMPONENTS, shape (n,).  position: shape (n, 3).
+    """
+
+    node: np.ndarray
+    component: np.ndarray
+    position: np.ndarray
+
+
+@dataclass(frozen=True)
+class Contents:
+    """A file's matrices and table; moments by their name in schema MATRICES, empty where the file has none."""
+
+    stiffness: sp.coo_array
+    mass: sp.coo_array
+    table: Table
+    moments: dict[str, np.ndarray]
+
+
+def table(model: Model) -> Table:
+    """What the unknowns of a model are, read from its rigid motions; nodes are numbered by place."""
+    moved = np.abs(model.rigid) > 0.0
+    component = np.where(moved[:, :3].any(axis=1), np.argmax(moved[:, :3], axis=1), 3 + np.argmax(moved[:, 3:], axis=1))
+    component[~moved.any(axis=1)] = COMPONENTS.index("internal")
+    _, node = np.unique(model.place, axis=0, return_inverse=True)
+    return Table(node.ravel() + 1, component, model.place)
+
+
+def write_npz(model: Model, path: Path) -> None:
+    """All that `shape.type = "matrices"` needs of a body, in SI units."""
+    found = table(model)
+    content: dict[str, Any] = {}
+    for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
+        entries = sp.coo_array(matrix)
+        content |= {f"{name}_row": entries.row, f"{name}_column": entries.col, f"{name}_value": entries.data}
+    content |= {"node": found.node, "component": found.component, "position": found.position}
+    np.savez_compressed(path, **content, **(moments(model) if model.size <= MOMENTS_UP_TO else {}))
+
+
+def write_matrix_market(model: Model, folder: Path) -> None:
+    """stiffness.mtx, mass.mtx and unknowns.csv in a folder, in SI units."""
+    for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
+        scipy.io.mmwrite(folder / f"{name}.mtx", sp.coo_array(matrix), symmetry="symmetric", precision=17)
+    found = table(model)
+    with (folder / "unknowns.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(COLUMNS)
+        for node, place, component in zip(found.node, found.position, found.component, strict=True):
+            writer.writerow([node, *map(repr, place.tolist()), COMPONENTS[component]])
+
+
+def moments(model: Model) -> dict[str, Any]:
+    """Integrals per unknown: those of unit vectors."""
+    found = model.integrate(np.eye(model.size))
+    entries = []
+    for k in range(3):
+        for l in range(k, 3):
+            pair = sp.coo_array(found.mode_mode_moment[k, l])
+            entries.append((np.full(pair.nnz, 3 * k + l), pair.row, pair.col, pair.data))
+    axes, row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+    return {
+        "body_mass": found.mass,
+        "first_moment": found.first_moment,
+        "second_moment": found.second_moment,
+        "unknown_first_moment": found.modal_first_moment,
+        "unknown_position_moment": found.position_mode_moment,
+        "pair_axes": axes,
+        "pair_row": row,
+        "pair_column": column,
+        "pair_value": value,
+    }
+
+
+def read_npz(path: Path, where: str) -> Contents:
+    """A file as `write_npz` makes it; InputError when something is missing."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            data = {name: file[name] for name in file.files}
+        found = Table(data.pop("node"), data.pop("component"), data.pop("position"))
+        n = len(found.node)
+        matrices = []
+        for name in ("stiffness", "mass"):
+            row, column, value = (data.pop(f"{name}_{part}") for part in ("row", "column", "value"))
+            matrices.append(sp.coo_array((value, (row, column)), shape=(n, n)))
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(where, f"'{path.name}' holds no matrices: {error}", "write it with exchange.files") from None
+    return Contents(matrices[0], matrices[1], found, data)
+
+
+def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) -> Contents:
+    """Matrices of any code; InputError when they and the table do not fit together."""
+    matrices = [_matrix(path, where) for path in (stiffness, mass)]
+    found = _table(unknowns, where)
+    for path, matrix in zip((stiffness, mass), matrices, strict=True):
+        if matrix.shape != (len(found.node),) * 2:
+            raise InputError(
+                where, f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' {len(found.node)} lines"
+            )
+    return Contents(matrices[0], matrices[1], found, {})
+
+
+def _matrix(path: Path, where: str) -> sp.coo_array:
+    try:
+        return sp.coo_array(scipy.io.mmread(path))
+    except (OSError, ValueError) as error:
+        raise InputError(where, f"'{path.name}' is no MatrixMarket file: {error}") from None
+
+
+def _table(path: Path, where: str) -> Table:
+    try:
+        with path.open(newline="") as file:
+            rows = list(csv.DictReader(file, skipinitialspace=True))
+        node = np.array([int(row["node"]) for row in rows])
+        position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
+        component = np.array([COMPONENTS.index(row["component"].strip()) for row in rows])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
+        raise InputError(where, f"'{path.name}' is no table of unknowns: {error}", hint) from None
+    return Table(node, component, position.reshape(-1, 3))

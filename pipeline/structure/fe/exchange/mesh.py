@@ -1,0 +1,120 @@
+"""Stage 1 of a body given by matrices: checked, in SI units, with its frames."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import xarray as xr
+
+from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.artifacts.schema import MATRICES, conform
+from pipeline.core.errors import InputError
+from pipeline.structure.fe.exchange import files
+from pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
+from pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
+from pipeline.structure.fe.recipe import sources
+
+#: length [m], mass [kg] and time [s] of each consistent system
+SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
+#: asymmetry of a matrix, relative to its largest entry, that is taken for rounding of the file
+SYMMETRIC = 1e-9
+
+
+def build(recipe: MatricesRecipe, folder: Path, place: str) -> xr.Dataset:
+    """The dataset (schema MATRICES); InputError for files that do not fit together.
+
+    folder: what the recipe's files are relative to.  place: how messages call the recipe.
+    """
+    where = f"{place} [shape]"
+    contents = _read(recipe.shape, folder, where)
+    stiffness, mass, position = _in_si(contents, recipe.shape.units, where)
+    data: dict[str, Any] = {
+        "unknown_node": (("unknown",), contents.table.node),
+        "unknown_component": (("unknown",), np.array(COMPONENTS)[contents.table.component]),
+        "unknown_position": (("unknown", "axis"), position),
+    }
+    for name, matrix in (("stiffness", stiffness), ("mass", mass)):
+        entries = sp.coo_array(_symmetric(matrix, name, where))
+        for part, values in (("row", entries.row), ("column", entries.col), ("value", entries.data)):
+            data[f"{name}_{part}"] = ((f"{name}_entry",), values)
+    data |= {name: (MATRICES[name].dims, values) for name, values in contents.moments.items() if name in MATRICES}
+    data |= _frames(recipe, contents.table, position, place)
+    return conform(
+        xr.Dataset(data),
+        MATRICES,
+        title=recipe.title,
+        body_kind="matrices",
+        section="matrices",
+        inertia_section="matrices",
+        interfaces=" ".join(recipe.interfaces),
+        source=sources(recipe),
+    )
+
+
+def _read(shape: Matrices, folder: Path, where: str) -> Contents:
+    if shape.file is not None:
+        return files.read_npz(folder / shape.file, where)
+    stiffness, mass, unknowns = (folder / str(name) for name in (shape.stiffness, shape.mass, shape.unknowns))
+    return files.read_matrix_market(stiffness, mass, unknowns, where)
+
+
+def _in_si(contents: Contents, system: str, where: str) -> tuple[sp.csr_array, sp.csr_array, np.ndarray]:
+    length, mass, time = SYSTEMS[system]
+    if system != "m-kg-s" and (contents.moments or np.any(contents.table.component == COMPONENTS.index("internal"))):
+        raise InputError(where, "internal unknowns and integrals have no units of their own", 'units = "m-kg-s"')
+    energy = mass * length**2 / time**2
+    # u = S u' makes K = e S^-1 K' S^-1, and M the same times the square of the unit of time
+    per_unit = sp.diags_array(np.where(contents.table.component < 3, 1.0 / length, 1.0))
+    K, M = (sp.csr_array(per_unit @ matrix @ per_unit) for matrix in (contents.stiffness, contents.mass))
+    return sp.csr_array(energy * K), sp.csr_array(energy * time**2 * M), length * contents.table.position
+
+
+def _symmetric(matrix: sp.csr_array, name: str, where: str) -> sp.csr_array:
+    if matrix.nnz == 0 or not np.isfinite(matrix.data).all():
+        raise InputError(where, f"the {name} matrix is empty or has entries that are not finite")
+    away = abs(matrix - matrix.T).max() / abs(matrix).max()
+    if away > SYMMETRIC:
+        raise InputError(where, f"the {name} matrix is not symmetric: entries differ by {away:.2g} of the largest")
+    return sp.csr_array(0.5 * (matrix + matrix.T))
+
+
+def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, place: str) -> dict[str, Any]:
+    nodes, frames, origins, rotations = [], [], [], []
+    for k, (name, frame) in enumerate(recipe.frames.items()):
+        chosen = frame.nodes or (frame.node,)
+        where = f"{place} [frames.{name}]"
+        missing = [node for node in chosen if not np.any(table.node == node)]
+        if missing:
+            raise InputError(where, f"there is no node {missing[0]}", "use numbers from the table of unknowns")
+        if frame.node is not None:
+            own = set(table.component[table.node == frame.node].tolist())
+            if not own >= set(range(6)):
+                lacks = ", ".join(COMPONENTS[c] for c in sorted(set(range(6)) - own))
+                raise InputError(where, f"node {frame.node} has no {lacks}", "tie the frame to the mean of `nodes`")
+        elif len(chosen) < 3:
+            raise InputError(where, f"{len(chosen)} nodes cannot carry a frame's rotation", "name at least three")
+        nodes += list(chosen)
+        frames += [k] * len(chosen)
+        origins.append(np.mean([position[table.node == node][0] for node in chosen], axis=0))
+        rotations.append(quaternion_to_matrix(frame.orientation().as_quaternion()))
+    return {
+        "frame": (("frame",), list(recipe.frames)),
+        "frame_position": (("frame", "axis"), np.array(origins)),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array(rotations)),
+        "tie_node": (("tie",), np.array(nodes)),
+        "tie_frame": (("tie",), np.array(frames)),
+    }
+
+
+def write_vtu(mesh: xr.Dataset, path: Path) -> None:
+    """Write the nodes as points of a VTU file."""
+    import meshio  # slow to import and needed by this function alone
+
+    _, first = np.unique(mesh["unknown_node"].values, return_index=True)
+    points = mesh["unknown_position"].values[first]
+    cells = [("vertex", np.arange(len(points))[:, None])]
+    node = {"node": mesh["unknown_node"].values[first]}
+    meshio.Mesh(points, cells, point_data=node).write(path, file_format="vtu")

@@ -1,0 +1,179 @@
+"""Matrices of another code as a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph
+import xarray as xr
+
+from pipeline.core.algebra import skew
+from pipeline.core.errors import InputError, SolverError
+from pipeline.structure.fe.exchange.files import COMPONENTS
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model
+from pipeline.structure.fe.solid import ties
+from pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
+from pipeline.structure.sparse.multifrontal import cholesky
+
+WHERE = "mesh recipe [shape]"
+#: blocks of the mass matrix for x, y and z that differ by less, relative to the largest entry, are the same
+ALIKE = 1e-9
+#: strain forces of a rigid motion, relative to the largest term that they are a sum of
+UNSTRAINED = 1e-6
+
+
+def assemble(mesh: xr.Dataset) -> Model:
+    """The model of a dataset (schema MATRICES); InputError when the matrices are not those of a free body."""
+    component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
+    place, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
+    K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
+    rigid = _rigid(place, component)
+    _check(K, M, rigid, place)
+    interfaces = _interfaces(mesh, component)
+    names = mesh.attrs["interfaces"].split()
+    return Model(
+        stiffness=K,
+        mass=M,
+        rigid=rigid,
+        place=place,
+        interfaces=interfaces,
+        ends=tuple(frame for name in names[:2] for frame in interfaces if frame.name == name),
+        integrate=_integrate(mesh, M, component),
+        families=_families(place, component),
+        drawn=_drawn(mesh, component),
+    )
+
+
+def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
+    row, column, value = (mesh[f"{name}_{part}"].values for part in ("row", "column", "value"))
+    return sp.csr_array(sp.coo_array((value, (row, column)), shape=(n, n)))
+
+
+def _rigid(place: np.ndarray, component: np.ndarray) -> np.ndarray:
+    motion = np.zeros((len(place), 7, 6))
+    motion[:, range(6), range(6)] = 1.0
+    motion[:, :3, 3:] = -skew(place)
+    return motion[np.arange(len(place)), component]
+
+
+def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarray) -> None:
+    left = np.abs(K @ rigid).max(axis=0) / (abs(K) @ np.abs(rigid)).max(axis=0)
+    if left.max() > UNSTRAINED:
+        worst = COMPONENTS[int(np.argmax(left))]
+        raise InputError(
+            WHERE,
+            f"a rigid motion along {worst} strains the body ({left.max():.2g} of the largest term)",
+            "export the free body, without supports; check the units and the table of unknowns",
+        )
+    # unknowns of one node belong together, even where axial, bending and torsion are independent of each other
+    _, node = np.unique(place, axis=0, return_inverse=True)
+    linked = sp.coo_array(K)
+    pairs = (np.ones(linked.nnz), (node.ravel()[linked.row], node.ravel()[linked.col]))
+    pieces, _ = scipy.sparse.csgraph.connected_components(sp.coo_array(pairs).tocsr(), directed=False)
+    if pieces > 1:
+        raise InputError(
+            WHERE,
+            f"the stiffness matrix falls into parts: {pieces} of them share no node",
+            "make each a body of its own",
+        )
+    try:
+        cholesky(M, place)
+    except SolverError:
+        raise InputError(WHERE, "the mass matrix is not positive definite", "give every unknown a mass") from None
+
+
+def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Callable[[np.ndarray], Integrals]:
+    if "pair_value" in mesh:
+        return partial(_from_moments, mesh)
+    node = mesh["unknown_node"].values
+    rows = [np.flatnonzero(component == k) for k in range(3)]
+    rows = [row[np.argsort(node[row], kind="stable")] for row in rows]
+    same = sum(len(row) for row in rows) == len(node) and all(np.array_equal(node[rows[0]], node[row]) for row in rows)
+    if same:
+        line = sp.csr_array(M[rows[0]][:, rows[0]])
+        alike = ALIKE * abs(line).max()
+        blocks = [(k, l, M[rows[k]][:, rows[l]]) for k in range(3) for l in range(3)]
+        same = all(abs(block - line if k == l else block).max() <= alike for k, l, block in blocks)
+    if not same:
+        raise InputError(
+            WHERE,
+            "the mass matrix differs for motion along x, y and z, so that it does not tell the volume integrals",
+            "use nodes with three displacements and a consistent or lumped mass, or an npz with the integrals",
+        )
+    order = np.stack(rows, axis=1).ravel()
+    spread = sp.csr_array(sp.eye_array(len(node), format="csr")[order])
+    return partial(integrals, line, mesh["unknown_position"].values[rows[0]], spread)
+
+
+def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
+    n, count = mesh.sizes["unknown"], vectors.shape[1]
+    pair = np.empty((3, 3, count, count))
+    axes, row, column, value = (mesh[f"pair_{name}"].values for name in ("axes", "row", "column", "value"))
+    for k in range(3):
+        for l in range(k, 3):
+            at = axes == 3 * k + l
+            matrix = sp.csr_array(sp.coo_array((value[at], (row[at], column[at])), shape=(n, n)))
+            pair[k, l] = vectors.T @ (matrix @ vectors)
+            pair[l, k] = pair[k, l].T
+    return Integrals(
+        mass=float(mesh["body_mass"]),
+        first_moment=mesh["first_moment"].values,
+        second_moment=mesh["second_moment"].values,
+        modal_first_moment=mesh["unknown_first_moment"].values @ vectors,
+        position_mode_moment=mesh["unknown_position_moment"].values @ vectors,
+        mode_mode_moment=pair,
+    )
+
+
+def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...]:
+    n, node, place = mesh.sizes["unknown"], mesh["unknown_node"].values, mesh["unknown_position"].values
+    found = []
+    for k, name in enumerate(mesh["frame"].values):
+        tied = mesh["tie_node"].values[mesh["tie_frame"].values == k]
+        rows = np.array([[_unknown(node, component, t, c, str(name)) for c in range(3)] for t in tied])
+        if len(tied) == 1:
+            turns = [_unknown(node, component, tied[0], c, str(name)) for c in range(3, 6)]
+            motion = sp.csr_array((np.ones(6), (np.arange(6), [*rows[0], *turns])), shape=(6, n))
+        else:
+            x = place[rows[:, 0]]
+            average = ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x))
+            pick = sp.csr_array((np.ones(rows.size), (np.arange(rows.size), rows.ravel())), shape=(rows.size, n))
+            motion = sp.csr_array(average @ pick)
+        position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
+        found.append(Interface(str(name), position, rotation, motion))
+    return tuple(found)
+
+
+def _unknown(node: np.ndarray, component: np.ndarray, number: int, wanted: int, frame: str) -> int:
+    found = np.flatnonzero((node == number) & (component == wanted))
+    if len(found) != 1:
+        raise InputError(
+            f"mesh recipe [frames.{frame}]", f"node {number} has {len(found)} unknowns {COMPONENTS[wanted]}"
+        )
+    return int(found[0])
+
+
+def _families(place: np.ndarray, component: np.ndarray) -> Families:
+    member = np.zeros(len(place), dtype=np.int64)
+    for rank, name in enumerate(FAMILIES):
+        member[np.isin(component, MEMBER[name])] = rank
+    main = tuple(np.flatnonzero(component == MEMBER[name][0]) for name in FAMILIES)
+    extent = np.ptp(place, axis=0)
+    along = place[:, int(np.argmax(extent))]
+    local = sp.eye_array(len(place), format="csr")
+    return Families(FAMILIES, sp.csr_array(local), member, main, (along - along.min()) / extent.max())
+
+
+def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:
+    """Nodes as points; a component that a node does not have is drawn at rest."""
+    numbers, first, index = np.unique(mesh["unknown_node"].values, return_index=True, return_inverse=True)
+    n, count = mesh.sizes["unknown"], len(numbers)
+    maps = []
+    for start in (0, 3):
+        own = np.flatnonzero((component >= start) & (component < start + 3))
+        rows = 3 * index.ravel()[own] + component[own] - start
+        maps.append(sp.csr_array((np.ones(own.size), (rows, own)), shape=(3 * count, n)))
+    return Drawn(mesh["unknown_position"].values[first], np.arange(count)[:, None], np.zeros(count), maps[0], maps[1])

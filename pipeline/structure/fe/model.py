@@ -1,0 +1,111 @@
+"""What reference conditions, reductions and inertia integrals need of a finite element model, beam or solid."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+#: directions of a frame's motion, in the order of every six
+DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
+
+
+@dataclass(frozen=True)
+class Interface:
+    """A named frame of the body and its motion as six functionals of the model's vector.
+
+    position: origin, mesh frame [m], shape (3,).  rotation: R_MF, frame to mesh axes, shape (3, 3).
+    motion: translation and rotation vector in mesh axes, shape (6, ndof). A frame with degrees of freedom of its own
+    (beam node, RBE2) has one entry per row; a weighted mean (RBE3) has many.
+    """
+
+    name: str
+    position: np.ndarray
+    rotation: np.ndarray
+    motion: sp.csr_array
+
+
+@dataclass(frozen=True)
+class Integrals:
+    """Volume integrals over the undeformed body; axes of the mesh frame, n vectors."""
+
+    mass: float  #: [kg]
+    first_moment: np.ndarray  #: int rho X [kg m], shape (3,)
+    second_moment: np.ndarray  #: int rho X X^T [kg m^2], shape (3, 3)
+    modal_first_moment: np.ndarray  #: int rho S, shape (3, n)
+    position_mode_moment: np.ndarray  #: int rho X_k S_lj, shape (3, 3, n)
+    mode_mode_moment: np.ndarray  #: int rho S_ki S_lj, shape (3, 3, n, n)
+
+
+@dataclass(frozen=True)
+class Families:
+    """How modes are told apart, named and signed.
+
+    names: families in the order that they take within a cluster of equal frequencies.
+    local: the model's vector to components along the body's own axes, orthogonal, shape (ndof, ndof).
+    member: family of each local component, index into names, shape (ndof,).
+    main: local components that decide a mode's sign, by family, in node order.
+    along: place of each local component along the body, 0 at its start, 1 at its end, shape (ndof,).
+    """
+
+    names: tuple[str, ...]
+    local: sp.csr_array
+    member: np.ndarray
+    main: tuple[np.ndarray, ...]
+    along: np.ndarray
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """What is drawn of the body: nodes, cells of one kind, and their motion.
+
+    position: [m], shape (nodes, 3).  cell: shape (cells, corners).  radius: of line cells [m], else zero, (cells,).
+    translation, rotation: shape (3 nodes, ndof), node by node.
+    """
+
+    position: np.ndarray
+    cell: np.ndarray
+    radius: np.ndarray
+    translation: sp.csr_array
+    rotation: sp.csr_array
+
+
+@dataclass(frozen=True)
+class Model:
+    """A free body: stiffness [N/m ...] and mass [kg ...] of its degrees of freedom, both (ndof, ndof).
+
+    rigid: three translations, three rotations about the mesh origin, shape (ndof, 6).
+    place: where each degree of freedom belongs [m], shape (ndof, 3).
+    interfaces: every named frame.  ends: the two ends that a fixed-fixed condition clamps.
+    integrate: volume integrals of vectors, shape (ndof, n); exact but for rounding.
+    """
+
+    stiffness: sp.csr_array
+    mass: sp.csr_array
+    rigid: np.ndarray
+    place: np.ndarray
+    interfaces: tuple[Interface, ...]
+    ends: tuple[Interface, ...]
+    integrate: Callable[[np.ndarray], Integrals]
+    families: Families
+    drawn: Drawn
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom."""
+        return self.mass.shape[0]
+
+
+def rows(interfaces: tuple[Interface, ...], size: int) -> sp.csr_array:
+    """Motions of several frames on top of each other, shape (6 frames, size)."""
+    if not interfaces:
+        return sp.csr_array((0, size))
+    return sp.csr_array(sp.vstack([frame.motion for frame in interfaces], format="csr"))
+
+
+def own_dofs(held: sp.csr_array) -> np.ndarray | None:
+    """The degrees of freedom that functionals select, one each; None when some functional mixes several."""
+    single = np.all(np.diff(held.indptr) == 1) and np.unique(held.indices).size == held.shape[0]
+    return held.indices.astype(np.int64) if single else None

@@ -1,0 +1,160 @@
+"""Cross sections as a recipe says them, and the constants that they give."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from pipeline.core.scene.fields import Area, Length, Number, Part, SecondMoment
+from pipeline.structure.fe import section as sections
+from pipeline.structure.fe.section import Section, Value
+
+Positive = Field(gt=0.0)
+
+
+def _pair(value: Any) -> Any:
+    """One number for both axes, or one along y and one along z."""
+    return value if isinstance(value, (list, tuple)) else (value, value)
+
+
+def _shares(value: tuple[float, float]) -> tuple[float, float]:
+    if not all(0.0 < kappa <= 1.0 for kappa in value):
+        raise ValueError(f"a shear coefficient is a share of the area, above 0 and at most 1, not {list(value)}")
+    return value
+
+
+ShearCoefficient = Annotated[tuple[Number, Number], BeforeValidator(_pair), AfterValidator(_shares)]
+
+
+class CircleSection(Part):
+    """Full circle.  shear_coefficient: kappa instead of Cowper's (1966)."""
+
+    type: Literal["circle"]
+    radius: Annotated[Length, Positive]
+    shear_coefficient: ShearCoefficient | None = None
+
+
+class TubeSection(Part):
+    """Circular tube; `inner_radius` is that of the hole."""
+
+    type: Literal["tube"]
+    radius: Annotated[Length, Positive]
+    inner_radius: Annotated[Length, Positive]
+    shear_coefficient: ShearCoefficient | None = None
+
+    @model_validator(mode="after")
+    def _has_a_wall(self) -> TubeSection:
+        if not self.inner_radius < self.radius:
+            raise ValueError(
+                f"the hole's radius {self.inner_radius:g} m leaves no wall inside the radius {self.radius:g} m"
+            )
+        return self
+
+
+class RectangleSection(Part):
+    """Full rectangle, `width` along y and `height` along z of the rod."""
+
+    type: Literal["rectangle"]
+    width: Annotated[Length, Positive]
+    height: Annotated[Length, Positive]
+    shear_coefficient: ShearCoefficient | None = None
+
+
+class GeneralSection(Part):
+    """Any section by its constants about the centroid, which is its shear centre too.
+
+    second_y: int z^2 dA.  second_z: int y^2 dA.  product: int y z dA.  torsion: St. Venant's J.
+    inertia: polar and bending second moments of the mass [about x, y, z], where they are not those of the area.
+    shear_coefficient: kappa, one number or [along y, along z]; needed by Timoshenko beams only.
+    """
+
+    type: Literal["general"]
+    area: Annotated[Area, Positive]
+    torsion: Annotated[SecondMoment, Positive]
+    second_y: Annotated[SecondMoment, Positive]
+    second_z: Annotated[SecondMoment, Positive]
+    product: SecondMoment = 0.0
+    inertia: tuple[Annotated[SecondMoment, Positive], SecondMoment, SecondMoment] | None = None
+    shear_coefficient: ShearCoefficient | None = None
+
+    @model_validator(mode="after")
+    def _moments_are_of_an_area(self) -> GeneralSection:
+        if not self.product**2 < self.second_y * self.second_z:
+            raise ValueError(
+                f"product = {self.product:g} m^4: its square is below second_y second_z = "
+                f"{self.second_y * self.second_z:g} m^8 for every area"
+            )
+        if self.inertia is not None and min(self.inertia) < 0.0:
+            raise ValueError(f"inertia = {list(self.inertia)} m^4: second moments of a mass are not negative")
+        return self
+
+
+class EqualAreaSquare(Part):
+    """The square with the area of the stiffness section; lends its second moments to the mass only."""
+
+    type: Literal["equal-area-square"]
+
+
+StiffnessSection = Annotated[
+    CircleSection | TubeSection | RectangleSection | GeneralSection, Field(discriminator="type")
+]
+InertiaSection = Annotated[
+    CircleSection | TubeSection | RectangleSection | GeneralSection | EqualAreaSquare, Field(discriminator="type")
+]
+
+#: names by which a section's model is chosen
+TYPES = ("circle", "tube", "rectangle", "general", "equal-area-square")
+#: lengths that a linear taper changes
+DIMENSIONS: dict[str, tuple[str, ...]] = {
+    "circle": ("radius",),
+    "tube": ("radius", "inner_radius"),
+    "rectangle": ("width", "height"),
+}
+
+
+def constants(start: Any, end: Any | None, s: Value) -> Section:
+    """Section constants at the share s of a span from the section `start` to the section `end` (None: no taper)."""
+    if start.type == "general":
+        return Section(start.area, start.torsion, start.second_y, start.second_z, start.product)
+    return getattr(sections, start.type)(*_dimensions(start, end, s))
+
+
+def inertia(start: Any, end: Any | None, given: Any | None, s: Value) -> tuple[Value, Value, Value, Value]:
+    """Second moments of the mass: polar, about y, about z, product [m^4].
+
+    given: the inertia section where it is not the one of the stiffness; it does not taper, but the square
+    of equal area does with its area.
+    """
+    if given is not None and given.type == "equal-area-square":
+        found = sections.square(constants(start, end, s).area ** 0.5)
+    elif given is not None:
+        return inertia(given, None, None, s)
+    else:
+        found = constants(start, end, s)
+    if start.type == "general" and start.inertia is not None and given is None:
+        # given apart, about the axes of the section
+        return (*start.inertia, 0.0)
+    return found.polar, found.second_y, found.second_z, found.product
+
+
+def shear_coefficient(start: Any, end: Any | None, s: Value, poisson: float) -> tuple[Value, Value] | None:
+    """Kappa along y and z, None where nobody says it."""
+    if start.shear_coefficient is not None or start.type == "general":
+        return start.shear_coefficient
+    if start.type == "tube":
+        outer, inner = _dimensions(start, end, s)
+        kappa: Value = sections.tube_shear_coefficient(poisson, inner / outer)
+    elif start.type == "circle":
+        kappa = sections.circle_shear_coefficient(poisson)
+    else:
+        kappa = sections.rectangle_shear_coefficient(poisson)
+    return kappa, kappa
+
+
+def _dimensions(start: Any, end: Any | None, s: Value) -> list[Value]:
+    names = DIMENSIONS[start.type]
+    if end is None:
+        return [getattr(start, name) for name in names]
+    return [getattr(start, name) * (1.0 - np.asarray(s)) + getattr(end, name) * np.asarray(s) for name in names]

@@ -1,0 +1,115 @@
+"""Solid elements: nodes as VTK and meshio number them, shape functions and quadrature from scikit-fem."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from skfem import ElementHex1, ElementHex2, ElementHexS2, ElementTetP1, ElementTetP2
+from skfem.quadrature import get_quadrature
+from skfem.refdom import RefQuad, RefTri
+
+HEX_CORNERS = np.array(
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]], dtype=float
+)
+HEX_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
+#: corners of each face, seen from outside anticlockwise; faces at x = 0, 1, y = 0, 1, z = 0, 1
+HEX_FACES = ((0, 4, 7, 3), (1, 2, 6, 5), (0, 1, 5, 4), (3, 7, 6, 2), (0, 3, 2, 1), (4, 5, 6, 7))
+TET_CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+TET_EDGES = ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3))
+TET_FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
+
+
+@dataclass(frozen=True)
+class Element:
+    """One type of cell.
+
+    cell: meshio's name.  local: places of its nodes in the reference cell, shape (nodes, 3).
+    faces: corner nodes of each face.  between: corners whose mean is near a node that is no corner, by node.
+    stiffness_order, mass_order: degrees that the quadrature integrates; the mass of cells with curved sides is exact.
+    """
+
+    cell: str
+    basis: Any
+    local: np.ndarray
+    faces: tuple[tuple[int, ...], ...]
+    between: dict[int, tuple[int, ...]]
+    stiffness_order: int
+    mass_order: int
+
+    @property
+    def face_nodes(self) -> np.ndarray:
+        """All nodes of each face, corners first, shape (faces, nodes)."""
+        inner = [[node for node, part in self.between.items() if set(part) <= set(face)] for face in self.faces]
+        return np.array([[*face, *nodes] for face, nodes in zip(self.faces, inner, strict=True)])
+
+    @property
+    def corners(self) -> int:
+        """Number of corner nodes, which come first."""
+        return len(self.local) - len(self.between)
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Shape functions at quadrature points: values (q, nodes), gradients (q, nodes, 3), weights (q,)."""
+
+    value: np.ndarray
+    gradient: np.ndarray
+    weight: np.ndarray
+
+
+def _element(
+    cell: str,
+    basis: Any,
+    corners: np.ndarray,
+    faces: tuple[tuple[int, ...], ...],
+    inner: tuple[tuple[int, ...], ...],
+    orders: tuple[int, int],
+) -> Element:
+    between = {len(corners) + k: part for k, part in enumerate(inner)}
+    local = np.vstack([corners, *(corners[list(part)].mean(axis=0) for part in inner)])
+    return Element(cell, basis, local, faces, between, *orders)
+
+
+#: by the recipe's name
+ELEMENTS = {
+    "hex8": _element("hexahedron", ElementHex1(), HEX_CORNERS, HEX_FACES, (), (3, 5)),
+    "hex20": _element("hexahedron20", ElementHexS2(), HEX_CORNERS, HEX_FACES, HEX_EDGES, (5, 9)),
+    "hex27": _element(
+        "hexahedron27", ElementHex2(), HEX_CORNERS, HEX_FACES, (*HEX_EDGES, *HEX_FACES, tuple(range(8))), (5, 9)
+    ),
+    "tet4": _element("tetra", ElementTetP1(), TET_CORNERS, TET_FACES, (), (1, 2)),
+    "tet10": _element("tetra10", ElementTetP2(), TET_CORNERS, TET_FACES, TET_EDGES, (5, 7)),
+}
+
+
+@cache
+def sampled(name: str, order: int) -> Sampled:
+    """Shape functions of an element at the points of a quadrature of this order."""
+    element = ELEMENTS[name]
+    points, weight = get_quadrature(element.basis.refdom, order)
+    return Sampled(*shape_functions(name, points), weight)
+
+
+@cache
+def on_face(name: str, face: int) -> tuple[Sampled, np.ndarray]:
+    """Shape functions of an element at quadrature points of one of its faces, and the face's two directions (2, 3)."""
+    element = ELEMENTS[name]
+    corners = element.local[list(element.faces[face])]
+    directions = np.array([corners[1] - corners[0], corners[-1] - corners[0]])
+    points, weight = get_quadrature(RefQuad if len(corners) == 4 else RefTri, element.mass_order)
+    return Sampled(*shape_functions(name, (corners[0] + points.T @ directions).T), weight), directions
+
+
+def shape_functions(name: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Values (q, nodes) and gradients (q, nodes, 3) at points of the reference cell, shape (3, q)."""
+    element = ELEMENTS[name]
+    places = np.asarray(element.basis.doflocs)
+    # scikit-fem's order to VTK's
+    found = [int(np.argmin(np.abs(places - place).sum(axis=1))) for place in element.local]
+    pairs = [element.basis.lbasis(points, i) for i in found]
+    value = np.stack([np.broadcast_to(phi, points.shape[1:]) for phi, _ in pairs], axis=1)
+    gradient = np.stack([np.broadcast_to(slope, points.shape).T for _, slope in pairs], axis=1)
+    return value, gradient

@@ -1,0 +1,101 @@
+"""A mesh of one element type with named regions, whatever it came from; its boundary; its faults."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.csgraph
+
+from pipeline.core.errors import InputError
+from pipeline.structure.fe.solid import lattice
+from pipeline.structure.fe.solid.elasticity import check_cells
+from pipeline.structure.fe.solid.elements import ELEMENTS
+from pipeline.structure.fe.solid.recipe import Block, Cylinder
+
+#: a node that is no corner lies this near to the mean of its corners, as a share of the cell's size
+ASTRAY = 0.3
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Nodes [m] (n, 3), cells (c, nodes of the element), and regions by name: of nodes, and of cells."""
+
+    element: str
+    nodes: np.ndarray
+    cells: np.ndarray
+    node_regions: dict[str, np.ndarray]
+    cell_regions: dict[str, np.ndarray]
+
+
+def made(shape: Cylinder | Block) -> Geometry:
+    """The mesh of a shape that is made here."""
+    if isinstance(shape, Cylinder):
+        n = shape.cells
+        nodes, cells = lattice.cylinder(shape.radius, shape.length, n.along, n.across, n.rings)
+        length = shape.length
+    else:
+        nodes, cells = lattice.block(shape.size, shape.cells)
+        length = shape.size[0]
+    nodes, cells = lattice.cut(nodes, cells, shape.element)
+    x = nodes[:, 0]
+    bare = Geometry(shape.element, nodes, cells, {}, {"body": np.arange(len(cells))})
+    start, end = (np.flatnonzero(np.abs(x - place) < 1e-9 * length) for place in (0.0, length))
+    faces = face_nodes(bare, *boundary(bare))
+    # faces of the mantle have nodes at different x
+    mantle = np.unique(faces[np.ptp(x[faces], axis=1) > 1e-9 * length])
+    regions = {"start": start, "end": end, "side": mantle}
+    return Geometry(shape.element, nodes, cells, regions, bare.cell_regions)
+
+
+def boundary(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
+    """Cell and number of the face, for each face that belongs to one cell only."""
+    faces = np.array(ELEMENTS[geometry.element].faces)
+    corners = np.sort(geometry.cells[:, faces], axis=2).reshape(-1, faces.shape[1])
+    _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
+    return np.divmod(np.sort(first[count == 1]), len(faces))
+
+
+def face_nodes(geometry: Geometry, cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """All nodes of the faces, corners first, shape (faces, nodes)."""
+    return np.take_along_axis(geometry.cells[cells], ELEMENTS[geometry.element].face_nodes[faces], axis=1)
+
+
+def boundary_nodes(geometry: Geometry) -> np.ndarray:
+    """All nodes on the boundary, ascending."""
+    return np.unique(face_nodes(geometry, *boundary(geometry)))
+
+
+def check(geometry: Geometry, where: str) -> None:
+    """InputError for cells that are inverted or oddly numbered, and for a body in several pieces."""
+    _check_numbering(geometry, where)
+    check_cells(geometry.element, geometry.nodes, geometry.cells, where)
+    n, a = len(geometry.nodes), geometry.cells.shape[1]
+    rows = np.repeat(geometry.cells[:, 0], a)
+    graph = sp.csr_array((np.ones(rows.size, dtype=np.int8), (rows, geometry.cells.ravel())), shape=(n, n))
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    if count > 1:
+        sizes = np.sort(np.bincount(label[geometry.cells[:, 0]]))[::-1]
+        shown = ", ".join(str(k) for k in sizes[:5])
+        raise InputError(
+            where,
+            f"the mesh is in {count} pieces that share no node (of {shown} cells)",
+            "merge the nodes where the pieces touch, or make each a body of its own",
+        )
+
+
+def _check_numbering(geometry: Geometry, where: str) -> None:
+    element = ELEMENTS[geometry.element]
+    X = geometry.nodes[geometry.cells]
+    size = np.linalg.norm(np.ptp(X, axis=1), axis=1)
+    for node, part in element.between.items():
+        away = np.linalg.norm(X[:, node] - X[:, list(part)].mean(axis=1), axis=1)
+        wrong = np.flatnonzero(away > ASTRAY * size)
+        if wrong.size:
+            raise InputError(
+                where,
+                f"node {node + 1} of cell {wrong[0]} is far from the middle of its corners: "
+                f"the nodes of a {element.cell} are not in the order of VTK",
+                "write the mesh with meshio's or VTK's node order",
+            )

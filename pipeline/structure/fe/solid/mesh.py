@@ -1,0 +1,119 @@
+"""Stage 1 of solids: nodes, cells, materials and tied frames from a recipe."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.artifacts.schema import SOLID, conform
+from pipeline.core.errors import InputError
+from pipeline.structure.fe.recipe import sources
+from pipeline.structure.fe.solid import geometry as geometries
+from pipeline.structure.fe.solid import imported, ties
+from pipeline.structure.fe.solid.elements import ELEMENTS
+from pipeline.structure.fe.solid.geometry import Geometry
+from pipeline.structure.fe.solid.recipe import MeshFile, SolidRecipe
+
+
+def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
+    """The mesh dataset (schema SOLID); InputError for meshes and frames that cannot be meant.
+
+    folder: what the recipe's files are relative to.  place: how messages call the recipe.
+    """
+    where = f"{place} [shape]"
+    shape = recipe.shape
+    geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.made(shape)
+    geometries.check(geometry, where)
+    names, region = _materials(recipe, geometry, place)
+    materials = [recipe.materials.get(name) or recipe.material for name in names]
+    data: dict[str, Any] = {
+        "node_position": (("node", "axis"), geometry.nodes),
+        "cell": (("cell", "corner"), geometry.cells),
+        "cell_region": (("cell",), region),
+        "region": (("region",), names),
+    }
+    for name in ("youngs_modulus", "poisson", "density"):
+        data[name] = (("region",), np.array([getattr(material, name) for material in materials]))
+    data |= _frames(recipe, geometry, place)
+    return conform(
+        xr.Dataset(data),
+        SOLID,
+        title=recipe.title,
+        body_kind="solid",
+        element=geometry.element,
+        section="solid",
+        inertia_section="solid",
+        interfaces=" ".join(recipe.interfaces),
+        source=sources(recipe),
+    )
+
+
+def _materials(recipe: SolidRecipe, geometry: Geometry, place: str) -> tuple[list[str], np.ndarray]:
+    """Names of the regions with a material, and the region of each cell."""
+    if recipe.material is not None:
+        return ["body"], np.zeros(len(geometry.cells), dtype=np.int64)
+    names = list(recipe.materials)
+    region = np.full(len(geometry.cells), -1, dtype=np.int64)
+    for k, name in enumerate(names):
+        where = f"{place} [materials.{name}]"
+        if name not in geometry.cell_regions:
+            known = ", ".join(sorted(geometry.cell_regions)) or "none"
+            raise InputError(where, f"no region of solid cells is called '{name}'", f"known: {known}")
+        cells = geometry.cell_regions[name]
+        if np.any(region[cells] >= 0):
+            other = names[int(region[cells].max())]
+            raise InputError(where, f"the regions '{other}' and '{name}' share cells", "give each cell one material")
+        region[cells] = k
+    bare = int(np.count_nonzero(region < 0))
+    if bare:
+        raise InputError(f"{place} [materials]", f"{bare} of {len(region)} cells belong to none of {names}", "add them")
+    return names, region
+
+
+def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, Any]:
+    found: dict[str, list[Any]] = {name: [] for name in ("node", "weight", "frame", "position", "rotation")}
+    taken = np.full(len(geometry.nodes), -1, dtype=np.int64)
+    names = list(recipe.frames)
+    for k, (name, frame) in enumerate(recipe.frames.items()):
+        where = f"{place} [frames.{name}.on]"
+        nodes = ties.chosen(geometry, frame.on, where)
+        x, weight = geometry.nodes[nodes], ties.areas(geometry, nodes)
+        ties.check_rank(frame, x, where)
+        if frame.tie == "rigid":
+            other = taken[nodes].max()
+            if other >= 0:
+                raise InputError(
+                    where, f"'{names[other]}' and '{name}' tie the same nodes rigidly", "make one of them a mean tie"
+                )
+            taken[nodes] = k
+        found["node"].append(nodes)
+        found["weight"].append(weight)
+        found["frame"].append(np.full(len(nodes), k))
+        found["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
+        found["rotation"].append(quaternion_to_matrix(frame.orientation().as_quaternion()))
+    return {
+        "frame": (("frame",), names),
+        "frame_tie": (("frame",), [frame.tie for frame in recipe.frames.values()]),
+        "frame_position": (("frame", "axis"), np.array(found["position"])),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array(found["rotation"])),
+        "tie_node": (("tie",), np.concatenate(found["node"])),
+        "tie_weight": (("tie",), np.concatenate(found["weight"])),
+        "tie_frame": (("tie",), np.concatenate(found["frame"])),
+    }
+
+
+def write_vtu(mesh: xr.Dataset, path: Path) -> None:
+    """Write the solid as a VTU file that ParaView and meshio open."""
+    import meshio  # slow to import and needed by this function alone
+
+    cell = ELEMENTS[mesh.attrs["element"]].cell
+    region = mesh["cell_region"].values
+    data = {name: [mesh[name].values[region]] for name in ("youngs_modulus", "poisson", "density")}
+    cells = [(cell, mesh["cell"].values)]
+    meshio.Mesh(mesh["node_position"].values, cells, cell_data=data | {"region": [region]}).write(
+        path, file_format="vtu"
+    )

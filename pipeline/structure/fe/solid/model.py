@@ -1,0 +1,175 @@
+"""Solids as models: displacements of the nodes, and six degrees of freedom of each frame that is tied rigidly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import scipy.sparse as sp
+import xarray as xr
+
+from pipeline.core.algebra import skew
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model
+from pipeline.structure.fe.solid import elasticity, ties
+from pipeline.structure.fe.solid.elasticity import Solid
+from pipeline.structure.fe.solid.elements import ELEMENTS
+from pipeline.structure.fe.solid.geometry import Geometry, boundary, face_nodes
+
+#: families by direction, in the order that they take within a cluster of equal frequencies
+FAMILIES = ("y", "z", "x")
+#: components of a frame's motion by family: turning about z moves the body along y
+MEMBER = {"y": (1, 5), "z": (2, 4), "x": (0, 3)}
+
+
+@dataclass(frozen=True)
+class _Unknowns:
+    """From the model's vector to the displacements of all nodes, shape (3 n, ndof), and what the vector is made of."""
+
+    spread: sp.csr_array
+    place: np.ndarray  #: [m], shape (ndof, 3)
+    component: np.ndarray  #: 0 .. 5, shape (ndof,)
+    first: dict[int, int]  #: first unknown of each rigidly tied frame, by its number
+
+
+def assemble(mesh: xr.Dataset) -> Model:
+    """The model of a solid mesh (schema SOLID)."""
+    solid = _solid(mesh)
+    unknowns = _unknowns(mesh)
+    T = unknowns.spread
+    line = elasticity.mass(solid)
+    K = T.T @ elasticity.stiffness(solid) @ T
+    M = T.T @ sp.csr_array(sp.kron(line, sp.eye_array(3))) @ T
+    interfaces = _interfaces(mesh, unknowns)
+    recipe = mesh.attrs["interfaces"].split()
+    ends = tuple(frame for name in recipe[:2] for frame in interfaces if frame.name == name)
+    return Model(
+        stiffness=_symmetric(K),
+        mass=_symmetric(M),
+        rigid=_rigid(unknowns),
+        place=unknowns.place,
+        interfaces=interfaces,
+        ends=ends,
+        integrate=partial(integrals, line, solid.nodes, T),
+        families=_families(unknowns),
+        drawn=_drawn(mesh, T),
+    )
+
+
+def integrals(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array, vectors: np.ndarray) -> Integrals:
+    """Volume integrals from the mass matrix of one axis: positions are as exact in its space as displacements are.
+
+    line: [kg], shape (n, n).  nodes: [m], shape (n, 3).  spread: vector to displacements, shape (3 n, ndof).
+    """
+    n, count = len(nodes), vectors.shape[1]
+    S = (spread @ vectors).reshape(n, 3, count)
+    weighted = (line @ S.reshape(n, -1)).reshape(n, 3, count)
+    moment = line @ nodes
+    pair = np.empty((3, 3, count, count))
+    for k in range(3):
+        for l in range(3):
+            pair[k, l] = S[:, k].T @ weighted[:, l] if l >= k else pair[l, k].T
+    return Integrals(
+        mass=float(line.sum()),
+        first_moment=moment.sum(axis=0),
+        second_moment=nodes.T @ moment,
+        modal_first_moment=weighted.sum(axis=0),
+        position_mode_moment=np.einsum("nk,nlj->klj", nodes, weighted, optimize=True),
+        mode_mode_moment=pair,
+    )
+
+
+def _solid(mesh: xr.Dataset) -> Solid:
+    region = mesh["cell_region"].values
+    E, nu, rho = (mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density"))
+    lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))
+    return Solid(mesh.attrs["element"], mesh["node_position"].values, mesh["cell"].values, lame, shear, rho)
+
+
+def _unknowns(mesh: xr.Dataset) -> _Unknowns:
+    x, n = mesh["node_position"].values, mesh.sizes["node"]
+    tie_node, tie_frame = mesh["tie_node"].values, mesh["tie_frame"].values
+    rigid = np.flatnonzero(mesh["frame_tie"].values == "rigid")
+    led = np.zeros(n, dtype=bool)
+    led[tie_node[np.isin(tie_frame, rigid)]] = True
+    free = np.flatnonzero(~led)
+    size = 3 * len(free)
+    rows = [(3 * free[:, None] + np.arange(3)).ravel()]
+    columns, values = [np.arange(size)], [np.ones(size)]
+    place, component, first = [np.repeat(x[free], 3, axis=0)], [np.tile(np.arange(3), len(free))], {}
+    for k in rigid:
+        nodes, position = tie_node[tie_frame == k], mesh["frame_position"].values[k]
+        motion = ties.slaves(x[nodes], position)
+        rows.append(np.broadcast_to((3 * nodes[:, None] + np.arange(3))[:, :, None], motion.shape).ravel())
+        columns.append(np.broadcast_to(size + np.arange(6), motion.shape).ravel())
+        values.append(motion.ravel())
+        place.append(np.tile(position, (6, 1)))
+        component.append(np.arange(6))
+        first[int(k)] = size
+        size += 6
+    where = (np.concatenate(rows), np.concatenate(columns))
+    spread = sp.csr_array(sp.coo_array((np.concatenate(values), where), shape=(3 * n, size)))
+    spread.eliminate_zeros()
+    return _Unknowns(spread, np.vstack(place), np.concatenate(component), first)
+
+
+def _rigid(unknowns: _Unknowns) -> np.ndarray:
+    """Rigid motions about the mesh origin, shape (ndof, 6)."""
+    full = np.zeros((len(unknowns.place), 6, 6))
+    full[:, range(6), range(6)] = 1.0
+    full[:, :3, 3:] = -skew(unknowns.place)
+    return full[np.arange(len(full)), unknowns.component]
+
+
+def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
+    size, found = len(unknowns.place), []
+    for k, name in enumerate(mesh["frame"].values):
+        position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
+        if k in unknowns.first:
+            own = unknowns.first[k] + np.arange(6)
+            motion = sp.csr_array((np.ones(6), (np.arange(6), own)), shape=(6, size))
+        else:
+            tied = mesh["tie_frame"].values == k
+            nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
+            x = mesh["node_position"].values[nodes]
+            motion = sp.csr_array(ties.mean(x, weight, nodes, position, mesh.sizes["node"]) @ unknowns.spread)
+        found.append(Interface(str(name), position, rotation, motion))
+    return tuple(found)
+
+
+def _families(unknowns: _Unknowns) -> Families:
+    size = len(unknowns.place)
+    member = np.empty(size, dtype=np.int64)
+    for rank, name in enumerate(FAMILIES):
+        member[np.isin(unknowns.component, MEMBER[name])] = rank
+    main = tuple(np.flatnonzero(unknowns.component == MEMBER[name][0]) for name in FAMILIES)
+    extent = np.ptp(unknowns.place, axis=0)
+    along = unknowns.place[:, int(np.argmax(extent))]
+    return Families(FAMILIES, sp.eye_array(size, format="csr"), member, main, (along - along.min()) / extent.max())
+
+
+def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
+    """The boundary: faces with nodes between their corners are cut into several."""
+    geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell"].values, {}, {})
+    found = face_nodes(geometry, *boundary(geometry))
+    pieces = found[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(found.shape[1])[0]))
+    used, cell = np.unique(pieces, return_inverse=True)
+    translation = sp.csr_array(spread[(3 * used[:, None] + np.arange(3)).ravel()])
+    # a solid has no rotations of its own
+    rotation = sp.csr_array(translation.shape)
+    cell = cell.reshape(pieces.shape)
+    return Drawn(geometry.nodes[used], cell, np.zeros(len(cell)), translation, rotation)
+
+
+def _cut(nodes: int) -> list[list[int]]:
+    """Corners of the plane pieces of a face with so many nodes, corners first and then edges in turn."""
+    if nodes in (3, 4, 8):
+        return [[0, 1, 2]] if nodes == 3 else [[0, 1, 2, 3]]
+    if nodes == 6:
+        return [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
+    return [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
+
+
+def _symmetric(matrix: sp.csr_array) -> sp.csr_array:
+    """Rounding differs above and below the diagonal; exact symmetry is what eigensolvers expect."""
+    return sp.csr_array(0.5 * (matrix + matrix.T))

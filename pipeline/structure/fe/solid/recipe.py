@@ -1,0 +1,150 @@
+"""Recipes of solids: blocks and cylinders that are meshed here, and meshes from files."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from pipeline.core.registry import suggestion
+from pipeline.core.scene.fields import Direction, Length, Part, Pose, Position
+from pipeline.structure.fe.beam_recipe import Isotropic
+
+Positive = Field(gt=0.0)
+Cells = Annotated[int, Field(ge=1, le=1000)]
+ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]
+
+
+class CylinderCells(Part):
+    """Numbers of cells: along the axis, along a side of the section's square core, and rings around the core."""
+
+    along: Cells
+    across: Cells
+    rings: Cells
+
+
+class Cylinder(Part):
+    """A round rod along x of the mesh frame, from x = 0 to `length`. Regions: body, start, end, side."""
+
+    type: Literal["cylinder"]
+    radius: Annotated[Length, Positive]
+    length: Annotated[Length, Positive]
+    cells: CylinderCells
+    element: ElementName = "hex27"
+
+
+class Block(Part):
+    """A box from x = 0 to size[0], centred in y and z. Regions: body, start (x = 0), end, side."""
+
+    type: Literal["block"]
+    size: Position
+    cells: tuple[Cells, Cells, Cells]
+    element: ElementName = "hex27"
+
+    @model_validator(mode="after")
+    def _has_a_volume(self) -> Block:
+        if not min(self.size) > 0.0:
+            raise ValueError(f"the sides {list(self.size)} m of a block are positive")
+        return self
+
+
+class MeshFile(Part):
+    """A mesh of tetrahedra or of hexahedra in a file that meshio reads; `file` is relative to the recipe.
+
+    length_unit: unit of the file's coordinates; a file does not say.
+    """
+
+    type: Literal["mesh-file"]
+    file: str
+    length_unit: Literal["m", "cm", "mm", "um", "in"]
+
+
+class Plane(Part):
+    """Nodes on a plane."""
+
+    point: Position
+    normal: Direction
+
+
+class Tube(Part):
+    """Nodes on a cylinder's surface around the line through `point` along `axis`."""
+
+    point: Position
+    axis: Direction
+    radius: Annotated[Length, Positive]
+
+
+class Sphere(Part):
+    """Nodes on a sphere's surface."""
+
+    centre: Position
+    radius: Annotated[Length, Positive]
+
+
+class On(Part):
+    """Which nodes a frame is tied to: those of a named region, or on a surface; on the boundary of the body only.
+
+    tolerance: largest distance from the surface; default: 1e-6 of the body's size.
+    """
+
+    region: str | None = None
+    plane: Plane | None = None
+    cylinder: Tube | None = None
+    sphere: Sphere | None = None
+    tolerance: Annotated[Length, Positive] | None = None
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> On:
+        rules = ("region", "plane", "cylinder", "sphere")
+        given = [name for name in rules if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"one of {', '.join(rules)} says where, not {' and '.join(given) or 'none'}")
+        return self
+
+
+class TiedFrame(Part):
+    """A named frame tied to nodes: rigidly (RBE2; they move as one), or to their mean motion (RBE3; they deform).
+
+    position: origin in the mesh frame; default: the centre of the nodes.  axes: as of a pose; default: the mesh axes.
+    """
+
+    on: On
+    tie: Literal["rigid", "mean"]
+    position: Position | None = None
+    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+
+    @model_validator(mode="after")
+    def _orthogonal_axes(self) -> TiedFrame:
+        self.orientation()
+        return self
+
+    def orientation(self) -> Pose:
+        """The orientation as a pose at the origin."""
+        return Pose(axes=self.axes)
+
+
+class SolidRecipe(Part):
+    """A solid body.
+
+    material: of all cells, or materials: by region.
+    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
+    """
+
+    title: str = ""
+    shape: Annotated[Cylinder | Block | MeshFile, Field(discriminator="type")]
+    material: Isotropic | None = None
+    materials: dict[str, Isotropic] = Field(default_factory=dict)
+    frames: Annotated[dict[str, TiedFrame], Field(min_length=1)]
+    interfaces: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _complete(self) -> SolidRecipe:
+        if (self.material is None) == (not self.materials):
+            raise ValueError("give either `material` for the whole body or `materials` by region")
+        for name in self.interfaces:
+            if name not in self.frames:
+                hint = suggestion(name, dict(self.frames))
+                raise ValueError(f"interfaces: there is no frame called '{name}'; {hint}")
+        if len(set(self.interfaces)) < len(self.interfaces):
+            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
+        return self

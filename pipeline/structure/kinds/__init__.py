@@ -1,0 +1,20 @@
+"""Kinds of flexible bodies by what their recipe describes; each turns recipes into meshes and meshes into models.
+
+To add one: a module here with ``KIND: Kind``, and its shapes below.
+"""
+
+from __future__ import annotations
+
+KIND = "kind of body"
+NAMES = {
+    "beam": "beam:KIND",
+    "solid": "solid:KIND",
+    "matrices": "matrices:KIND",
+}
+#: kind of body by `shape.type` of its recipe; every other type is a beam's
+SHAPES = {
+    "cylinder": "solid",
+    "block": "solid",
+    "mesh-file": "solid",
+    "matrices": "matrices",
+}

@@ -1,0 +1,96 @@
+"""Beams as models: the degrees of freedom are those of the nodes, and some inside the cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+import xarray as xr
+
+from pipeline.structure.fe import beam as beams
+from pipeline.structure.fe import mesh as meshes
+from pipeline.structure.fe.beam import N_DOFS, Beam
+from pipeline.structure.fe.model import Drawn, Families, Interface, Model
+from pipeline.structure.kinds.kind import Kind
+from pipeline.structure.modes import exact
+from pipeline.structure.modes.inertia_integrals import integrate
+
+#: components along the rod's axes by family, the one that decides the sign first
+FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}
+
+
+def assemble(mesh: xr.Dataset) -> Model:
+    """The model of a beam mesh (schema MESH)."""
+    beam = beams.assemble(mesh)
+    return Model(
+        stiffness=beam.stiffness,
+        mass=beam.mass,
+        rigid=beams.rigid_vectors(beam),
+        place=_place(beam),
+        interfaces=_interfaces(mesh, beam),
+        ends=_ends(mesh, beam),
+        integrate=partial(integrate, mesh, beam),
+        families=_families(beam),
+        drawn=_drawn(mesh, beam),
+    )
+
+
+def _place(beam: Beam) -> np.ndarray:
+    start = beam.node_position[0] - beam.along[0] * beam.axes[:, 0]
+    return start + np.outer(beam.along, beam.axes[:, 0])
+
+
+def _interfaces(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:
+    columns = ("frame", "frame_node", "frame_position", "frame_rotation")
+    found = zip(*(mesh[name].values for name in columns), strict=True)
+    return tuple(Interface(str(name), x, R, _node(beam, int(node))) for name, node, x, R in found)
+
+
+def _ends(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:
+    x = mesh["abscissa"].values
+    return tuple(
+        Interface(name, beam.node_position[node], beam.axes, _node(beam, node))
+        for name, node in (("start", int(np.argmin(x))), ("end", int(np.argmax(x))))
+    )
+
+
+def _node(beam: Beam, node: int) -> sp.csr_array:
+    """The six degrees of freedom of a node, shape (6, ndof)."""
+    dofs = beams.node_dofs(np.array([node]))
+    return sp.csr_array((np.ones(N_DOFS), (np.arange(N_DOFS), dofs)), shape=(N_DOFS, beam.size))
+
+
+def _families(beam: Beam) -> Families:
+    member = np.empty(beam.size, dtype=np.int64)
+    for rank, components in enumerate(FAMILIES.values()):
+        member[np.isin(beam.component, components)] = rank
+    # nodes alone decide a sign: they are what is drawn
+    nodal = np.arange(beam.nodal_size).reshape(-1, N_DOFS)
+    main = tuple(nodal[:, components[0]] for components in FAMILIES.values())
+    along = (beam.along - beam.along.min()) / np.ptp(beam.along)
+    local = sp.csr_array(beams.in_rod_axes(beam, sp.eye_array(beam.size, format="csr")))
+    return Families(tuple(FAMILIES), local, member, main, along)
+
+
+def _drawn(mesh: xr.Dataset, beam: Beam) -> Drawn:
+    nodal = np.arange(beam.nodal_size).reshape(-1, N_DOFS)
+    unit = sp.eye_array(beam.size, format="csr")
+    # drawn as a round rod of the true area, whatever the section
+    radius = np.sqrt(mesh["area"].values / np.pi)
+    translation, rotation = (sp.csr_array(unit[nodal[:, part].ravel()]) for part in (slice(0, 3), slice(3, 6)))
+    return Drawn(beam.node_position, mesh["cell"].values, radius, translation, rotation)
+
+
+def _build(recipe: Mapping[str, Any], folder: Path) -> xr.Dataset:
+    return meshes.build(recipe)
+
+
+def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
+    return [name.partition("_")[0] for name in families]
+
+
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=exact.columns)

@@ -1,0 +1,59 @@
+"""What a kind of body has to offer to the stages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.registry import lookup
+from pipeline.structure.fe.model import Model
+from pipeline.structure.kinds import SHAPES
+
+FAMILY = "pipeline.structure.kinds"
+#: told the done share of the work (None: unknown) and what is being done
+Progress = Callable[[float | None, str], None]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """Functions of one kind of body.
+
+    build: a recipe's table, and the folder that files in it are relative to, to the mesh dataset.
+    write_vtu: the mesh dataset to a file that ParaView opens.
+    assemble: the mesh dataset to matrices.
+    words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
+    exact: closed-form frequencies [Hz] beside those of a reference condition, by variable, from the modes' families.
+    """
+
+    build: Callable[[Mapping[str, Any], Path], xr.Dataset]
+    write_vtu: Callable[[xr.Dataset, Path], None]
+    assemble: Callable[[xr.Dataset], Model]
+    words: Callable[[Model, list[str], np.ndarray], list[str]]
+    exact: Callable[[xr.Dataset, str, list[str]], dict[str, np.ndarray]]
+
+
+def name_of(recipe: Mapping[str, Any]) -> str:
+    """Name of the kind of body that a recipe's table describes."""
+    shape = recipe.get("shape")
+    return SHAPES.get(str(shape.get("type")), "beam") if isinstance(shape, Mapping) else "beam"
+
+
+def of_recipe(recipe: Mapping[str, Any]) -> Kind:
+    """The kind of body that a recipe's table describes."""
+    found: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
+    return found
+
+
+def of_mesh(mesh: xr.Dataset) -> Kind:
+    """The kind of body whose mesh dataset this is."""
+    found: Kind = lookup(FAMILY, str(mesh.attrs.get("body_kind", "beam")), where="mesh")
+    return found
+
+
+def silent(share: float | None, text: str) -> None:
+    """A progress callback that says nothing."""

@@ -1,0 +1,59 @@
+"""Solids as a kind of body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.structure.fe.model import Model
+from pipeline.structure.fe.recipe import parse
+from pipeline.structure.fe.solid import mesh as meshes
+from pipeline.structure.fe.solid.model import assemble
+from pipeline.structure.fe.solid.recipe import SolidRecipe
+from pipeline.structure.kinds.kind import Kind
+
+PLACE = "mesh recipe"
+#: a body is a rod where its second largest extent is below this share of the largest
+SLENDER = 0.5
+#: a mode is torsion where the swirl about the axis has this many times the energy of all else
+SWIRL = 4.0
+
+
+def _build(recipe: Mapping[str, Any], folder: Path) -> xr.Dataset:
+    checked = parse(recipe, PLACE)
+    assert isinstance(checked, SolidRecipe)
+    return meshes.build(checked, folder, PLACE)
+
+
+def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
+    """Of a rod: bending, torsion or axial, by the motion of its surface; of any other body: elastic."""
+    X = model.drawn.position - model.drawn.position.mean(axis=0)
+    _, extent, axes = np.linalg.svd(X, full_matrices=False)
+    if extent[1] > SLENDER * extent[0]:
+        return ["elastic"] * vectors.shape[1]
+    u = (model.drawn.translation @ vectors).reshape(len(X), 3, -1)
+    axis = axes[0]
+    across = X - np.outer(X @ axis, axis)
+    size = np.linalg.norm(across, axis=1, keepdims=True)
+    radial = np.divide(across, size, out=np.zeros_like(across), where=size > 1e-9 * extent[0])
+    swirl = np.cross(axis, radial)
+    along, out, turn = (np.einsum("nk,nkj->nj", e, u) for e in (np.broadcast_to(axis, X.shape), radial, swirl))
+    energy = [(part**2).sum(axis=0) for part in (along, out, turn)]
+    return [_word(*parts) for parts in zip(*energy, strict=True)]
+
+
+def _word(along: float, out: float, turn: float) -> str:
+    if turn > SWIRL * (along + out):
+        return "torsion"
+    return "axial" if along > out + turn else "bending"
+
+
+def _exact(mesh: xr.Dataset, reference: str, families: list[str]) -> dict[str, np.ndarray]:
+    return {}
+
+
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=_exact)

@@ -1,0 +1,70 @@
+"""Static compliance at the frames of the full model, and the share of it that a basis has."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.artifacts.compliance import DIRECTIONS, reduced, shares
+from pipeline.structure.fe.model import Interface
+from pipeline.structure.modes.condition import in_own_axes
+from pipeline.structure.modes.statics import Flexibility
+
+
+@dataclass(frozen=True)
+class Frames:
+    """Motion of p frames in their own axes.
+
+    motion: functionals, shape (6 p, ndof).  rigid: under the six rigid motions, shape (p, 6, 6).
+    """
+
+    motion: np.ndarray
+    rigid: np.ndarray
+
+
+def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> Frames:
+    """Functionals of the frames and their rigid motion."""
+    motion = np.vstack([in_own_axes(frame).toarray() for frame in interfaces])
+    return Frames(motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6))
+
+
+def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
+    """Compliance [m/N, rad/(N m)] of each frame with each held (or, with itself, nothing), shape (p, p, 6)."""
+    at, p = frames(flexibility, interfaces), len(interfaces)
+    loads = np.hstack([at.motion.T, flexibility.momentum])
+    gram = loads.T @ flexibility.response(loads)
+    result = np.empty((p, p, 6))
+    for i in range(p):
+        for j in range(p):
+            # the load on i and its reaction: at j, or the inertia of the whole body
+            balance = np.zeros((6 * p + 6, 6))
+            balance[6 * i : 6 * i + 6] = np.eye(6)
+            if i == j:
+                balance[6 * p :] = -np.linalg.solve(flexibility.inertia, at.rigid[i].T)
+            else:
+                balance[6 * j : 6 * j + 6] = -np.linalg.solve(at.rigid[j].T, at.rigid[i].T)
+            result[i, j] = np.einsum("ad,ab,bd->d", balance, gram, balance)
+    return result
+
+
+def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> np.ndarray:
+    """Compliance that shapes of (ndof, n) can show, likewise; any combination and scale of them."""
+    at = frames(flexibility, interfaces)
+    K = vectors.T @ (flexibility.model.stiffness @ vectors)
+    relief = np.linalg.solve(flexibility.inertia, flexibility.momentum.T @ vectors)
+    scale = 1.0 / np.sqrt(np.diag(K))
+    inner = scale[:, None] * (0.5 * (K + K.T)) * scale
+    motion = (at.motion @ (vectors * scale)).reshape(len(interfaces), 6, -1)
+    return reduced(motion, at.rigid, relief * scale, inner)
+
+
+def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
+    """Smallest share of the compliance between the interfaces (of a single one: of the free body), and where."""
+    whole = full(flexibility, interfaces)
+    found = shares(of_basis(flexibility, interfaces, vectors), whole)
+    if len(interfaces) > 1:
+        found[np.arange(len(found)), np.arange(len(found))] = 1.0
+    i, j, d = np.unravel_index(int(np.argmin(found)), found.shape)
+    held = "with nothing held" if i == j else f"with '{interfaces[j].name}' held"
+    return float(found[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"

@@ -1,0 +1,115 @@
+"""What a reference condition is: which motions are held, which static shapes belong to it, how rigid motion goes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import suggestion
+from pipeline.structure.fe.model import DIRECTIONS, Interface, Model, own_dofs
+
+WHERE = "modes.reference"
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a scene says besides the condition's name.
+
+    interfaces: frames at which the body is joined, first the one that may carry the body frame.
+    held: single motions, ``frame.direction`` in axes of the frame.  of: another condition that this one is based on.
+    """
+
+    interfaces: tuple[Interface, ...]
+    held: tuple[str, ...] = ()
+    of: str | None = None
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A reference condition and the kind of shapes that it admits.
+
+    held: functionals that vanish in every normal mode, shape (c, ndof).
+    moved: rows of `held`; each gives a constraint mode, in which it is one and the others are zero.
+    loaded: functionals whose unit loads give attachment modes, shape (s, ndof).
+    residual: whether the kept normal modes' share is taken out of the attachment modes.
+    mean_axes: whether rigid motion is taken out of every shape (Tisserand's condition: no momentum).
+    note: which rigid-body motion was removed, and how.
+    """
+
+    held: sp.csr_array
+    note: str
+    moved: np.ndarray
+    loaded: sp.csr_array
+    residual: bool = False
+    mean_axes: bool = False
+
+
+def holding(held: sp.csr_array, note: str, moved: np.ndarray | None = None) -> Condition:
+    """Normal modes with some functionals held, and constraint modes for `moved` ones."""
+    none = sp.csr_array((0, held.shape[1]))
+    return Condition(held, note, np.empty(0, dtype=int) if moved is None else moved, none)
+
+
+def floating(model: Model, note: str, loaded: sp.csr_array | None = None, *, residual: bool = False) -> Condition:
+    """Normal modes of the free body without rigid ones, and attachment modes for `loaded` functionals."""
+    none = sp.csr_array((0, model.size))
+    return Condition(
+        none, note, np.empty(0, dtype=int), none if loaded is None else loaded, residual=residual, mean_axes=True
+    )
+
+
+def functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
+    """The motion ``frame.direction`` in axes of the frame, shape (1, ndof); InputError for unknown names."""
+    frame_name, _, direction = name.partition(".")
+    known = {frame.name: frame for frame in frames}
+    if frame_name not in known:
+        raise InputError("modes.held", f"the mesh has no frame called '{frame_name}'", suggestion(frame_name, known))
+    if direction not in DIRECTIONS:
+        raise InputError("modes.held", f"'{name}' names no direction", f"frame.{{{', '.join(DIRECTIONS)}}}")
+    return sp.csr_array(in_own_axes(known[frame_name])[[DIRECTIONS.index(direction)]])
+
+
+def in_own_axes(frame: Interface) -> sp.csr_array:
+    """Motion of a frame in its own axes, shape (6, ndof)."""
+    # products with the zeros of a rotation would store them, and a single degree of freedom look like a mixture
+    R = np.where(np.abs(frame.rotation) < 1e-15, 0.0, frame.rotation)
+    turned = sp.csr_array(sp.block_diag([R.T, R.T])) @ frame.motion
+    turned.eliminate_zeros()
+    return sp.csr_array(turned)
+
+
+def different(frames: tuple[Interface, ...]) -> None:
+    """InputError when two frames move alike, so that a second one can add nothing."""
+    for k, frame in enumerate(frames):
+        for other in frames[:k]:
+            if abs(frame.motion - other.motion).max() == 0.0:
+                raise InputError(
+                    "modes.interfaces",
+                    f"two interfaces lie on the same node: '{other.name}' and '{frame.name}'",
+                    "keep one of them",
+                )
+
+
+def check(model: Model, condition: Condition) -> None:
+    """InputError unless the held motions are independent and leave the body no rigid motion (or all of it)."""
+    held = condition.held
+    if held.shape[0] == 0:
+        return
+    dofs = own_dofs(held)
+    if dofs is None:
+        rows = held.toarray()
+        size = np.linalg.norm(rows, axis=1, keepdims=True)
+        if np.any(size == 0.0) or np.linalg.matrix_rank(rows / size, tol=1e-9) < len(rows):
+            raise InputError(WHERE, "the held motions are not independent of each other", "hold each motion once")
+    lengths = np.linalg.norm(model.place - model.place.mean(axis=0), axis=1)
+    scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
+    left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)
+    if left:
+        raise InputError(
+            WHERE,
+            f"the held motions leave {left} rigid-body motions of the body free",
+            'hold six motions that fix it, or take mean axes: reference = "mean-axis"',
+        )

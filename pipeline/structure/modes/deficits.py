@@ -1,0 +1,121 @@
+r"""What a reduced body cannot do, measured against the full model.
+
+*Compliance*: displacement of a frame under unit static loads while another frame is held (or nothing is, the load
+being balanced by the body's inertia), full model and share of the basis.
+
+*Error bound*: a force :math:`f e^{i\omega t}` at a frame moves the free body by u, and the reduced one (with its rigid
+motion) by :math:`\hat u`. With :math:`D = K - \omega^2 M` and the residual :math:`r = f - D\hat u`, which the basis and
+the rigid motions do not feel, the error at the frame along the force is :math:`r^T D^{-1} r`. In the elastic modes of
+the full model this is :math:`\sum_j (\phi_j^T r)^2 / (\omega_j^2-\omega^2)`, so below the first frequency
+:math:`\omega_1`
+
+.. math:: 0 \le f^T(u - \hat u) \le \frac{r^T G r}{1 - \omega^2/\omega_1^2},
+
+where :math:`r^T G r = \sum_j (\phi_j^T r)^2/\omega_j^2` needs one static solution of the full model. At rest the bound
+is the missing compliance itself.
+
+*Resolved frequency*: the highest frequency of the free body up to which the basis, with the rigid motions, has every
+frequency within a hundredth.
+
+*Effective mass*: of a mode of unit modal mass, the square of its momentum per unit rigid motion, about the centre of
+mass.
+
+Sources: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 17; Parlett, *The Symmetric Eigenvalue
+Problem* (1998), ch. 11 (residual bounds).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+
+from pipeline.core.artifacts.compliance import shares
+from pipeline.structure.fe.model import DIRECTIONS, Model
+from pipeline.structure.kinds.kind import Progress
+from pipeline.structure.modes import compliance, eigen, normal
+from pipeline.structure.modes.statics import Flexibility
+
+#: frequencies of the error bound, as shares of the free body's first one
+BOUND_AT = (0.0, 0.25, 0.5)
+#: a frequency this close to the full model's is resolved
+RESOLVED = 0.01
+#: full frequencies that are computed to compare with, at most; each costs a solution of the full model
+COMPARED = 40
+
+
+def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables (schema BUNDLE, the deficits) and attributes of a basis of shape (ndof, n), mass-normalised modes."""
+    model = flexibility.model
+    names = [frame.name for frame in model.interfaces]
+    progress(None, "compliance of the full model")
+    whole = compliance.full(flexibility, model.interfaces)
+    share = shares(compliance.of_basis(flexibility, model.interfaces, vectors), whole)
+    first, resolved = _frequencies(flexibility, vectors, progress)
+    progress(None, "error bounds")
+    at = first * np.array(BOUND_AT)
+    data = {
+        "frame_held": (("frame_held",), names),
+        "direction": (("direction",), list(DIRECTIONS)),
+        "bound_frequency": (("bound_frequency",), at),
+        "compliance_full": (("frame", "frame_held", "direction"), whole),
+        "compliance_share": (("frame", "frame_held", "direction"), share),
+        "error_bound": (("frame", "direction", "bound_frequency"), bounds(flexibility, vectors, at, first)),
+        "effective_mass": (("direction", "mode"), _effective_mass(model, vectors)),
+    }
+    return data, {"first_free_frequency": first, "resolved_frequency": resolved}
+
+
+def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, first: float) -> np.ndarray:
+    """Error bounds [m/N, rad/(N m)] for unit loads at every frame, shape (p, 6, frequencies).
+
+    hertz: frequencies of the load, below `first`, the free body's first one [Hz].
+    """
+    model = flexibility.model
+    basis = np.hstack([model.rigid, vectors])
+    K, M = model.stiffness @ basis, model.mass @ basis
+    loads = compliance.frames(flexibility, model.interfaces).motion.T
+    result = np.empty((loads.shape[1], len(hertz)))
+    for k, value in enumerate(hertz):
+        square = (2.0 * np.pi * value) ** 2
+        if square == 0.0:
+            # at rest the free body cannot be in balance; its inertia takes the load
+            residual = flexibility.balanced(loads)
+            residual = residual - K[:, 6:] @ _solved(vectors.T @ K[:, 6:], vectors.T @ residual)
+        else:
+            inner = basis.T @ (K - square * M)
+            residual = loads - (K - square * M) @ _solved(inner, basis.T @ loads)
+        energy = np.einsum("ij,ij->j", residual, flexibility.response(flexibility.balanced(residual)))
+        result[:, k] = energy / (1.0 - (value / first) ** 2)
+    # rounding of a basis that misses nothing
+    return np.maximum(result, 0.0).reshape(len(model.interfaces), 6, len(hertz))
+
+
+def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+    scale = 1.0 / np.sqrt(np.abs(np.diag(matrix)))
+    return scale[:, None] * scipy.linalg.solve(scale[:, None] * matrix * scale, scale[:, None] * right)
+
+
+def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -> tuple[float, float]:
+    """The free body's first frequency, and the highest one that the basis resolves (zero: none) [Hz]."""
+    model = flexibility.model
+    count = min(vectors.shape[1], COMPARED, model.size - 6)
+    none = sp.csr_array((0, model.size))
+    full = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
+    shapes = flexibility.relieved(vectors)
+    values, _ = eigen.rediagonalise(model.stiffness, model.mass, shapes)
+    near = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
+    whole = count if near.all() else int(np.argmin(near))
+    return float(full[0]), float(full[whole - 1]) if whole else 0.0
+
+
+def _effective_mass(model: Model, vectors: np.ndarray) -> np.ndarray:
+    """Effective mass [kg, kg m^2], shape (6, n)."""
+    momentum = model.mass @ model.rigid
+    inertia = model.rigid.T @ momentum
+    # rigid rotation about the centre of mass: momentum-free translation is subtracted
+    shift = np.eye(6)
+    shift[:3, 3:] = -inertia[:3, 3:] / inertia[0, 0]
+    return (shift.T @ (momentum.T @ vectors)) ** 2

@@ -1,0 +1,20 @@
+"""Body frame clamped at the first interface; normal modes with nothing else held.
+
+Source: Shabana, *Dynamics of Multibody Systems*, ch. 5 (reference conditions of a clamped body frame).
+"""
+
+from __future__ import annotations
+
+from pipeline.core.errors import InputError
+from pipeline.structure.fe.model import Model
+from pipeline.structure.modes.condition import Condition, Given, holding
+
+
+def condition(model: Model, given: Given) -> Condition:
+    """Normal modes with the first interface clamped; InputError without one."""
+    if not given.interfaces:
+        raise InputError(
+            "modes.interfaces", "a cantilever is clamped at an interface", "name one of the recipe's frames"
+        )
+    first = given.interfaces[0]
+    return holding(first.motion, f"the body frame rides on '{first.name}', where all shapes vanish")

@@ -1,0 +1,24 @@
+"""Mean axes of any basis (Tisserand's or Buckens' frame): another condition's shapes without their rigid motion.
+
+Source: Canavin & Likins (1977), J. Spacecraft 14, 724-732; Shabana, *Dynamics of Multibody Systems*, ch. 5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import lookup
+from pipeline.structure.fe.model import Model
+from pipeline.structure.modes.condition import Condition, Given
+
+FAMILY = "pipeline.structure.modes.reference"
+
+
+def condition(model: Model, given: Given) -> Condition:
+    """The shapes of the condition that `given.of` names, linear and angular momentum taken out."""
+    if given.of is None or given.of == "mean-axis":
+        raise InputError("modes.of", "mean axes of which shapes?", 'name them, as of = "craig-bampton"')
+    based: Condition = lookup(FAMILY, given.of, where="modes.of")(model, given)
+    note = f"shapes of {given.of}; their linear and angular momentum was taken out"
+    return replace(based, mean_axes=True, note=note)

@@ -1,0 +1,1 @@
+"""Direct solution of large symmetric systems: nested dissection and a multifrontal factorisation."""

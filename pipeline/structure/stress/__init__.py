@@ -1,0 +1,7 @@
+"""What stress recovery needs of a body, by its kind; part of a bundle when a scene asks for it.
+
+To add one: a module here with ``recover(mesh, modes) -> dict``, the variables STRESS of the contract, and a line below.
+"""
+
+KIND = "stress recovery"
+NAMES = {"beam": "beam:recover"}

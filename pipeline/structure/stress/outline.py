@@ -1,0 +1,145 @@
+r"""Stress in a cross section from its section forces: linear maps at fibres on the outline and inside.
+
+Axial stress is :math:`\sigma = N/A + M_y z/I_y - M_z y/I_z`. Shear stress of circles and tubes is the exact solution of
+St. Venant (torsion and flexure); that of rectangles the exact one of torsion and the parabola of flexure, which leaves
+out Poisson's share of the variation across the width.
+
+Sources: Love, *A Treatise on the Mathematical Theory of Elasticity*, ch. XV (flexure of a hollow circular cylinder);
+Timoshenko & Goodier, *Theory of Elasticity*, sec. 109 (torsion of a rectangle).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.structure.fe import section as sections
+from pipeline.structure.fe.section import Section, Value
+
+#: fibres around a round section, a whole step of 5 deg; one of them lies in the plane of bending (`Outline.round`)
+AROUND = 72
+#: fibres along each side of a rectangle, corners included
+ALONG = 9
+#: odd terms of the series of a rectangle's torsion; they fall as 1/n^2 at the middle of a side
+TERMS = np.arange(1, 400, 2)
+#: a section is of a type when its torsion constant is that of the type
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Stress maps of one section.
+
+    stress: axial stress and shear along y and z [Pa] per N, Qy, Qz, T, My, Mz, shape (fibres, 3, 6).
+    round: the same about every axis, so that y may be turned into the plane of bending.
+    """
+
+    stress: np.ndarray
+    round: bool
+
+
+def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
+    """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
+    for name in types:
+        found = _OUTLINES[name](given, poisson, len(types) > 1) if name in _OUTLINES else None
+        if found is not None:
+            return found
+    return None
+
+
+def _is(made: Section, given: Section) -> bool:
+    a, b = (np.array([s.torsion, s.second_y, s.second_z], dtype=float) for s in (made, given))
+    return bool(np.all(np.abs(a - b) <= SAME * b))
+
+
+def _circle(given: Section, poisson: float, checked: bool) -> Outline | None:
+    radius = math.sqrt(given.area / math.pi)
+    made = sections.circle(radius)
+    return None if checked and not _is(made, given) else _round(made, radius, 0.0, poisson)
+
+
+def _tube(given: Section, poisson: float, checked: bool) -> Outline | None:
+    # A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
+    total, difference = float(4.0 * given.second_y / given.area), float(given.area / math.pi)
+    if difference >= total:
+        return None
+    radius, inner = math.sqrt(0.5 * (total + difference)), math.sqrt(0.5 * (total - difference))
+    made = sections.tube(radius, inner)
+    return None if checked and not _is(made, given) else _round(made, radius, inner, poisson)
+
+
+def _rectangle(given: Section, poisson: float, checked: bool) -> Outline | None:
+    ratio = math.sqrt(given.second_z / given.second_y)
+    width, height = math.sqrt(given.area * ratio), math.sqrt(given.area / ratio)
+    made = sections.rectangle(width, height)
+    return None if checked and not _is(made, given) else _sides(made, width, height)
+
+
+_OUTLINES: dict[str, Callable[[Section, float, bool], Outline | None]] = {
+    "circle": _circle,
+    "tube": _tube,
+    "rectangle": _rectangle,
+}
+
+
+def _round(made: Section, radius: float, inner: float, poisson: float) -> Outline:
+    angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
+    ring = np.stack([np.cos(angle), np.sin(angle)])
+    y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)
+    found = _axial(made, y, z)
+    found[:, 1, 3], found[:, 2, 3] = -z / made.torsion, y / made.torsion
+    found[:, 1, 1], found[:, 2, 1] = _flexure(y, z, radius, inner, poisson, made.second_z)
+    # a force along z is one along y, seen a quarter turn on
+    found[:, 2, 2], found[:, 1, 2] = _flexure(z, y, radius, inner, poisson, made.second_y)
+    return Outline(found, True)
+
+
+def _axial(made: Section, y: np.ndarray, z: np.ndarray) -> np.ndarray:
+    found = np.zeros((len(y), 3, 6))
+    found[:, 0, 0] = 1.0 / made.area
+    found[:, 0, 4], found[:, 0, 5] = z / made.second_y, -y / made.second_z
+    return found
+
+
+def _flexure(
+    y: np.ndarray, z: np.ndarray, radius: float, inner: float, poisson: float, second: Value
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shear stress along y and z per unit force along y."""
+    square, k = np.maximum(y**2 + z**2, 1e-12 * radius**2), 0.75 + 0.5 * poisson
+    hole = (radius * inner) ** 2
+    along = -k * (radius**2 + inner**2) - k * hole * (z**2 - y**2) / square**2 + 0.75 * (y**2 - z**2)
+    across = 2.0 * k * hole * y * z / square**2 - 1.5 * y * z
+    scale = -1.0 / (2.0 * (1.0 + poisson) * second)
+    along = along + 0.5 * poisson * y**2 + (1.0 - 0.5 * poisson) * z**2
+    return scale * along, scale * (across + (2.0 + poisson) * y * z)
+
+
+def _sides(made: Section, width: float, height: float) -> Outline:
+    s = np.linspace(-0.5, 0.5, ALONG)
+    half = np.full(ALONG, 0.5)
+    y = width * np.concatenate([s, s, half, -half, [0.0]])
+    z = height * np.concatenate([half, -half, s, s, [0.0]])
+    found = _axial(made, y, z)
+    found[:, 1, 3], found[:, 2, 3] = _torsion(y, z, width, height, made.torsion)
+    found[:, 1, 1] = 1.5 / made.area * (1.0 - (2.0 * y / width) ** 2)
+    found[:, 2, 2] = 1.5 / made.area * (1.0 - (2.0 * z / height) ** 2)
+    return Outline(found, False)
+
+
+def _torsion(y: np.ndarray, z: np.ndarray, width: float, height: float, J: Value) -> tuple[np.ndarray, np.ndarray]:
+    """Shear stress along y and z of a rectangle per unit torque."""
+    a, b, n = 0.5 * width, 0.5 * height, TERMS
+    sign = np.where(n % 4 == 1, 1.0, -1.0) / n**2
+    wave = np.outer(y, n) * math.pi / (2.0 * a)
+    # cosh(k z) / cosh(k b) and sinh(k z) / cosh(k b) without their large exponents
+    k, far = n * math.pi / (2.0 * a), np.abs(z)[:, None]
+    rise, fall = np.exp(-k * (b - far)), np.exp(-k * (b + far))
+    base = 1.0 + np.exp(-2.0 * k * b)
+    cosh, sinh = (rise + fall) / base, np.sign(z)[:, None] * (rise - fall) / base
+    series = 16.0 * a / math.pi**2
+    along_y = -series * np.sum(sign * sinh * np.cos(wave), axis=1)
+    along_z = 2.0 * y - series * np.sum(sign * cosh * np.sin(wave), axis=1)
+    return along_y / J, along_z / J

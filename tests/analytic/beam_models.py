@@ -1,0 +1,63 @@
+"""Rods as finite elements, taken apart into planes: recipes, and frequencies with the ends held."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+import xarray as xr
+
+from pipeline.structure.fe import beam, mesh
+from tests.analytic.beam_solutions import PAPER_ROD
+
+RECIPE = {
+    "elements": 12,
+    "shape": {"type": "straight-beam", "length": PAPER_ROD.length},
+    "material": {
+        "density": PAPER_ROD.density,
+        "youngs_modulus": PAPER_ROD.youngs_modulus,
+        "poisson": PAPER_ROD.poisson,
+    },
+    "section": {"type": "circle", "radius": PAPER_ROD.radius},
+    "frames": {"bottom": {"x": 0.0}, "top": {"x": PAPER_ROD.length}},
+    "interfaces": ["bottom", "top"],
+}
+#: motions of the section, as indices of ux uy uz rx ry rz in rod axes
+BENDING, BENDING_Z, TORSION, EXTENSION = (1, 5), (2, 4), (3,), (0,)
+#: what a letter holds: index into the motions above (deflection, slope); torsion and extension have the first only
+HELD = {"F": (), "P": (0,), "G": (1,), "C": (0, 1)}
+WORDS = {"F": "free", "P": "pinned", "G": "guided", "C": "fixed"}
+#: rigid motions that the ends leave to a plane of bending
+RIGID = {"FF": 2, "PF": 1, "FP": 1, "GG": 1, "GF": 1, "FG": 1}
+
+
+def build(**changes: Any) -> xr.Dataset:
+    """The paper's rod with other entries in its recipe."""
+    return mesh.build(RECIPE | changes)
+
+
+def held_system(rod: xr.Dataset, motions: tuple[int, ...], ends: str) -> tuple[np.ndarray, np.ndarray]:
+    """Dense stiffness and mass of some motions of the section, ends held as the two letters say."""
+    found = beam.assemble(rod)
+    kept = np.isin(found.component, motions)
+    for node, letter in zip((0, rod.sizes["node"] - 1), ends, strict=True):
+        for k in HELD[letter]:
+            if k < len(motions):
+                kept[6 * node + motions[k]] = False
+    K, M = (beam.in_rod_axes(found, matrix.toarray()) for matrix in (found.stiffness, found.mass))
+    K, M = (beam.in_rod_axes(found, matrix.T).T for matrix in (K, M))
+    return K[np.ix_(kept, kept)], M[np.ix_(kept, kept)]
+
+
+def frequencies(rod: xr.Dataset, motions: tuple[int, ...], ends: str, count: int) -> np.ndarray:
+    """The lowest elastic frequencies [Hz], shape (count,)."""
+    rigid = RIGID.get(ends, 0) if len(motions) == 2 else int(ends == "FF")
+    values = scipy.linalg.eigvalsh(*held_system(rod, motions, ends))
+    return np.sqrt(values[rigid : rigid + count]) / (2.0 * np.pi)
+
+
+def order(elements: list[int], errors: np.ndarray) -> np.ndarray:
+    """Observed order of convergence, errors of shape (len(elements), ...)."""
+    flat = np.log(np.abs(errors)).reshape(len(elements), -1)
+    return -np.polyfit(np.log(elements), flat, 1)[0].reshape(np.shape(errors)[1:])

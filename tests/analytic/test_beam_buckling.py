@@ -1,0 +1,93 @@
+"""Geometric stiffness: buckling loads, the frequency of a stretched rod, and what a rigid rotation costs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from pipeline.structure.fe import beam, mesh
+from tests.analytic.beam_models import BENDING, HELD, RECIPE, build, frequencies, order
+from tests.analytic.beam_solutions import PAPER_ROD
+
+EI = PAPER_ROD.youngs_modulus * PAPER_ROD.second_moment
+#: effective length over length, Euler's cases
+EULER = {"CF": 2.0, "PP": 1.0, "CP": 0.699155660, "CC": 0.5}
+
+
+def plane(matrix: Any, ends: str, found: beam.Beam) -> np.ndarray:
+    """One plane of bending, with its ends held."""
+    kept = np.isin(found.component, BENDING)
+    for start, letter in zip((0, found.nodal_size - 6), ends, strict=True):
+        for k in HELD[letter]:
+            kept[start + BENDING[k]] = False
+    return np.asarray(matrix.toarray()[np.ix_(kept, kept)])
+
+
+def critical_load(elements: int, ends: str, **changes: Any) -> float:
+    """Smallest compressive force [N] at which the rod's plane loses its stiffness."""
+    rod = build(elements=elements, **changes)
+    found = beam.assemble(rod)
+    unit = beam.geometric_stiffness(rod, np.ones(elements))
+    K, S = (plane(matrix, ends, found) for matrix in (found.stiffness, unit))
+    # K x = P S x: the stiffness of a compression P is -P S
+    return float(1.0 / scipy.linalg.eigvalsh(S, K)[-1])
+
+
+@pytest.mark.parametrize("ends", EULER)
+def test_euler_loads_are_met_from_above_at_order_four(ends: str) -> None:
+    exact = np.pi**2 * EI / (EULER[ends] * PAPER_ROD.length) ** 2
+    elements = [4, 8, 16]
+    error = np.array([critical_load(n, ends) / exact - 1.0 for n in elements])
+    assert error.min() > 0.0
+    assert error[-1] < 1e-4
+    np.testing.assert_allclose(order(elements, error), 4.0, atol=0.2)
+
+
+def test_shear_lowers_the_euler_load_as_engesser_says() -> None:
+    """P = P_E / (1 + P_E / kappa G A) when the axial force follows the axis: geometric work in v'."""
+    section = {"type": "circle", "radius": PAPER_ROD.radius, "shear_coefficient": 0.1}
+    found = critical_load(16, "PP", theory="timoshenko", section=section)
+    euler = np.pi**2 * EI / PAPER_ROD.length**2
+    exact = euler / (1.0 + euler / (0.1 * PAPER_ROD.shear_modulus * PAPER_ROD.area))
+    assert found == pytest.approx(exact, rel=1e-5)
+    assert exact < 0.96 * euler
+
+
+def test_a_cantilever_buckles_under_its_own_weight() -> None:
+    """At q L^3 = 7.8373 EI (Timoshenko & Gere, sec. 2.12); the force varies from cell to cell."""
+    elements = 64
+    rod = build(elements=elements)
+    found = beam.assemble(rod)
+    weight_above = 1.0 - (np.arange(elements) + 0.5) / elements
+    unit = beam.geometric_stiffness(rod, weight_above)
+    K, S = (plane(matrix, "CF", found) for matrix in (found.stiffness, unit))
+    load = 1.0 / scipy.linalg.eigvalsh(S, K)[-1]
+    # the force is constant in each cell: second order, 64 cells leave 1e-4
+    assert load * PAPER_ROD.length**2 / EI == pytest.approx(7.8373, rel=2e-4)
+
+
+def test_tension_raises_the_frequencies_of_a_pinned_rod() -> None:
+    """w^2 = w0^2 (1 + N L^2 / (n^2 pi^2 EI)) without rotary inertia."""
+    tension = 4e4
+    rod = mesh.build(RECIPE | {"elements": 24, "theory": "euler-bernoulli"})
+    found = beam.assemble(rod)
+    stiffened = found.stiffness + beam.geometric_stiffness(rod, np.full(24, tension))
+    K, M = (plane(matrix, "PP", found) for matrix in (stiffened, found.mass))
+    hertz = np.sqrt(scipy.linalg.eigvalsh(K, M)[:3]) / (2.0 * np.pi)
+    n = np.arange(1, 4)
+    expected = np.sqrt(1.0 + tension * PAPER_ROD.length**2 / (n**2 * np.pi**2 * EI))
+    np.testing.assert_allclose(hertz / frequencies(rod, BENDING, "PP", 3), expected, rtol=1e-4)
+
+
+def test_it_turns_with_the_rod_and_ignores_translations() -> None:
+    turned = build(elements=6, pose={"rotation_vector": [0.4, -1.1, 0.7]}, theory="timoshenko")
+    straight = build(elements=6, theory="timoshenko")
+    force = np.linspace(-3.0, 5.0, 6)
+    found = beam.assemble(turned)
+    G = beam.geometric_stiffness(turned, force)
+    assert np.abs(G @ beam.rigid_vectors(found)[:, :3]).max() < 1e-11  # entries are 36 / 30 N / h, about 1e2
+    values = [np.linalg.eigvalsh(beam.geometric_stiffness(rod, force).toarray()) for rod in (turned, straight)]
+    np.testing.assert_allclose(*values, atol=1e-11)

@@ -1,0 +1,151 @@
+"""A rod is the same rod wherever it lies: poses, far from the origin, and rods joined to a frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+import xarray as xr
+
+from pipeline.core.algebra import rotation_vector_to_matrix
+from pipeline.structure.fe import beam, mesh
+from pipeline.structure.modes import bundle, solve
+from tests.analytic.beam_models import RECIPE
+
+POSES: dict[str, dict[str, Any]] = {
+    "turned": {"position": [0.1, -0.2, 0.3], "rotation_vector": [0.4, -1.1, 0.7]},
+    "upright": {"position": [0.0, 0.0, 0.0], "axes": {"x": [0, 0, 1], "y": [1, 0, 0]}},
+    # a kilometre away, where 1e-16 of the place is 1e-10 of a millimetre
+    "far": {"position": [600.0, -700.0, 400.0], "rotation_vector": [0.4, -1.1, 0.7]},
+}
+#: a rod without any symmetry that would leave shapes open: other stiffness in each plane, a ball beside the axis
+ROD: dict[str, Any] = RECIPE | {
+    "theory": "timoshenko",
+    "torsion": "quadratic",
+    "section": {"type": "rectangle", "width": 0.02, "height": 0.013},
+    "end_section": {"type": "rectangle", "width": 0.012, "height": 0.01},
+    "masses": {"ball": {"x": 0.24, "mass": 0.3, "com": [0.01, 0.002, -0.003], "inertia": [6e-5, 8e-5, 9e-5]}},
+}
+
+
+def reduced(reference: str, count: int, pose: dict[str, Any] | None = None) -> xr.Dataset:
+    rod = mesh.build(ROD | ({"pose": pose} if pose else {}))
+    return bundle.build(rod, solve(rod, reference, count))
+
+
+@pytest.mark.parametrize("pose", POSES)
+@pytest.mark.parametrize("reference, count", [("free-free", 8), ("craig-bampton", 12)])
+def test_the_bundle_is_the_same_in_the_rods_own_frames(reference: str, count: int, pose: str) -> None:
+    here, there = reduced(reference, count), reduced(reference, count, POSES[pose])
+    # matrices agree to 1e-13 (below); solvers on them, whose eigenvalues span 1e9, leave this much of the lowest
+    np.testing.assert_allclose(there["frequency"], here["frequency"], rtol=5e-12)
+    # named frames: z along the rod, whatever the mesh frame; a mode may come with the other sign
+    signs = _signs(here, there)
+    for name in ("frame_translation_shape", "frame_rotation_shape"):
+        a, b = (_in_frames(data, name) for data in (here, there))
+        np.testing.assert_allclose(b * signs, a, rtol=0.0, atol=1e-11 * np.abs(a).max())
+
+
+@pytest.mark.parametrize("pose", ["turned", "upright"])
+def test_invariants_turn_and_shift_with_the_rod(pose: str) -> None:
+    here, there = reduced("craig-bampton", 12), reduced("craig-bampton", 12, POSES[pose])
+    position = np.array(POSES[pose]["position"])
+    R = there["frame_rotation"].values[0] @ here["frame_rotation"].values[0].T
+    signs = _signs(here, there)
+    mass = float(here["mass"])
+    assert float(there["mass"]) == pytest.approx(mass, rel=1e-14)
+    first = R @ here["first_moment"].values
+    np.testing.assert_allclose(there["first_moment"], first + mass * position, rtol=1e-12)
+    second = R @ here["second_moment"].values @ R.T
+    second += np.outer(first, position) + np.outer(position, first) + mass * np.outer(position, position)
+    np.testing.assert_allclose(there["second_moment"], second, rtol=1e-12, atol=1e-14)
+    modal = R @ here["modal_first_moment"].values * signs
+    _close(there["modal_first_moment"].values, modal)
+    moment = np.einsum("ka,lb,abj->klj", R, R, here["position_mode_moment"].values) * signs
+    _close(there["position_mode_moment"].values, moment + position[:, None, None] * modal)
+    pairs = np.einsum("ka,lb,abij->klij", R, R, here["mode_mode_moment"].values) * np.outer(signs, signs)
+    _close(there["mode_mode_moment"].values, pairs)
+
+
+def _close(found: np.ndarray, expected: np.ndarray) -> None:
+    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-11 * np.abs(expected).max())
+
+
+def _in_frames(data: xr.Dataset, name: str) -> np.ndarray:
+    return np.einsum("fka,fkj->faj", data["frame_rotation"].values, data[name].values)
+
+
+def _signs(here: xr.Dataset, there: xr.Dataset) -> np.ndarray:
+    a, b = (
+        np.concatenate([_in_frames(d, "frame_translation_shape"), 0.1 * _in_frames(d, "frame_rotation_shape")])
+        for d in (here, there)
+    )
+    return np.sign(np.einsum("faj,faj->j", a, b))
+
+
+@pytest.mark.parametrize("theory", ["rayleigh", "timoshenko"])
+def test_matrices_turn_with_the_rod(theory: str) -> None:
+    recipe = ROD | {"theory": theory}
+    here, there = (beam.assemble(mesh.build(r)) for r in (recipe, recipe | {"pose": POSES["far"]}))
+    R = rotation_vector_to_matrix(np.array(POSES["far"]["rotation_vector"]))
+    turn = np.eye(here.size)
+    for start in range(0, here.nodal_size, 3):
+        turn[start : start + 3, start : start + 3] = R
+    for a, b in ((here.stiffness, there.stiffness), (here.mass, there.mass)):
+        expected = turn @ a.toarray() @ turn.T
+        scale = np.sqrt(np.outer(expected.diagonal(), expected.diagonal()))
+        # the places of the nodes play no part, so the kilometre costs no digit
+        assert (np.abs(b.toarray() - expected) <= 1e-14 * np.abs(expected).max() + 1e-13 * scale).all()
+
+
+def test_rigid_motions_of_a_turned_rod_store_no_energy() -> None:
+    found = beam.assemble(mesh.build(ROD | {"pose": POSES["turned"]}))
+    force = found.stiffness @ beam.rigid_vectors(found)
+    assert np.abs(force).max() <= 1e-12 * np.abs(found.stiffness).sum(axis=1).max()
+
+
+# NAFEMS FV2, pin-ended double cross, in-plane: eight arms of 5 m, 125 x 125 mm, E = 200 GPa, 8000 kg/m^3
+ARM: dict[str, Any] = {
+    "theory": "euler-bernoulli",
+    "shape": {"type": "straight-beam", "length": 5.0},
+    "material": {"density": 8000.0, "youngs_modulus": 2e11, "poisson": 0.3},
+    "section": {"type": "rectangle", "width": 0.125, "height": 0.125},
+    "frames": {"centre": {"x": 0.0}, "pin": {"x": 5.0}},
+}
+#: analytical values [Hz] of inextensible arms, and how often each comes
+FV2 = ((11.33624602646386, 1), (17.70937984816896, 7), (45.34498410585544, 1), (57.38973374330916, 7))
+
+
+def double_cross(elements: int, *, centre_held: bool) -> np.ndarray:
+    """The sixteen lowest in-plane frequencies [Hz] of eight arms, 45 deg apart, one node in common."""
+    arms = [
+        mesh.build(ARM | {"elements": elements, "pose": {"rotation_vector": [0.0, 0.0, k * np.pi / 4.0]}})
+        for k in range(8)
+    ]
+    plane = np.array([0, 1, 5])
+    size = 3 + 8 * 3 * elements
+    K, M = np.zeros((size, size)), np.zeros((size, size))
+    for k, arm in enumerate(arms):
+        found = beam.assemble(arm)
+        own = (6 * np.arange(elements + 1)[:, None] + plane).ravel()
+        place = np.concatenate([np.arange(3), 3 + 3 * elements * k + np.arange(3 * elements)])
+        for total, part in ((K, found.stiffness), (M, found.mass)):
+            total[np.ix_(place, place)] += part.toarray()[np.ix_(own, own)]
+    held = [3 + 3 * elements * (k + 1) - 3 + axis for k in range(8) for axis in (0, 1)]
+    free = np.setdiff1d(np.arange(size), held + ([0, 1] if centre_held else []))
+    values = scipy.linalg.eigvalsh(K[np.ix_(free, free)], M[np.ix_(free, free)])[:16]
+    return np.sqrt(values) / (2.0 * np.pi)
+
+
+def test_nafems_fv2_double_cross_of_eight_turned_rods() -> None:
+    expected = np.repeat([f for f, _ in FV2], [n for _, n in FV2])
+    # inextensible arms hold their centre; 0.1 % for the first cluster with 4 elements per arm, for both with 8:
+    # (beta h)^4 / 1440 is 6.5e-4 and 4.2e-4 there
+    np.testing.assert_allclose(double_cross(4, centre_held=True)[:8], expected[:8], rtol=1e-3)
+    np.testing.assert_allclose(double_cross(8, centre_held=True), expected, rtol=1e-3)
+    # real arms stretch: in each cluster of seven the two modes in which the centre moves are lower
+    free = double_cross(8, centre_held=False) / double_cross(8, centre_held=True)
+    assert np.flatnonzero(np.abs(free - 1.0) > 1e-3).tolist() == [1, 2, 9, 10]
+    assert free.max() < 1.0 + 1e-9

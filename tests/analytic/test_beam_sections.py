@@ -1,0 +1,144 @@
+"""Section constants against quadrature, tables and a solution of the torsion problem, and sections in skew axes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse as sp
+import scipy.sparse.linalg
+
+from pipeline.structure.fe import beam, mesh, section
+from pipeline.structure.modes import bundle, solve
+from tests.analytic.beam_models import RECIPE, build
+
+# Timoshenko & Goodier, *Theory of Elasticity*, sec. 109: J = k1 b a^3 by b/a, printed digits
+PRINTED_TORSION = {1.0: 0.1406, 1.2: 0.166, 1.5: 0.196, 2.0: 0.229, 2.5: 0.249, 3.0: 0.263, 4.0: 0.281, 10.0: 0.312}
+# Cowper (1966), table 1 for nu = 0.3
+COWPER = {"circle": 0.886, "rectangle": 0.850, "thin tube": 0.531}
+
+
+@pytest.mark.parametrize("ratio", PRINTED_TORSION)
+def test_torsion_of_rectangles_is_the_printed_one(ratio: float) -> None:
+    found = section.rectangle_torsion(0.02 * ratio, 0.02) / (ratio * 0.02**4)
+    assert found == pytest.approx(PRINTED_TORSION[ratio], abs=6e-4)  # three digits are printed
+    assert section.rectangle_torsion(0.02, 0.02 * ratio) == section.rectangle_torsion(0.02 * ratio, 0.02)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 1.7, 4.0])
+def test_torsion_of_rectangles_is_that_of_prandtls_membrane(ratio: float) -> None:
+    """Laplace(phi) = -2 on the rectangle, J = 2 int phi, by finite differences and extrapolation."""
+    coarse, fine = (_membrane(ratio, n) for n in (40, 80))
+    # second order: a third of the difference is left
+    expected = fine + (fine - coarse) / 3.0
+    # the extrapolated rest is of fourth order, with a logarithm from the corners: 7e-6 for the longest
+    assert section.rectangle_torsion(ratio, 1.0) == pytest.approx(expected, rel=1e-5)
+
+
+def _membrane(ratio: float, n: int) -> float:
+    lines = []
+    for length in (ratio, 1.0):
+        h = length / n
+        lines.append(sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n - 1, n - 1)) / h**2)
+    eye = sp.eye_array(n - 1)
+    A = sp.csc_array(sp.kron(lines[0], eye) + sp.kron(eye, lines[1]))
+    phi = scipy.sparse.linalg.spsolve(A, np.full((n - 1) ** 2, 2.0))
+    return float(2.0 * phi.sum() * ratio / n**2)
+
+
+def test_second_moments_are_those_of_the_area() -> None:
+    node, weight = np.polynomial.legendre.leggauss(3)
+    y, z = np.meshgrid(0.015 * node, 0.01 * node, indexing="ij")
+    dA = 0.015 * 0.01 * np.outer(weight, weight)
+    found = section.rectangle(0.03, 0.02)
+    assert found.area == pytest.approx(dA.sum(), rel=1e-14)
+    assert found.second_y == pytest.approx((dA * z**2).sum(), rel=1e-14)
+    assert found.second_z == pytest.approx((dA * y**2).sum(), rel=1e-14)
+
+
+def test_a_tube_is_a_circle_less_a_circle() -> None:
+    tube, outer, inner = section.tube(0.02, 0.015), section.circle(0.02), section.circle(0.015)
+    for name in ("area", "torsion", "second_y", "second_z", "polar"):
+        assert getattr(tube, name) == pytest.approx(getattr(outer, name) - getattr(inner, name), rel=1e-14)
+
+
+def test_shear_coefficients_are_cowpers() -> None:
+    assert section.circle_shear_coefficient(0.3) == pytest.approx(COWPER["circle"], abs=5e-4)
+    assert section.rectangle_shear_coefficient(0.3) == pytest.approx(COWPER["rectangle"], abs=5e-4)
+    assert section.tube_shear_coefficient(0.3, 1.0) == pytest.approx(COWPER["thin tube"], abs=5e-4)
+    # without a hole it is the full circle; a thin wall has 2 (1 + nu) / (4 + 3 nu)
+    assert section.tube_shear_coefficient(0.3, 0.0) == pytest.approx(section.circle_shear_coefficient(0.3), rel=1e-15)
+    assert section.tube_shear_coefficient(0.3, 1.0) == pytest.approx(2.6 / 4.9, rel=1e-15)
+
+
+def rotated(angle: float, **more: Any) -> dict[str, Any]:
+    """The constants of a 30 x 12 mm rectangle, its sides turned by `angle` about the rod."""
+    flat = section.rectangle(0.03, 0.012)
+    mean, half = 0.5 * (flat.second_z + flat.second_y), 0.5 * (flat.second_z - flat.second_y)
+    return {
+        "type": "general",
+        "area": flat.area,
+        "torsion": flat.torsion,
+        "second_z": mean + half * np.cos(2.0 * angle),
+        "second_y": mean - half * np.cos(2.0 * angle),
+        "product": half * np.sin(2.0 * angle),
+        **more,
+    }
+
+
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "rayleigh", "timoshenko"])
+def test_skew_axes_change_no_frequency(theory: str) -> None:
+    flat = {"type": "rectangle", "width": 0.03, "height": 0.012, "shear_coefficient": 0.85}
+    principal = _elastic(build(theory=theory, section=flat))
+    skew = _elastic(build(theory=theory, section=rotated(0.6, shear_coefficient=0.85)))
+    np.testing.assert_allclose(skew, principal, rtol=1e-9)  # dense solver on a spectrum of 1e7
+
+
+def test_skew_axes_are_the_rod_turned_about_itself() -> None:
+    """Every invariant of the reduced rod, not only its frequencies."""
+    turned = {"rotation_vector": [0.6, 0.0, 0.0]}
+    flat = {"type": "rectangle", "width": 0.03, "height": 0.012}
+    # the rod's own y and z stay along the mesh axes in one, turn with the rectangle in the other
+    skew, rigid = build(section=rotated(0.6)), build(section=flat, pose=turned)
+    a, b = (bundle.build(rod, solve(rod, "free-free", 6)) for rod in (skew, rigid))
+    np.testing.assert_allclose(a["frequency"], b["frequency"], rtol=1e-9)
+    np.testing.assert_allclose(a["second_moment"], b["second_moment"], rtol=1e-12, atol=1e-18)
+    signs = np.sign(np.einsum("nkj,nkj->j", a["shape_translation"].values, b["shape_translation"].values))
+    # torsion has no translation
+    signs[signs == 0.0] = 1.0
+    found = np.abs(np.einsum("kkij->ij", b["mode_mode_moment"].values))
+    np.testing.assert_allclose(found, np.eye(6), atol=1e-9)
+    expected = b["mode_mode_moment"].values * np.outer(signs, signs)
+    np.testing.assert_allclose(np.abs(a["mode_mode_moment"].values), np.abs(expected), atol=1e-8)
+
+
+def test_inertia_given_apart_enters_the_mass_alone() -> None:
+    """A general section that lends the rod ten times the spin of its area: torsion falls by the root of ten."""
+    plain, heavy = rotated(0.0), rotated(0.0)
+    heavy["inertia"] = [10.0 * (plain["second_y"] + plain["second_z"]), plain["second_y"], plain["second_z"]]
+    a, b = (solve(build(section=s), "free-free", 10) for s in (plain, heavy))
+    first = [float(m["frequency"].values[list(m["kind"].values).index("torsion")]) for m in (a, b)]
+    assert first[0] / first[1] == pytest.approx(np.sqrt(10.0), rel=1e-9)
+    bending = [m["frequency"].values[m["kind"].values == "bending"][:4] for m in (a, b)]
+    np.testing.assert_allclose(*bending, rtol=1e-9)
+
+
+def test_euler_bernoulli_rods_spin_but_do_not_rock() -> None:
+    """No rotary inertia in bending, in rigid motion either: inertia across the rod is that of a line of mass."""
+    rod = mesh.build(RECIPE | {"theory": "euler-bernoulli"})
+    data = bundle.build(rod, solve(rod, "free-free", 7))
+    second = data["second_moment"].values
+    inertia = np.trace(second) * np.eye(3) - second
+    mass = float(data["mass"])
+    assert inertia[1, 1] == pytest.approx(mass * 0.24**2 / 3.0, rel=1e-12)
+    assert inertia[0, 0] == pytest.approx(mass * 0.01**2 / 2.0, rel=1e-12)
+    modal_mass = np.einsum("kkij->ij", data["mode_mode_moment"].values)
+    np.testing.assert_allclose(modal_mass, np.eye(7), atol=1e-10)
+
+
+def _elastic(rod: Any) -> np.ndarray:
+    found = beam.assemble(rod)
+    values = scipy.linalg.eigvalsh(found.stiffness.toarray(), found.mass.toarray())
+    return np.sqrt(values[6:20]) / (2.0 * np.pi)

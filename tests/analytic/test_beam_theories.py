@@ -1,0 +1,227 @@
+"""Each theory of beams, with all kinds of ends, against the exact roots of its own frequency equation."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from pipeline.structure.fe import beam
+from pipeline.structure.fe.section import circle_shear_coefficient
+from pipeline.structure.modes import closed_form
+from pipeline.structure.modes.closed_form import Span
+from tests.analytic.beam_models import (
+    BENDING,
+    BENDING_Z,
+    EXTENSION,
+    RECIPE,
+    TORSION,
+    WORDS,
+    build,
+    frequencies,
+    held_system,
+    order,
+)
+from tests.analytic.beam_solutions import PAPER_ROD
+
+E, G, RHO = PAPER_ROD.youngs_modulus, PAPER_ROD.shear_modulus, PAPER_ROD.density
+A, I, L = PAPER_ROD.area, PAPER_ROD.second_moment, PAPER_ROD.length
+SHEAR = circle_shear_coefficient(PAPER_ROD.poisson) * G * A
+SPANS = {
+    "euler-bernoulli": Span(L, E * I, RHO * A),
+    "rayleigh": Span(L, E * I, RHO * A, RHO * I),
+    "timoshenko": Span(L, E * I, RHO * A, RHO * I, SHEAR),
+}
+ENDS = ("FF", "CC", "CF", "FC", "PP", "CP", "PF", "GG", "CG", "PG", "GF")
+#: 0.01 %
+WANTED = 1e-4
+# Exact frequencies [Hz] of the paper's rod from a program of other authorship; P pinned, C clamped, F free.
+INDEPENDENT = {
+    ("CF", "euler-bernoulli"): (248.48644413848672, 1557.2379637700344, 4360.311390061857, 8544.47006488191),
+    ("CF", "rayleigh"): (248.23615561158698, 1546.3922441874804, 4288.9550955593595, 8291.210028431868),
+    ("CF", "timoshenko"): (247.492761124534, 1515.358647279601, 4098.005654619874, 7669.651775566156),
+    ("PP", "euler-bernoulli"): (697.5120172690308, 2790.0480690761233, 6277.608155421278),
+    ("PP", "rayleigh"): (696.0228399378884, 2766.44757081701, 6159.987654567392),
+    ("PP", "timoshenko"): (691.6399647065812, 2700.2694227661304, 5853.678280140553),
+}
+# the same program with kappa = 0.9
+KAPPA_09 = {
+    "FF": (1552.7587669133898, 4147.311964201585, 7795.930788610589),
+    "CC": (1529.6005076471188, 4049.8981065578914, 7562.094331180602),
+    "CF": (247.5021056692413, 1515.739289901413, 4100.261575308612),
+}
+# its torsional and axial frequencies of twelve linear elements, free or fixed at both ends
+TWELVE_LINEAR = ((6553.024067023286, 13218.447482364336), (10687.658815902936, 21558.63542122052))
+# docs/structure.md, "How many elements"
+DOCUMENTED = {
+    ("rayleigh", 4): (1.3e-3, 9.2e-3, 2.2e-2),
+    ("rayleigh", 8): (8.4e-5, 6.3e-4, 2.4e-3),
+    ("rayleigh", 12): (1.7e-5, 1.3e-4, 4.8e-4),
+    ("rayleigh", 18): (3.3e-6, 2.5e-5, 9.6e-5),
+    ("timoshenko", 4): (1.2e-3, 8.1e-3, 1.9e-2),
+    ("timoshenko", 8): (7.9e-5, 5.5e-4, 1.9e-3),
+    ("timoshenko", 12): (1.6e-5, 1.1e-4, 3.9e-4),
+    ("timoshenko", 18): (3.1e-6, 2.2e-5, 7.9e-5),
+}
+# beta L of Euler-Bernoulli beams, Blevins (1979), *Formulas for Natural Frequency and Mode Shape*, table 8-1
+BLEVINS = {
+    "CP": (3.92660231, 7.06858275, 10.21017612),
+    "PF": (3.92660231, 7.06858275, 10.21017612),
+    "CG": (2.36502037, 5.49780392, 8.63937983),
+    "GF": (2.36502037, 5.49780392, 8.63937983),
+    "PG": (math.pi / 2, 3 * math.pi / 2, 5 * math.pi / 2),
+    "GG": (math.pi, 2 * math.pi, 3 * math.pi),
+}
+
+
+def words(ends: str) -> str:
+    return "-".join(WORDS[letter] for letter in ends)
+
+
+@pytest.mark.parametrize("ends, theory", INDEPENDENT)
+def test_closed_forms_agree_with_an_independent_program(ends: str, theory: str) -> None:
+    expected = INDEPENDENT[ends, theory]
+    found = closed_form.bending(SPANS[theory], words(ends), len(expected))
+    np.testing.assert_allclose(found, expected, rtol=1e-11)  # both solve to rounding times a few
+
+
+@pytest.mark.parametrize("ends", BLEVINS)
+def test_closed_forms_have_the_printed_wave_numbers(ends: str) -> None:
+    hertz = closed_form.bending(SPANS["euler-bernoulli"], words(ends), 3)
+    beta = (RHO * A / (E * I) * (2.0 * np.pi * hertz) ** 2) ** 0.25
+    np.testing.assert_allclose(beta * L, BLEVINS[ends], rtol=0.0, atol=1e-8)  # eight printed decimals
+
+
+@pytest.mark.parametrize("theory", SPANS)
+def test_turning_the_rod_round_changes_nothing(theory: str) -> None:
+    for ends in ("fixed-free", "fixed-pinned", "pinned-free", "guided-fixed"):
+        other = "-".join(reversed(ends.split("-")))
+        there, back = (closed_form.bending(SPANS[theory], e, 6) for e in (ends, other))
+        np.testing.assert_allclose(there, back, rtol=1e-11)
+
+
+@pytest.mark.parametrize("length", [0.24, 0.05, 0.02])
+def test_pinned_timoshenko_rods_have_both_spectra(length: float) -> None:
+    """Pinned at both ends sin(n pi x / L) solves the theory on both branches, n = 0 on the second one too."""
+    span = Span(length, E * I, RHO * A, RHO * I, SHEAR)
+    n = np.arange(60) * np.pi / length
+    a, c, s = span.rotary / span.bending, span.line_mass / span.bending, span.line_mass / span.shear
+    # omega^4 a s - omega^2 (n^2 (a + s) + c) + n^4 = 0; the lower root without cancellation
+    b = n**2 * (a + s) + c
+    upper = (b + np.sqrt(b**2 - 4.0 * a * s * n**4)) / (2.0 * a * s)
+    lower = n[1:] ** 4 / (a * s * upper[1:])
+    expected = np.sort(np.sqrt(np.concatenate([lower, upper])))[:12] / (2.0 * np.pi)
+    cut_off = np.sqrt(span.shear / span.rotary) / (2.0 * np.pi)
+    assert (expected[-1] > cut_off) == (length < 0.1)
+    np.testing.assert_allclose(closed_form.bending(span, "pinned-pinned", 12), expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize("theory", SPANS)
+@pytest.mark.parametrize("ends", ENDS)
+def test_eighteen_elements_give_three_modes_within_a_hundredth_of_a_percent(ends: str, theory: str) -> None:
+    exact = closed_form.bending(SPANS[theory], words(ends), 3)
+    error = frequencies(build(elements=18, theory=theory), BENDING, ends, 3) / exact - 1.0
+    assert error.max() < WANTED
+    # admissible shapes and exact integration: from above
+    assert error.min() > 0.0
+
+
+@pytest.mark.parametrize("theory, elements", DOCUMENTED)
+def test_documented_errors_are_the_measured_ones(theory: str, elements: int) -> None:
+    """The table in docs/structure.md: the worst of all ends, mode by mode."""
+    rod = build(elements=elements, theory=theory)
+    exact = np.array([closed_form.bending(SPANS[theory], words(ends), 3) for ends in ENDS])
+    found = np.array([frequencies(rod, BENDING, ends, 3) for ends in ENDS])
+    # two digits are printed
+    np.testing.assert_allclose((found / exact - 1.0).max(axis=0), DOCUMENTED[theory, elements], rtol=0.05)
+
+
+@pytest.mark.parametrize("theory", SPANS)
+@pytest.mark.parametrize("ends", ["FF", "CC", "CF", "PP", "CP"])
+def test_bending_converges_at_order_four_in_both_planes(ends: str, theory: str) -> None:
+    exact = closed_form.bending(SPANS[theory], words(ends), 2)
+    elements = [8, 16, 32]
+    for plane in (BENDING, BENDING_Z):
+        error = [frequencies(build(elements=n, theory=theory), plane, ends, 2) / exact - 1.0 for n in elements]
+        # the coarsest mesh is not quite in the asymptotic range
+        np.testing.assert_allclose(order(elements, np.array(error)), 4.0, atol=0.15)
+
+
+def test_condensing_the_unknowns_inside_a_timoshenko_cell_costs_two_orders() -> None:
+    """Statically condensed it is the element of interdependent interpolation: exact in statics only."""
+    exact = closed_form.bending(SPANS["timoshenko"], "fixed-fixed", 2)
+    elements, errors = [16, 32, 64], []
+    for n in elements:
+        K, M = held_system(build(elements=n, theory="timoshenko"), BENDING, "CC")
+        nodal = 2 * (n - 1)
+        shapes = np.vstack([np.eye(nodal), -np.linalg.solve(K[nodal:, nodal:], K[nodal:, :nodal])])
+        values = scipy.linalg.eigvalsh(shapes.T @ K @ shapes, shapes.T @ M @ shapes)
+        errors.append(np.sqrt(values[:2]) / (2.0 * np.pi) / exact - 1.0)
+    np.testing.assert_allclose(order(elements, np.array(errors)), 2.0, atol=0.1)
+
+
+def test_slender_timoshenko_rods_do_not_lock() -> None:
+    """Two elements of a rod a thousand times longer than thick: the Hermite value, not many times it."""
+    thin = RECIPE | {"elements": 2, "section": {"type": "circle", "radius": L / 1000.0}}
+    shear, none = (
+        frequencies(build(**thin | {"theory": theory}), BENDING, "CF", 2) for theory in ("timoshenko", "rayleigh")
+    )
+    # the exact ratio is 1 - O((r/L)^2), 1e-5 at the second mode; a locked element is off by factors
+    np.testing.assert_allclose(shear, none, rtol=5e-5)
+
+
+@pytest.mark.parametrize("ends", KAPPA_09)
+def test_a_shear_coefficient_of_the_recipe_replaces_cowpers(ends: str) -> None:
+    section = {"type": "circle", "radius": PAPER_ROD.radius, "shear_coefficient": 0.9}
+    found = frequencies(build(elements=24, theory="timoshenko", section=section), BENDING, ends, 3)
+    np.testing.assert_allclose(found, KAPPA_09[ends], rtol=WANTED)
+
+
+@pytest.mark.parametrize("degree, elements, expected", [("linear", [8, 16, 32], 2.0), ("quadratic", [4, 8, 16], 4.0)])
+@pytest.mark.parametrize("motion, name", [(TORSION, "torsion"), (EXTENSION, "extension")])
+@pytest.mark.parametrize("ends", ["FF", "CC", "CF"])
+def test_twist_and_extension_converge_at_twice_their_degree(
+    ends: str, motion: tuple[int, ...], name: str, degree: str, elements: list[int], expected: float
+) -> None:
+    speed = math.sqrt((G if name == "torsion" else E) / RHO)
+    exact = closed_form.rod(speed, L, words(ends), 2)
+    error = np.array(
+        [frequencies(build(elements=n, **{name: degree}), motion, ends, 2) / exact - 1.0 for n in elements]
+    )
+    assert error.min() > 0.0
+    np.testing.assert_allclose(order(elements, error), expected, atol=0.1)
+
+
+@pytest.mark.parametrize("ends", ["FF", "CC"])
+def test_twelve_linear_elements_agree_with_an_independent_program(ends: str) -> None:
+    rod = build(elements=12)
+    twist, stretch = (frequencies(rod, motion, ends, 2) for motion in (TORSION, EXTENSION))
+    # dense solvers of two programs on twelve unknowns
+    np.testing.assert_allclose(twist, TWELVE_LINEAR[0], rtol=1e-10)
+    np.testing.assert_allclose(stretch, TWELVE_LINEAR[1], rtol=1e-10)
+
+
+@pytest.mark.parametrize("motion, name", [(TORSION, "torsion"), (EXTENSION, "extension")])
+def test_resolution_of_the_first_twist_and_extension(motion: tuple[int, ...], name: str) -> None:
+    """65 linear elements per half wave, or 6 quadratic ones: (pi/64)^2 / 24 is 0.01004 %, just too much."""
+    exact = closed_form.rod(math.sqrt((G if name == "torsion" else E) / RHO), L, "fixed-fixed", 1)
+    for degree, enough, short in (("linear", 65, 64), ("quadratic", 6, 5)):
+        good, bad = (
+            float(frequencies(build(elements=n, **{name: degree}), motion, "CC", 1)[0] / exact[0] - 1.0)
+            for n in (enough, short)
+        )
+        assert good < WANTED < bad
+
+
+def test_euler_bernoulli_has_no_rotary_inertia_but_spins() -> None:
+    found = beam.assemble(build(theory="euler-bernoulli"))
+    turn = np.zeros(found.size)
+    turn[4::6] = 1.0  # every section about y, the axis at rest
+    spin = np.zeros(found.size)
+    spin[3::6] = 1.0
+    # the Hermite cubics between the nodes deflect: consistent mass of two unit slopes, rho A h^3 (4 - 3 - 3 + 4) / 420
+    h = L / 12
+    assert turn @ found.mass @ turn == pytest.approx(RHO * A * L * h**2 / 210.0, rel=1e-12)
+    assert spin @ found.mass @ spin == pytest.approx(RHO * 2.0 * I * L, rel=1e-13)

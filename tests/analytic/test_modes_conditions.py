@@ -1,0 +1,202 @@
+"""Reference conditions: complete ones span one space, frequencies are those of theory, wrong ones are refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+import xarray as xr
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.structure.fe import mesh
+from pipeline.structure.fe.model import Model
+from pipeline.structure.kinds.kind import of_mesh
+from pipeline.structure.modes import compliance, eigen, solve
+from pipeline.structure.modes.select import Wanted
+from pipeline.structure.modes.statics import Flexibility, support
+
+MESHES = Path(__file__).parents[2] / "meshes"
+#: the rod of ../../meshes/actuated_rod.toml
+L, E, RHO, A, I = 0.24, 7.17e10, 2740.0, np.pi * 1e-4, np.pi * 1e-8 / 4.0
+G = E / 2.66
+#: six conditions each, nothing truncated
+COMPLETE: dict[str, dict[str, object]] = {
+    "free-free": {},
+    "cantilever": {},
+    "pinned-pinned": {},
+    "constrained": {"held": ("bottom.x", "bottom.y", "bottom.rz", "at_60mm.z", "top.x", "top.y")},
+    "craig-bampton": {"interfaces": ("bottom", "at_60mm", "top")},
+    "craig-chang": {},
+    "residual-flexibility": {},
+    "mean-axis": {"of": "craig-bampton"},
+}
+
+
+@pytest.fixture(scope="module")
+def rod() -> xr.Dataset:
+    return mesh.build(mesh.read_recipe(MESHES / "actuated_rod.toml"))
+
+
+@pytest.fixture(scope="module")
+def body(rod: xr.Dataset) -> Flexibility:
+    return support(of_mesh(rod).assemble(rod), lambda share: None)
+
+
+@pytest.mark.parametrize("condition", COMPLETE)
+def test_complete_sets_span_the_same_space(rod: xr.Dataset, body: Flexibility, condition: str) -> None:
+    """Each has every elastic coordinate, all static compliance, and with rigid motion the free body's frequencies."""
+    vectors = solve(rod, condition, None, **COMPLETE[condition])["vector"].values  # type: ignore[arg-type]
+    model = body.model
+    assert vectors.shape == (78, 72)
+    together = np.hstack([model.rigid, vectors])
+    assert np.linalg.matrix_rank(together / np.linalg.norm(together, axis=0)) == 78
+    share = compliance.of_basis(body, model.interfaces, vectors) / compliance.full(body, model.interfaces)
+    # the eigenvalues of the basis span 1e9; what is left of rounding in a static answer is about its root
+    np.testing.assert_allclose(share, 1.0, rtol=0.0, atol=1e-7)
+    values, _ = eigen.rediagonalise(model.stiffness, model.mass, body.relieved(vectors))
+    full = eigen.dense(model.stiffness, model.mass, 78)[0][6:]
+    # eps times the ratio of the largest to the lowest eigenvalue is 1e-7 as a bound
+    np.testing.assert_allclose(values, full, rtol=2e-7)
+
+
+def test_mean_axes_take_all_momentum_out_of_any_basis(rod: xr.Dataset, body: Flexibility) -> None:
+    found = solve(rod, "mean-axis", 13, of="craig-bampton")
+    momentum = body.momentum.T @ found["vector"].values
+    # sqrt(m) is the largest momentum that a shape of unit modal mass could have
+    assert np.abs(momentum).max() < 1e-12 * np.sqrt(0.2066)
+    held = solve(rod, "craig-bampton", 13)["vector"].values
+    assert np.abs(body.momentum.T @ held).max() > 0.1 * np.sqrt(0.2066)
+    assert "craig-bampton" in found.attrs["rigid_motion"]
+
+
+def test_pinned_rods_have_the_frequencies_of_theory(rod: xr.Dataset) -> None:
+    """Rayleigh beam: omega^2 = E I k^4 / (rho A + rho I k^2); turning is held at one pin: (2n - 1) c / 4 L."""
+    recipe = mesh.read_recipe(MESHES / "actuated_rod.toml") | {"elements": 64}
+    found = solve(mesh.build(recipe), "pinned-pinned", 8)
+    k = np.pi * np.arange(1, 4) / L
+    bending = np.sqrt(E * I * k**4 / (RHO * A + RHO * I * k**2)) / (2.0 * np.pi)
+    kinds = found["kind"].values
+    # 64 cubic elements are within 1e-6; linear ones of torsion and extension within (pi/2/64)^2/24 = 3e-5
+    np.testing.assert_allclose(found["frequency"].values[kinds == "bending"], np.repeat(bending, 2)[:6], rtol=1e-6)
+    np.testing.assert_allclose(found["frequency"].values[kinds == "torsion"], np.sqrt(G / RHO) / (4 * L), rtol=5e-5)
+    np.testing.assert_allclose(found["frequency"].values[kinds == "axial"], np.sqrt(E / RHO) / (4 * L), rtol=5e-5)
+
+
+def test_attachment_modes_have_the_free_rods_answer_to_an_end_load(rod: xr.Dataset, body: Flexibility) -> None:
+    """A force on the end of a free rod, balanced by its inertia, moves that end by F L / 3 E A from the mean."""
+    whole = compliance.full(body, body.model.interfaces)
+    axial = whole[3, 3, 2]  # frame `top` against nothing, z of the frame runs along the rod
+    # 12 linear elements: constant strain where the true one is linear loses 1 / 4 n^2 of the energy
+    assert axial == pytest.approx(L / (3.0 * E * A) * (1.0 - 0.25 / 144), rel=1e-9)
+    for condition in ("craig-chang", "residual-flexibility"):
+        found = solve(rod, condition, 19)["vector"].values
+        share = compliance.of_basis(body, body.model.interfaces, found) / whole
+        # both frames are loaded: all their compliance is there, held or free
+        np.testing.assert_allclose(share[np.ix_([0, 3], [0, 3])], 1.0, rtol=0.0, atol=1e-9)
+
+
+def test_both_attachment_bases_are_one_space(rod: xr.Dataset) -> None:
+    chang, rubin = (solve(rod, name, 25)["frequency"].values for name in ("craig-chang", "residual-flexibility"))
+    np.testing.assert_allclose(chang, rubin, rtol=1e-7)
+
+
+def means(model: Model) -> sp.csr_array:
+    """Six functionals that mix degrees of freedom: the mean motion of both ends."""
+    return sp.csr_array(0.5 * (model.interfaces[0].motion + model.interfaces[3].motion))
+
+
+@pytest.mark.parametrize("rows", [means, lambda model: model.interfaces[0].motion])
+def test_dense_and_sparse_solvers_agree_on_held_functionals(
+    monkeypatch: pytest.MonkeyPatch, body: Flexibility, rows: Callable[[Model], sp.csr_array]
+) -> None:
+    from pipeline.structure.kinds.kind import silent
+    from pipeline.structure.modes import normal
+
+    held = rows(body.model)
+    dense = normal.lowest(body.model, held, 8, lambda: body, silent)
+    monkeypatch.setattr(eigen, "DENSE_LIMIT", 10)
+    sparse = normal.lowest(body.model, held, 8, lambda: body, silent)
+    np.testing.assert_allclose(sparse.values, dense.values, rtol=1e-9)
+    for found in (dense, sparse):
+        # what is held moves by rounding only, beside motions of 1 / sqrt(m) = 2
+        assert np.abs(held @ found.shapes).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    "wanted, count", [(Wanted(up_to=8000.0), 5), (Wanted(up_to=8500.0), 7), (Wanted(up_to=11000.0), 8)]
+)
+def test_modes_up_to_a_frequency(rod: xr.Dataset, wanted: Wanted, count: int) -> None:
+    """The free rod has two bending pairs, torsion, a third pair at 8221 Hz, axial at 10.7 kHz."""
+    found = solve(rod, "free-free", wanted=wanted)
+    assert found.sizes["mode"] == count
+    assert found["frequency"].values[-1] <= wanted.up_to  # type: ignore[operator]
+
+
+def test_modes_up_to_a_share_of_the_compliance(rod: xr.Dataset, body: Flexibility) -> None:
+    ends = (body.model.interfaces[0], body.model.interfaces[3])
+    found = solve(rod, "free-free", wanted=Wanted(compliance=0.9))
+    n = found.sizes["mode"]
+    assert compliance.least(body, ends, found["vector"].values)[0] >= 0.9
+    # the next smaller whole basis would not do
+    assert compliance.least(body, ends, found["vector"].values[:, : n - 2])[0] < 0.9
+    assert solve(rod, "craig-bampton", wanted=Wanted(compliance=1.0 - 1e-9)).sizes["mode"] == 6
+
+
+def test_modes_up_to_a_share_of_the_mass(rod: xr.Dataset) -> None:
+    """Of a clamped rod the first axial mode carries 8 / pi^2 = 0.81 of the mass, so 0.8 needs it and 0.85 more."""
+    first, more = (solve(rod, "cantilever", wanted=Wanted(mass=share)) for share in (0.8, 0.85))
+    axial = [int(np.sum(found["kind"].values == "axial")) for found in (first, more)]
+    assert axial == [1, 2]
+
+
+def test_a_mechanism_is_told_from_a_body(body: Flexibility) -> None:
+    """A hinge: the stiffness of a chain whose middle node is cut in two that share their place only."""
+    middle = body.model.place[:, 0] < 0.11
+    cut = sp.diags_array(middle.astype(float)) @ body.model.stiffness @ sp.diags_array(middle.astype(float))
+    rest = sp.diags_array((~middle).astype(float)) @ body.model.stiffness @ sp.diags_array((~middle).astype(float))
+    with pytest.raises(SolverError, match="beyond its six rigid motions"):
+        support(
+            replace(body.model, stiffness=sp.csr_array(_free(cut, body, middle) + _free(rest, body, ~middle))), _quiet
+        )
+
+
+def _free(part: sp.csr_array, body: Flexibility, own: np.ndarray) -> sp.csr_array:
+    """A part's stiffness made free of supports: rigid motions of its own taken out."""
+    R = body.model.rigid * own[:, None]
+    P = np.eye(body.model.size) - R @ np.linalg.pinv(R)
+    return sp.csr_array(P.T @ part.toarray() @ P)
+
+
+def _quiet(share: float) -> None:
+    """No progress."""
+
+
+@pytest.mark.parametrize(
+    "condition, options, message",
+    [
+        ("fixed-fixed", {"wanted": Wanted(compliance=0.5)}, r"0 of the compliance .* 'bottom'.*\n.*craig-bampton"),
+        ("free-free", {"wanted": Wanted(mass=0.5)}, r"of the mass moves with the basis\n.*count or up_to"),
+        ("free-free", {"wanted": Wanted(up_to=100.0)}, r"no mode .* 100 Hz; the first is at 1564"),
+        ("constrained", {"held": ("top.x", "top.y", "top.z")}, r"leave 3 rigid-body motions of the body free"),
+        ("constrained", {"held": ("top.x",) * 6}, r"not independent"),
+        ("constrained", {"held": ()}, "no motion is held"),
+        ("constrained", {"held": ("topp.x",)}, r"no frame called 'topp'\n.*'top'"),
+        ("constrained", {"held": ("top.w",)}, "names no direction"),
+        ("pinned-pinned", {"interfaces": ("top",)}, "two interfaces"),
+        ("pinned-pinned", {"interfaces": ("top", "top")}, "at one place"),
+        ("cantilever", {"interfaces": ()}, "clamped at an interface"),
+        ("craig-chang", {"interfaces": ()}, "need an interface"),
+        ("craig-chang", {"count": 11}, r"12 .*modes"),
+        ("mean-axis", {}, "mean axes of which shapes"),
+        ("mean-axis", {"of": "craig"}, r"no reference condition is called 'craig'"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused(
+    rod: xr.Dataset, condition: str, options: dict[str, object], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        solve(rod, condition, **({"count": 8} if "wanted" not in options else {}) | options)  # type: ignore[arg-type]

@@ -1,0 +1,110 @@
+"""Solids through the stages: artifacts that can be stored and opened elsewhere, and scenes that say how many modes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import meshio
+import numpy as np
+import pytest
+import xarray as xr
+from pydantic import ValidationError
+
+from pipeline.core.artifacts.store import write_dataset
+from pipeline.core.errors import InputError
+from pipeline.core.scene.parts import FlexibleBody, Modes
+from pipeline.structure.fe.exchange import files
+from pipeline.structure.kinds.kind import of_mesh
+from stages import s1_mesh, s2_modes, s3_bundle
+from stages.__main__ import main
+from tests.analytic.solid_models import block, build
+
+MESHES = Path(__file__).parents[2] / "meshes"
+
+
+def silent(share: float | None, text: str) -> None:
+    """No progress."""
+
+
+def stored(data: xr.Dataset, path: Path) -> xr.Dataset:
+    """The dataset after a way through a file, as the next stage gets it."""
+    write_dataset(path, data)
+    return xr.load_dataset(path)
+
+
+def test_a_solid_goes_through_the_stages(tmp_path: Path) -> None:
+    recipe = MESHES / "checks" / "solid_rod.toml"
+    body = FlexibleBody(type="flexible", mesh=str(recipe), modes=Modes(reference="craig-bampton", up_to="5000 Hz"))
+    assert s1_mesh.modules(recipe) == ("pipeline.structure.kinds.solid",)
+    assert "pipeline.structure.kinds.solid" in s2_modes.modules(body, "scene")
+    made = s1_mesh.run(s1_mesh.params(recipe), {}, silent)
+    mesh = stored(made["nc"], tmp_path / "mesh.nc")
+    solved = s2_modes.run(s2_modes.params(body), {"mesh": mesh}, silent)
+    modes = stored(solved["nc"], tmp_path / "modes.nc")
+    bundle = stored(s3_bundle.run({}, {"mesh": mesh, "modes": modes}, silent)["nc"], tmp_path / "bundle.nc")
+    # six constraint modes; between held ends two pairs lie below 5 kHz
+    assert bundle.sizes["mode"] == 10
+    (tmp_path / "mesh.vtu").write_bytes(made["vtu"])
+    assert meshio.read(tmp_path / "mesh.vtu").cells[0].type == "hexahedron20"
+    (tmp_path / "modes.vtu").write_bytes(solved["vtu"])
+    drawn = meshio.read(tmp_path / "modes.vtu")
+    assert [name.split("_")[1] for name in drawn.point_data] == [f"{k:03d}" for k in range(1, 11)]
+    # the first shape is that of a rod clamped at the bottom: the largest displacement is one, at the top
+    first = np.linalg.norm(next(iter(drawn.point_data.values())), axis=1)
+    assert first.max() == pytest.approx(1.0)
+    assert drawn.points[np.argmax(first), 0] == pytest.approx(0.24)
+
+
+def test_files_of_a_recipe_count_by_their_content(tmp_path: Path) -> None:
+    mesh = build(block("hex8", (2, 1, 1), (0.2, 0.1, 0.1), "mean"))
+    files.write_npz(of_mesh(mesh).assemble(mesh), tmp_path / "body.npz")
+    recipe = tmp_path / "body.toml"
+    recipe.write_text(
+        '[shape]\ntype = "matrices"\nunits = "m-kg-s"\nfile = "body.npz"\n[frames]\nfoot = { nodes = [1, 2, 3] }\n'
+    )
+    params = s1_mesh.params(recipe)
+    again = stored(s1_mesh.run(params, {}, silent)["nc"], tmp_path / "mesh.nc")
+    assert of_mesh(again).assemble(again).size == 36
+    assert s1_mesh.params(recipe) == params
+    with (tmp_path / "body.npz").open("ab") as file:
+        file.write(b"\0")
+    assert s1_mesh.params(recipe) != params
+    (tmp_path / "body.npz").unlink()
+    with pytest.raises(InputError, match=r"there is no file .*body\.npz"):
+        s1_mesh.params(recipe)
+
+
+@pytest.mark.parametrize(
+    "choice, value",
+    [
+        ({"count": 7}, 7),
+        ({"count": "all"}, "all"),
+        ({"up_to": "5000 Hz"}, 5000.0),
+        ({"up_to": 5000}, 5000.0),
+        ({"mass": "90 %"}, 0.9),
+    ],
+)
+def test_one_choice_says_how_many_modes(choice: dict[str, Any], value: object) -> None:
+    modes = Modes(reference="free-free", **choice)
+    (name,) = choice
+    assert getattr(modes, name) == pytest.approx(value)
+    assert Modes.model_validate(modes.model_dump(mode="json")) == modes
+
+
+@pytest.mark.parametrize(
+    "choice", [{}, {"count": 7, "mass": 0.9}, {"count": 0}, {"up_to": "5 mm"}, {"compliance": 1.1}]
+)
+def test_two_choices_or_none_are_refused(choice: dict[str, Any]) -> None:
+    with pytest.raises(ValidationError):
+        Modes(reference="free-free", **choice)
+
+
+def test_the_command_prints_what_bundles_lack(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path))
+    assert main(["run", "sps4/frequencies/fixed_circle", "--to", "bundle"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("sps4/frequencies/fixed_circle, rod\n")
+    assert "not even the first, 1564.49 Hz" in shown

@@ -1,0 +1,241 @@
+"""What the benchmarks compare with must itself be right: the dense system, the peer's model, the chain of four-bars."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import __main__ as command
+from benchmarks import accuracy, evaluation, growth, log, maximal, measure, page, peer
+from benchmarks.accuracy import Error
+from benchmarks.engines import (
+    Mechanism,
+    damped,
+    evaluation_time,
+    mechanism,
+    silent,
+    states,
+    trajectory,
+    without_clearance,
+    without_friction,
+)
+from benchmarks.exudyn_runs import METHODS, SAMPLING, Samples, solve
+from benchmarks.laws import derivative, holds_at_zero, joint_laws
+from pipeline import dynamics
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_SIZE
+from tests.reference.ideal_motion import ideal
+
+UNKNOWNS = {"ideal": 116, "csj": 113, "far_cb": 129, "far_csj_cb": 126}
+
+
+def scene(root: Path, name: str) -> Scene:
+    return load_scene(root / "scenes" / "sps4" / f"{name}.toml")
+
+
+def test_the_dense_system_gives_the_start_accelerations_of_the_ideal_mechanism(root: Path):
+    """Against the leg lengths' second derivatives, which know neither bodies nor joints."""
+    system = maximal.assemble(scene(root, "ideal"), {})
+    solution = np.linalg.solve(system.matrix, system.right_side)
+    first = system.first[system.group_of["platform"]]
+    expected = ideal(np.array([0.0]))[0]
+    # the scene gives its poses to 16 digits, the closures magnify that by their condition, 1e4
+    assert np.allclose(solution[first : first + 3], [0.0, 0.0, expected.acceleration], rtol=0.0, atol=1e-9)
+    assert np.allclose(solution[first + 3 : first + 6], expected.alpha, rtol=0.0, atol=1e-8)
+
+
+def test_the_dense_system_is_symmetric_and_has_the_unknowns_that_its_derivation_says(root: Path):
+    system = maximal.assemble(scene(root, "csj"), {})
+    # ten links of six; four prismatic joints of five rows, four spherical B and C of three, A2..A4, Z; four drives
+    assert system.count.derivation() == "6 x 10 links + 49 joint rows + 4 drive rows = 113"
+    assert system.matrix.shape == (113, 113)
+    # R J R^T of the rounded rotations is symmetric to rounding only
+    assert np.allclose(system.matrix, system.matrix.T, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", UNKNOWNS)
+def test_the_dense_system_gives_the_start_accelerations_of_the_engine(name: str):
+    """Flexible rod and clearance included: two formulations of the same equations."""
+    here = mechanism(name)
+    system = maximal.assemble(here.scene, here.bundles)
+    assert system.count.unknowns == UNKNOWNS[name]
+    solution = np.linalg.solve(system.matrix, system.right_side)
+    first = system.first[system.group_of["platform"]]
+    short = here.scene.model_copy(update={"time": here.scene.time.model_copy(update={"end": 1e-4})})
+    start = dynamics.simulate(short, here.bundles, silent).sel(body="platform").isel(time=0)
+    # both solve systems whose condition is below 1e7, with 16 digits
+    assert np.allclose(solution[first : first + 3], start.acceleration, rtol=1e-8, atol=1e-8)
+    assert np.allclose(solution[first + 3 : first + 6], start.angular_acceleration, rtol=1e-8, atol=1e-7)
+
+
+def test_a_dense_solution_is_timed_on_fresh_copies(root: Path):
+    """`dgesv` overwrites its matrix; timing it on its own factors would time something else."""
+    system = maximal.assemble(scene(root, "ideal"), {})
+    before = system.matrix.copy()
+    assert evaluation.dgesv_time(system)() > 0.0
+    assert np.array_equal(system.matrix, before)
+
+
+def test_drive_laws_are_the_paper_s_steps(root: Path):
+    laws = joint_laws(scene(root, "ideal"))
+    s, T, h = 0.3, 0.09, 0.06
+    for t, sign in ((s * T, 1.0), (T + s * T, -1.0)):
+        value, rate, second = (derivative(laws["P1"], k)(t) for k in range(3))
+        # eq. (29): h (3 s^2 - 2 s^3) and its derivatives
+        assert value == pytest.approx((0.0 if sign > 0 else h) + sign * h * (3 * s**2 - 2 * s**3), rel=1e-13)
+        assert rate == pytest.approx(sign * 6 * h * s * (1 - s) / T, rel=1e-12)
+        assert second == pytest.approx(sign * 6 * h * (1 - 2 * s) / T**2, rel=1e-12)
+    assert holds_at_zero(laws["P3"])
+    assert not holds_at_zero(laws["P1"])
+
+
+def test_a_ratio_is_that_of_neighbours():
+    """A machine that becomes twice as slow half way does not change how two tasks compare."""
+    fast, slow = measure.Times((1.0, 1.0, 2.0, 2.0, 2.0)), measure.Times((3.0, 3.0, 6.0, 6.0, 6.0))
+    assert slow.over(fast) == 3.0
+    assert measure.Times((1.0, 2.0, 3.0, 4.0, 5.0)).spread == pytest.approx(1.0 / 3.0)
+    assert measure.slope([5, 10, 20], [1.0, 2.0, 4.0]) == pytest.approx(1.0)
+
+
+def test_tasks_take_turns_and_the_first_round_does_not_count():
+    calls: list[str] = []
+
+    def task(name: str) -> float:
+        calls.append(name)
+        return float(len(calls))
+
+    times = measure.interleaved({"a": lambda: task("a"), "b": lambda: task("b")}, rounds=2)
+    assert "".join(calls) == "ababab"
+    assert times["a"].seconds == (3.0, 5.0)
+
+
+def test_errors_are_taken_up_to_the_horizon_and_between_equal_times():
+    time = SAMPLING * np.arange(11)
+    still, moved = np.zeros((11, 3)), np.outer(time, [3.0, 0.0, 4.0])
+    reference = accuracy.of_samples(Samples(time, still, still + 2.0), 5 * SAMPLING)
+    error = reference.error(Samples(time, moved, still + 2.0 + 10 * moved))
+    assert error.position == pytest.approx(5 * 5 * SAMPLING)
+    assert error.relative == pytest.approx(250 * SAMPLING / np.sqrt(12.0))
+    with pytest.raises(ValueError, match="same times"):
+        reference.error(Samples(time + 0.3 * SAMPLING, moved, still))
+
+
+def test_equal_error_means_worse_in_neither_quantity():
+    assert Error(1.0, 1.0, 1.0).within(Error(1.0, 2.0, 1.0))
+    assert not Error(1.5, 1.0, 1.0).within(Error(1.0, 2.0, 1.0))
+
+
+@pytest.mark.slow
+def test_evaluations_in_contact_are_of_states_that_press():
+    """What is timed as contact has a normal force, what is timed as free has none."""
+    engine = mechanism("csj").engine()
+    for label, state in states(engine, trajectory(engine)).items():
+        assert evaluation_time(engine, state, 1) > 0.0
+        force = engine.view("TOUCH", TOUCH_SIZE)[NORMAL_FORCE]
+        assert (force > 0.0) == (label == "in contact")
+
+
+@pytest.mark.slow
+def test_the_chain_of_four_bars_moves_like_the_benchmark_problem():
+    """IFToMM benchmark A02, N = 2, at 0.1 s: an independent solution for its one angle (0.1019174629455971 rad)."""
+    run = dynamics.simulate(growth.four_bars(2), {}, silent).isel(time=-1)
+    top = run.frame_position.sel(frame="upright0.top").values
+    # default tolerance 1e-10 per step, a handful of steps
+    assert np.allclose(top, [0.10174111556844023, 0.0, 0.994810909370665], rtol=0.0, atol=1e-8)
+
+
+def test_effects_are_taken_away_as_parts(root: Path):
+    full = scene(root, "far_csj_cb")
+    assert without_clearance(full).contacts() == {}
+    assert without_friction(full).joint["A1"].friction is None  # type: ignore[union-attr]
+    assert damped(full, 0.05).flexible()["rod1"].damping == 0.05
+    assert full.joint["A1"].friction is not None  # type: ignore[union-attr]
+
+
+def platform_motion(samples: Samples) -> tuple[float, float]:
+    """Largest deviations of height [m] and speed [m/s] from the ideal motion."""
+    exact = ideal(samples.time, np.where(samples.time < 0.09, 1, -1))
+    z, v = np.array([m.height for m in exact]), np.array([m.speed for m in exact])
+    return float(np.max(np.abs(samples.position[:, 2] - z))), float(np.max(np.abs(samples.velocity[:, 2] - v)))
+
+
+def test_the_peer_s_model_of_the_ideal_mechanism_converges_to_its_motion(root: Path):
+    pytest.importorskip("exudyn")
+    here = Mechanism("ideal", scene(root, "ideal"), {})
+    errors = []
+    for step in (1e-3, 5e-4):
+        samples = solve(here, "platform", next(iter(METHODS)), step).samples
+        assert samples is not None
+        errors.append(platform_motion(samples))
+    # the trapezoidal rule: 4e-6 m and 1.4e-6 m/s at the first step, a quarter of it at half the step
+    assert errors[0][0] < 1e-5
+    assert errors[0][1] < 5e-6
+    assert np.allclose(np.divide(errors[0], errors[1]), 4.0, rtol=0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [c for c in peer.CASES if c.title in ("far_cb", "csj without friction")])
+def test_the_peer_converges_to_our_run(case: peer.Case):
+    """Flexible rod, and normal contact: independent codes, one solution."""
+    pytest.importorskip("exudyn")
+    original = mechanism(case.scene)
+    here = original.with_scene(case.title, case.edit(original.scene))
+    reference = accuracy.converged(here, "platform", here.scene.time.end)
+    errors = []
+    for step in (2e-5, 5e-6):
+        samples = solve(here, "platform", next(iter(METHODS)), step).samples
+        assert samples is not None
+        errors.append(reference.error(samples))
+    # 0.5 m/s at most; impacts that no step ends on leave the method of second order with about the first
+    assert errors[1].relative < 5e-3
+    assert errors[1].velocity < 0.7 * errors[0].velocity
+    assert errors[1].position < 0.7 * errors[0].position
+
+
+def test_the_peer_s_model_refuses_what_it_would_leave_out():
+    pytest.importorskip("exudyn")
+    with pytest.raises(ValueError, match="no loads"):
+        solve(Mechanism("chain", growth.four_bars(1), {}), "bar0", next(iter(METHODS)), 1e-3)
+
+
+def test_without_the_peer_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    monkeypatch.setitem(sys.modules, "exudyn", None)
+    assert list(peer.measure()) == []
+    said = capsys.readouterr().out
+    assert said.count("\n") == 1
+    assert "pip install" in said
+
+
+def test_an_unknown_group_is_refused_with_those_there_are(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+):
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "speed"])
+    with pytest.raises(SystemExit) as ended:
+        command.main()
+    assert ended.value.code == 2
+    assert "evaluation, runs, growth, exudyn" in capsys.readouterr().err
+
+
+def test_the_log_keeps_lines_and_the_page_shows_the_last(tmp_path: Path):
+    path, shown = tmp_path / "log.jsonl", tmp_path / "page.md"
+    row = {"scene": "csj", "rtol": 1e-10, "evaluations": 7, "us_per_evaluation": 1.23456789}
+    for seconds in (1.0, 2.0):
+        part = {"s": seconds, "spread": 0.01}
+        log.append("runs", [row | {"integration": part, "stage": part}], path)
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [line["results"][0]["stage"]["s"] for line in lines] == [1.0, 2.0]
+    assert lines[0]["results"][0]["us_per_evaluation"] == 1.235
+    assert set(lines[0]) == {"date", "cpu", "versions", "group", "results"}
+    page.write(path, shown)
+    assert "2.0000 ± 1.0 %" in shown.read_text()
+    assert "1.0000" not in shown.read_text()
+
+
+def test_the_page_is_that_of_the_log():
+    assert page.PAGE.read_text() == page.text(log.latest())
