@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
-from scipy.linalg import null_space
+from scipy.linalg import null_space, qr
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.drives import JointDrive, PathDrive
@@ -59,19 +59,24 @@ def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     """
     wanted = paths(scene)
     names = [a for path in wanted.values() for a in path.actuators or ()]
-    other = _with_drives(scene, wanted, names)
+    _with_drives(scene, wanted, names)  # all of them can be named, before anything is compiled
     engine = prepare(tabulate(build(scene, bundles)), progress)
     start, _ = consistent_start(engine)
     engine.evaluate(start, engine.start)
-    _require_enough(engine, scene, list(wanted), names)
+    chosen = _enough(engine, scene, wanted, names)
     trajectory = step(engine, start, progress)
     before, after = observe(engine, trajectory.rows), observe(engine, trajectory.rows, after=True)
     sides = [joint_coordinates(engine.built, seen) for seen in (before, after)]
     laws = {}
-    for name in names:
+    for name in chosen:
         series = [np.array(side[_full_name(scene, name)]) for side in sides]
         laws[name] = hermite(trajectory.time, *series)
-    return other, laws
+    other = _with_drives(scene, wanted, chosen)
+    if len(chosen) == len(names):
+        return other, laws
+    from pipeline.dynamics.allocation import share
+
+    return share(other, laws, names, bundles, progress)
 
 
 def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
@@ -92,17 +97,18 @@ def _with_drives(scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]
     kept = {n: d for n, d in scene.drive.items() if n not in wanted}
     made = {}
     for path, drive in wanted.items():
-        for name in drive.actuators or ():
+        for name in (a for a in drive.actuators or () if a in names):
             place = f"[drive.{path}.actuators]"
-            if name in kept or name in made:
-                raise InputError(place, f"something called '{name}' drives already", "name each actuator once")
+            if name in kept or name in made or name in scene.load:
+                raise InputError(place, f"something called '{name}' acts already", "name each actuator once")
             joint, _, coordinate = name.partition(".")
             coordinate_of(scene, joint, coordinate or None, place)
             made[name] = JointDrive(joint=joint, coordinate=coordinate or None, law=Constant(type="constant"))
-    return _renamed(scene, {"drive": {**kept, **made}})
+    return renamed(scene, {"drive": {**kept, **made}})
 
 
-def _renamed(scene: Scene, update: dict[str, object]) -> Scene:
+def renamed(scene: Scene, update: dict[str, object]) -> Scene:
+    """The scene with other parts, under its own name."""
     changed = scene.model_copy(update=update)
     changed._name, changed._path = scene.name, scene.path
     return changed
@@ -115,7 +121,8 @@ def _full_name(scene: Scene, actuator: str) -> str:
     return label(scene, joint, k)
 
 
-def _require_enough(engine: Engine, scene: Scene, wanted: list[str], names: list[str]) -> None:
+def _enough(engine: Engine, scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> list[str]:
+    """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
     built = engine.built
     free = null_space(closure_jacobian(engine), rcond=RANK)
     known = [k for k, name in enumerate(built.system.drives) if name.partition(".")[0] in wanted]
@@ -123,8 +130,8 @@ def _require_enough(engine: Engine, scene: Scene, wanted: list[str], names: list
     if held:  # other drives go on as they do
         free = free @ null_space(free[[built.layout.nv + k for k in held]], rcond=RANK)
     of_path = free[[built.layout.nv + k for k in known]]
-    of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])
-    place = f"[drive.{wanted[0]}.actuators]"
+    of_actuators = np.array([rate(engine, scene, name) @ free for name in names])
+    place = f"[drive.{next(iter(wanted))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
     if both > rank:
         raise InputError(
@@ -132,12 +139,16 @@ def _require_enough(engine: Engine, scene: Scene, wanted: list[str], names: list
             f"{', '.join(names)} cannot produce this motion: with them held, {both - rank} of its freedoms remain",
             "name further actuators",
         )
-    if rank < len(names):
+    if rank == len(names):
+        return names
+    if any(path.allocation == "unique" for path in wanted.values()):
         raise InputError(
             place,
             f"{len(names)} actuators act on {rank} freedoms: their forces are not unique",
-            f"name {rank} of them",
+            f'name {rank} of them, or ask for allocation = "least-norm"',
         )
+    pivots = qr(of_actuators.T, mode="r", pivoting=True)[1]
+    return [name for k, name in enumerate(names) if k in pivots[:rank]]
 
 
 def _rank(matrix: np.ndarray) -> int:
@@ -167,7 +178,7 @@ def _columns(engine: Engine) -> np.ndarray:
     return engine.view("COLUMNS", 6 * engine.built.layout.columns).reshape(-1, 6)
 
 
-def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
+def rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
     """Rate of an actuator's coordinate per speed of the system."""
     built = engine.built
     joint, _, name = actuator.partition(".")

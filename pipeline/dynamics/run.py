@@ -14,10 +14,12 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate.beside import beside
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
 from pipeline.dynamics.record.ledger import require_closed
+from pipeline.dynamics.tables import SINGULAR
 
 if TYPE_CHECKING:
     from pipeline.dynamics.sensitivity import Twin
@@ -70,10 +72,23 @@ def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | N
 
 def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
     """The observed rows of a trajectory; SolverError where one of them could not be evaluated."""
-    seen = observe(engine, trajectory.rows)
+    seen = _observed_rows(engine, trajectory)
     bad = np.flatnonzero(seen["status"][:, 0])
     if len(bad):
         raise SolverError(
             f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
         )
     return seen
+
+
+def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
+    """Every row with the closure rows that were solved for when it was made."""
+    parts = []
+    for part, kept in trajectory.parts():
+        engine.keep(kept)
+        seen = observe(engine, trajectory.rows[part])
+        for k in np.flatnonzero(seen["status"][:, 0] == SINGULAR):
+            for name, value in (beside(engine, trajectory.rows[part][k]) or {}).items():
+                seen[name][k] = value[0]
+        parts.append(seen)
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -22,9 +22,9 @@ from pipeline.dynamics.vectors import index, kernel
 
 #: header of h: sizes
 SIZES = (
-    "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS "
-    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE MOST_MODES N_LAWS N_LOADS "
-    "N_TURNS LOAD_SLOT"
+    "N_LINKS N_SITES N_FLEX N_CLOSURES N_CLOSURE_ROWS N_KEPT_ROWS N_CONTACTS N_DRIVES NQ NV NY N_LEDGER N_PAIRS "
+    "N_KNOWN_PAIRS N_KNOWN_ENTRIES N_CLOSURE_PAIRS N_GROUPS MASS_SIZE SCHUR_SIZE JACOBIAN_SIZE MOST_MODES N_LAWS "
+    "N_LOADS N_TURNS LOAD_SLOT"
 ).split()
 #: wiring tables in h: name -> columns
 WIRING = {
@@ -40,15 +40,15 @@ WIRING = {
     "PAIRS": 3,  # momentum, column, place in the mass matrix's envelope
     "KNOWN_PAIRS": 4,  # momentum, column, prescribed coordinate, free coordinate
     "ENVELOPE": 2,  # first column, start of each row of the mass matrix
-    # site a, site b, first row, rows, first of support, its length, first of Jacobian, first entry, entries
-    "CLOSURES": 9,
+    # sites a and b, first row, rows, support, its length, Jacobian, first entry, entries, first and number of kept rows
+    "CLOSURES": 11,
     "CLOSURE_ROWS": 3,  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
     "SUPPORT": 1,  # coordinates on which a closure depends
     "ENTRIES": 3,  # slot in the support, column, sign
     "KNOWN_ENTRIES": 4,  # closure, prescribed coordinate, column, sign
     "CLOSURE_PAIRS": 4,  # closure a, closure b >= a, start and number of their common slots
     "COMMON": 2,  # slot in a, slot in b
-    "CLOSURE_ENVELOPE": 2,
+    "CLOSURE_ENVELOPE": 2,  # of the rows that are solved for
     # outer site, inner site, form of the normal law, friction law or -1, surfaces, place of the bristles'
     # deflection in the state or -1
     "CONTACTS": 6,
@@ -78,14 +78,18 @@ NUMBERS = {
 #: work space in w: its places, in order; sizes follow from the header (see `assembly.packing`)
 WORK = (
     "X U DU LINK_FRAMES SITE_FRAMES JOINT OWN INERTIA WRENCH COLUMNS MOMENTA DEFORMATION BIAS MODAL_BIAS "
-    "MODAL SCRATCH MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR MULTIPLIER TOUCH "
+    "MODAL SCRATCH MASS FORCE ROWS RESIDUAL RESIDUAL_RATE GAMMA JACOBIAN SPREAD SCHUR ROW_SCALE PIVOT MULTIPLIER TOUCH "
     "LAW LOAD TURN DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MEMORY MAGNITUDE CORRECTION "
     "LATCHED WATCH CONTROL"
 ).split()
 _PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK])}
 HEADER = len(_PLACE)
 #: places that only the kernels of some effects need, which name them themselves
-ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT".split()
+ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT ROW_SCALE PIVOT".split()
+ELSEWHERE += (
+    "N_KEPT_ROWS JACOBIAN_SIZE SCHUR_SIZE N_CLOSURE_PAIRS N_KNOWN_ENTRIES KNOWN_ENTRIES CLOSURE_PAIRS COMMON".split()
+)
+ELSEWHERE += "CLOSURE_ENVELOPE CLOSURE_ROWS SUPPORT ENTRIES GAMMA JACOBIAN SPREAD SCHUR".split()
 
 
 def place(name: str) -> int:
@@ -93,30 +97,9 @@ def place(name: str) -> int:
     return _PLACE[name]
 
 
-(
-    N_LINKS,
-    N_SITES,
-    N_FLEX,
-    N_CLOSURES,
-    N_CLOSURE_ROWS,
-    N_CONTACTS,
-    N_DRIVES,
-    NQ,
-    NV,
-    NY,
-    N_LEDGER,
-    N_PAIRS,
-    N_KNOWN_PAIRS,
-    N_KNOWN_ENTRIES,
-    N_CLOSURE_PAIRS,
-    N_GROUPS,
-    MASS_SIZE,
-    SCHUR_SIZE,
-    MOST_MODES,
-    N_LAWS,
-    N_LOADS,
-    N_TURNS,
-) = (place(name) for name in SIZES if name not in ELSEWHERE)
+_SIZES = [place(name) for name in SIZES if name not in ELSEWHERE]
+N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER = _SIZES[:11]
+N_PAIRS, N_KNOWN_PAIRS, N_GROUPS, MASS_SIZE, MOST_MODES, N_LAWS, N_LOADS, N_TURNS = _SIZES[11:]
 (
     LINKS,
     SITES,
@@ -127,13 +110,6 @@ def place(name: str) -> int:
     KNOWN_PAIRS,
     ENVELOPE,
     CLOSURES,
-    CLOSURE_ROWS,
-    SUPPORT,
-    ENTRIES,
-    KNOWN_ENTRIES,
-    CLOSURE_PAIRS,
-    COMMON,
-    CLOSURE_ENVELOPE,
     CONTACTS,
     GROUPS,
 ) = (place(name) for name in WIRING if name not in ELSEWHERE)
@@ -150,58 +126,20 @@ def place(name: str) -> int:
     GRAVITY,
     FLOORS,
 ) = (place(name) for name in NUMBERS if name not in ELSEWHERE)
+# fmt: off
 (
-    X,
-    U,
-    DU,
-    LINK_FRAMES,
-    SITE_FRAMES,
-    JOINT,
-    OWN,
-    INERTIA,
-    WRENCH,
-    COLUMNS,
-    MOMENTA,
-    DEFORMATION,
-    BIAS,
-    MODAL_BIAS,
-    MODAL,
-    SCRATCH,
-    MASS,
-    FORCE,
-    ROWS,
-    RESIDUAL,
-    RESIDUAL_RATE,
-    GAMMA,
-    JACOBIAN,
-    SPREAD,
-    SCHUR,
-    MULTIPLIER,
-    TOUCH,
-    LAW,
-    LOAD,
-    TURN,
-    DRIVE_FORCE,
-    LEDGER_RATE,
-    POSITION_RATE,
-    Y,
-    Y_NEW,
-    Y_STAGE,
-    SLOPES,
-    DENSE,
-    MEMORY,
-    MAGNITUDE,
-    CORRECTION,
-    LATCHED,
-    WATCH,
-    CONTROL,
-) = (place(name) for name in WORK)
+    X, U, DU, LINK_FRAMES, SITE_FRAMES, JOINT, OWN, INERTIA, WRENCH, COLUMNS, MOMENTA, DEFORMATION, BIAS,
+    MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, ROWS, RESIDUAL, RESIDUAL_RATE, MULTIPLIER, TOUCH, LAW, LOAD,
+    TURN, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY, MAGNITUDE,
+    CORRECTION, LATCHED, WATCH, CONTROL,
+) = (place(name) for name in WORK if name not in ELSEWHERE)
+# fmt: on
 
 # fields of a link, a flexible body, a port, a closure, a contact
 PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)
 FLEX_LINK, N_MODES, FLEX_Q0, FLEX_C0, DATA0, MOMENT0, N_MOMENTS, FLEX_INBOARD = range(8)
 PORT_FLEX, PORT_COLUMN, PORT_SHAPES = range(3)
-SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES = range(9)
+SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES, KEPT0, N_KEPT = range(11)
 OUTER, INNER, NORMAL_KIND, FRICTION_KIND, SURFACES, BRISTLE = range(6)
 CLEARANCE, RADIUS, FLOOR, STICK_SPEED, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 4, 8
 # a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
@@ -247,7 +185,7 @@ def port(h, k, field):
 @kernel
 def closure(h, c, field):
     """A field of closure c."""
-    return h[index(h[CLOSURES] + 9 * c + field)]
+    return h[index(h[CLOSURES] + 11 * c + field)]
 
 
 @kernel

@@ -17,12 +17,17 @@ TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
 
 
+def _table(value: object) -> object:
+    pairs = isinstance(value, tuple) and all(isinstance(v, tuple) for v in value)
+    return dict(value) if pairs else value  # type: ignore[call-overload]
+
+
 @cache
 def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
-    """The run of a scene; overrides as ((place, value), ...)."""
+    """The run of a scene; overrides as ((place, value), ...), a table as pairs too."""
     from pipeline import dynamics
 
-    scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", override={place: _table(value) for place, value in overrides})
     return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
 
 

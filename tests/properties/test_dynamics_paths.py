@@ -134,6 +134,60 @@ def test_actuators_that_cannot_or_are_too_many_are_refused(actuators: tuple[str,
     assert "[drive.path.actuators" in str(error.value)
 
 
+def table_of_two_rails(allocation: str) -> dict[str, Any]:
+    """A slide with a crank: a block on a rail, a crank on a hinge, a rod (universal, spherical) between them."""
+    bodies = {
+        "base": {
+            "type": "ground",
+            "frames": {"rail": frame((0.0, 0.0, 0.0), (0.0, 1.2, 0.3)), "pin": frame((0.3, 0.4, 0.0))},
+        },
+        "block": body(
+            (0.0, 0.0, 0.0),
+            frames={"rail": frame((0.0, 0.0, 0.0), (0.0, 1.2, 0.3)), "eye": frame((0.0, 0.1, 0.0))},
+        ),
+        "crank": body((0.3, 0.4, 0.0), frames={"pin": frame((0.0, 0.0, 0.0)), "end": frame((0.1, 0.05, 0.1))}),
+        "rod": body((0.0, 0.1, 0.0), frames={"eye": frame((0.0, 0.0, 0.0)), "end": frame((0.4, 0.35, 0.1))}),
+    }
+    joints = {
+        "rail": joint("prismatic", "base.rail", "block.rail"),
+        "pin": joint("revolute", "base.pin", "crank.pin"),
+        "eye": joint("universal", "block.eye", "rod.eye"),
+        "end": joint("spherical", "rod.end", "crank.end"),
+    }
+    path = {
+        "frame": "block.eye",
+        "position": {"x": {"type": "polynomial", "coefficients": [0.0, 0.0, 0.05]}},
+        "actuators": ["pin", "rail"],
+        "allocation": allocation,
+    }
+    return scene(bodies, joints, end=0.2, drive={"path": path}, load=GRAVITY)
+
+
+@pytest.mark.slow
+def test_actuators_beyond_the_freedoms_share_by_least_norm_when_asked_to() -> None:
+    with pytest.raises(InputError, match="least-norm"):
+        simulate(table_of_two_rails("unique"))
+    shared = simulate(table_of_two_rails("least-norm"))
+    alone = table_of_two_rails("unique")
+    alone["drive"]["path"]["actuators"] = ["rail"]
+    known = simulate(alone)
+    assert set(shared.drive.values) == {"pin", "rail"}
+    forces = {name: shared.drive_force.sel(drive=name).values for name in ("rail", "pin")}
+    rates = {name: known.joint_velocity.sel(coordinate=name).values[1:] for name in ("rail", "pin")}
+    ratio = rates["pin"] / rates["rail"]
+    # one freedom: the rail's force alone is made up by rail + ratio * pin, least where pin = ratio * rail
+    alone_force = known.drive_force.sel(drive="rail").values[1:]
+    assert forces["rail"][1:] + ratio * forces["pin"][1:] == pytest.approx(alone_force, rel=1e-8)
+    assert forces["pin"][1:] == pytest.approx(ratio * forces["rail"][1:], rel=1e-8)
+    assert shared.position.values == pytest.approx(known.position.values, abs=1e-10)
+    # the joints carry something else, and the energy is accounted for
+    change = np.abs(shared.joint_force.sel(joint="end") - known.joint_force.sel(joint="end"))
+    assert float(change.max()) > 0.1
+    exchanged = float(np.abs(shared.drive_work).max() + np.abs(shared.load_work).max())
+    # quintics and straight lines between outputs of 10 ms: the same in both, so that only rounding is left
+    assert float(np.abs(shared.energy_error).max()) < 1e-8 * exchanged
+
+
 def test_a_path_and_a_joint_drive_do_not_fight_unnoticed() -> None:
     """The same freedom prescribed twice, by a path and by a drive, closes a loop of driven joints."""
     table = scene(

@@ -234,7 +234,18 @@ RUN: Schema = {
     "energy_error": _V(
         ("time",), "J", "kinetic + potential + elastic + dissipated - drive_work - load_work, minus its start value"
     ),
-    "constraint_error": _V(("time",), "m", "largest violation of a loop closure"),
+    "constraint_error": _V(("time",), "m", "largest violation of a loop closure, redundant rows included"),
+    "mobility": _V(("time",), "1", "degrees of freedom, prescribed ones not counted", optional=True),
+    "rank": _V(("time",), "1", "independent rows of the loop closures", optional=True),
+    "condition": _V(
+        ("time",), "1", "condition number of the independent closure rows, lengths in units of 0.1 m", optional=True
+    ),
+    "reaction_redundant": _V(
+        ("joint",), "1", "1 where rigid bodies leave the joint's reaction undetermined", optional=True
+    ),
+    "pass_time": _V(("singular_pass",), "s", "time of a pass through a singular pose", optional=True),
+    "pass_condition": _V(("singular_pass",), "1", "condition number where the pass was located", optional=True),
+    "pass_rank_loss": _V(("singular_pass",), "1", "closure rows that depend on others in that pose", optional=True),
     "horizon": _V((), "s", "time up to which pointwise values mean something", optional=True),
     "twin_separation": _V(
         ("twin_time",),

@@ -39,6 +39,8 @@ class PathDrive(Part):
     takes all three components.
     actuators: joints (``P1``, or ``C.rotation`` where a joint has several freedoms) whose forces shall
     produce this motion; without them the drive itself acts on the frame.
+    allocation: what to do with more actuators than freedoms: refuse, or give the forces whose sum of
+    squares (in N and N m) is least.
     """
 
     frame: FrameName
@@ -46,6 +48,7 @@ class PathDrive(Part):
     rotation: Components | None = None
     angles: Literal["cardan", "rotation-vector"] = "cardan"
     actuators: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    allocation: Literal["unique", "least-norm"] = "unique"
 
     @model_validator(mode="after")
     def _prescribes(self) -> PathDrive:

@@ -18,7 +18,7 @@ FAMILIES = ("body", "joint", "drive", "load")
 #: types of parts, by which their models are chosen
 TYPES = (
     *("ground", "rigid", "flexible"),
-    *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed"),
+    *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"),
     *("clearance-spherical", "clearance-revolute", "modified-coulomb", "ambrosio", "lugre"),
     *("joint-drive", "path-drive"),
     *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise"),

@@ -131,9 +131,12 @@ Body = Annotated[Ground | RigidBody | FlexibleBody, Field(discriminator="type")]
 
 
 class IdealJoint(Part):
-    """Two frames; the axes of motion are those of the first, its axis is z."""
+    """Two frames; the axes of motion are those of the first, its axis is z.
 
-    type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed"]
+    A free joint holds nothing: it says that a body shall fly.
+    """
+
+    type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
     between: tuple[FrameName, FrameName]
 
 

@@ -7,36 +7,50 @@ coordinate is that wrench times the coordinate's column. With :math:`M = LL^T` t
           M\dot v = f + J^T\lambda
 
 with :math:`L^{-1}J^T` kept on the support of each closure (the coordinates on the way to the ground).
+
+Rows that follow from others (planar loops in space, Bricard's loop) are not solved for: the kept
+rows of a closure come first among its rows, the residuals of all are known (`assembly.selection`).
 """
 
 from __future__ import annotations
 
 from pipeline.dynamics.assembly.envelope import backward, base, factor, forward
-from pipeline.dynamics.tables import (
-    ACCELERATION,
-    ALPHA,
-    AXES,
+from pipeline.dynamics.assembly.places import (
     CLOSURE_ENVELOPE,
     CLOSURE_PAIRS,
     CLOSURE_ROWS,
     COMMON,
-    DRIVE_FORCE,
     ENTRIES,
+    GAMMA,
+    JACOBIAN,
+    KNOWN_ENTRIES,
+    LAST_PIVOT,
+    N_CLOSURE_PAIRS,
+    N_KEPT_ROWS,
+    N_KNOWN_ENTRIES,
+    PIVOT,
+    ROW_SCALE,
+    SCHUR,
+    SCHUR_SIZE,
+    SPREAD,
+    SUPPORT,
+)
+from pipeline.dynamics.tables import (
+    ACCELERATION,
+    ALPHA,
+    AXES,
+    DRIVE_FORCE,
     ENTRY0,
     ENVELOPE,
     EVALUATION,
     FORCE,
-    GAMMA,
-    JACOBIAN,
     JACOBIAN0,
-    KNOWN_ENTRIES,
+    KEPT0,
     MASS,
     MULTIPLIER,
-    N_CLOSURE_PAIRS,
-    N_CLOSURE_ROWS,
     N_CLOSURES,
     N_ENTRIES,
-    N_KNOWN_ENTRIES,
+    N_KEPT,
     N_ROWS,
     N_SUPPORT,
     NV,
@@ -47,13 +61,9 @@ from pipeline.dynamics.tables import (
     RESIDUAL_RATE,
     ROW0,
     ROWS,
-    SCHUR,
-    SCHUR_SIZE,
     SINGULAR,
     SITE_A,
     SITE_B,
-    SPREAD,
-    SUPPORT,
     SUPPORT0,
     VELOCITY,
     closure,
@@ -102,7 +112,7 @@ def rows(h, w, c):
 @kernel
 def jacobian(h, w, c):
     """J^T of closure c on its support: slot after slot, the rows of the closure side by side."""
-    start, size, count = h[JACOBIAN] + closure(h, c, JACOBIAN0), closure(h, c, N_SUPPORT), closure(h, c, N_ROWS)
+    start, size, count = h[JACOBIAN] + closure(h, c, JACOBIAN0), closure(h, c, N_SUPPORT), closure(h, c, N_KEPT)
     for k in range(start, start + size * count):
         w[index(k)] = 0.0
     first, wrenches = h[ENTRIES] + 3 * closure(h, c, ENTRY0), h[ROWS] + 6 * closure(h, c, ROW0)
@@ -118,7 +128,7 @@ def jacobian(h, w, c):
 @kernel
 def spread(h, w, c):
     """L^-1 J^T of closure c, laid out like J^T."""
-    size, support, count = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0), closure(h, c, N_ROWS)
+    size, support, count = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0), closure(h, c, N_KEPT)
     J, S = h[JACOBIAN] + closure(h, c, JACOBIAN0), h[SPREAD] + closure(h, c, JACOBIAN0)
     for a in range(size):
         i = h[index(support + a)]
@@ -142,7 +152,8 @@ def couple(h, w, p):
     o = h[CLOSURE_PAIRS] + 4 * p
     a, b, common = h[index(o)], h[index(o + 1)], h[COMMON] + 2 * h[index(o + 2)]
     A, B = h[SPREAD] + closure(h, a, JACOBIAN0), h[SPREAD] + closure(h, b, JACOBIAN0)
-    rows_a, rows_b, row0, col0 = closure(h, a, N_ROWS), closure(h, b, N_ROWS), closure(h, b, ROW0), closure(h, a, ROW0)
+    rows_a, rows_b = closure(h, a, N_KEPT), closure(h, b, N_KEPT)
+    row0, col0 = closure(h, b, KEPT0), closure(h, a, KEPT0)
     for k in range(common, common + 2 * h[index(o + 3)], 2):
         left, right = A + rows_a * h[index(k)], B + rows_b * h[index(k + 1)]
         for r in range(rows_b):
@@ -162,16 +173,31 @@ def prepare(h, w, n):
         w[index(k)] = 0.0
     for p in range(h[N_CLOSURE_PAIRS]):
         couple(h, w, p)
-    ratio = factor(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_CLOSURE_ROWS], SINGULAR_PIVOT)
-    n[EVALUATION] = OK if ratio > SINGULAR_PIVOT else SINGULAR
+    for r in range(h[N_KEPT_ROWS]):
+        size = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)]
+        w[index(h[ROW_SCALE] + r)] = max(w[index(h[ROW_SCALE] + r)], size)
+    ratio = factor(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_KEPT_ROWS], SINGULAR_PIVOT)
+    pivot = independence(h, w) if ratio > SINGULAR_PIVOT else 0.0
+    w[index(h[PIVOT] + LAST_PIVOT)] = pivot
+    n[EVALUATION] = OK if pivot > SINGULAR_PIVOT else SINGULAR
+
+
+@kernel
+def independence(h, w):
+    """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been in this run."""
+    least = 1.0
+    for r in range(h[N_KEPT_ROWS]):
+        pivot = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)] ** 2
+        least = min(least, pivot / w[index(h[ROW_SCALE] + r)])
+    return least
 
 
 @kernel
 def add_spread(h, w, y, weight):
     """Y <- y + weight L^-1 J^T lambda, y in w."""
     for c in range(h[N_CLOSURES]):
-        count, support = closure(h, c, N_ROWS), h[SUPPORT] + closure(h, c, SUPPORT0)
-        S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, ROW0)
+        count, support = closure(h, c, N_KEPT), h[SUPPORT] + closure(h, c, SUPPORT0)
+        S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, KEPT0)
         for a in range(closure(h, c, N_SUPPORT)):
             total = 0.0
             for r in range(count):
@@ -180,10 +206,19 @@ def add_spread(h, w, y, weight):
 
 
 @kernel
+def gather_rows(h, w, values):
+    """The kept ones of the rows' values from w[values] on, as a right-hand side for the multipliers."""
+    for c in range(h[N_CLOSURES]):
+        row, kept = values + closure(h, c, ROW0), h[MULTIPLIER] + closure(h, c, KEPT0)
+        for k in range(closure(h, c, N_KEPT)):
+            w[index(kept + k)] = w[index(row + k)]
+
+
+@kernel
 def solve(h, w):
     """Multipliers from their right-hand side, in place."""
-    forward(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_CLOSURE_ROWS], h[MULTIPLIER])
-    backward(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_CLOSURE_ROWS], h[MULTIPLIER])
+    forward(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_KEPT_ROWS], h[MULTIPLIER])
+    backward(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_KEPT_ROWS], h[MULTIPLIER])
 
 
 @kernel
@@ -192,11 +227,10 @@ def close(h, w, n):
     prepare(h, w, n)
     if n[EVALUATION] != OK:
         return
-    for k in range(h[N_CLOSURE_ROWS]):
-        w[index(h[MULTIPLIER] + k)] = w[index(h[GAMMA] + k)]
+    gather_rows(h, w, h[GAMMA])
     for c in range(h[N_CLOSURES]):
-        count, support = closure(h, c, N_ROWS), h[SUPPORT] + closure(h, c, SUPPORT0)
-        S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, ROW0)
+        count, support = closure(h, c, N_KEPT), h[SUPPORT] + closure(h, c, SUPPORT0)
+        S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, KEPT0)
         for a in range(closure(h, c, N_SUPPORT)):
             force = w[index(h[FORCE] + h[index(support + a)])]
             for r in range(count):
@@ -211,8 +245,9 @@ def known_forces(h, w):
     for e in range(h[N_KNOWN_ENTRIES]):
         o = h[KNOWN_ENTRIES] + 4 * e
         c, d, col, sign = h[index(o)], h[index(o + 1)], column(h, h[index(o + 2)]), h[index(o + 3)]
-        for k in range(closure(h, c, ROW0), closure(h, c, ROW0) + closure(h, c, N_ROWS)):
-            w[index(h[DRIVE_FORCE] + d)] -= sign * dot6(w, h[ROWS] + 6 * k, w, col) * w[index(h[MULTIPLIER] + k)]
+        wrenches, first = h[ROWS] + 6 * closure(h, c, ROW0), h[MULTIPLIER] + closure(h, c, KEPT0)
+        for k in range(closure(h, c, N_KEPT)):
+            w[index(h[DRIVE_FORCE] + d)] -= sign * dot6(w, wrenches + 6 * k, w, col) * w[index(first + k)]
 
 
 @kernel
@@ -221,8 +256,7 @@ def correction(h, w, residual, step):
 
     step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `prepare`.
     """
-    for k in range(h[N_CLOSURE_ROWS]):
-        w[index(h[MULTIPLIER] + k)] = w[index(residual + k)]
+    gather_rows(h, w, residual)
     solve(h, w)
     for k in range(h[NV]):
         w[index(step + k)] = 0.0

@@ -10,20 +10,19 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
 from pipeline.core.scene.parts import Ground
 from pipeline.dynamics.assembly.chain import path_positions
+from pipeline.dynamics.assembly.constraints import outboard_place
 from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.loading import order
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.assembly.tree import PATH
-from pipeline.dynamics.tables import AXES, OMEGA, ROW0, VELOCITY
+from pipeline.dynamics.tables import AXES, OMEGA, VELOCITY
 
 #: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
-#: a start further from closed than this share of the mechanism's size is a mistake, not rounding
-WORST_GUESS = 0.05
 
 
 def start_state(built: Tables) -> np.ndarray:
@@ -47,7 +46,7 @@ def _coordinates(built: Tables, i: int) -> np.ndarray:
     assert link.inboard is not None
     if edge is None or stage is None or edge.kind == link.kind:
         F = system.links[link.inboard.link].start.of(link.inboard.place)
-        relative = F.inverse().of(_inboard_frame(built, i))
+        relative = F.inverse().of(link.start.of(outboard_place(system, link)))
         found: np.ndarray = joint_class(link.kind).coordinates(relative.R, relative.p)
         return found
     G = _world(built, edge.frame_b)
@@ -63,16 +62,6 @@ def _world(built: Tables, frame: str) -> Placement:
     """Start pose of a named frame, from the kernels' origin."""
     site = built.system.site(frame)
     return built.system.links[site.link].start.of(site.place)
-
-
-def _inboard_frame(built: Tables, i: int) -> Placement:
-    """World pose of a link's own side of its inboard joint."""
-    link = built.system.links[i]
-    edge = link.branch.edge
-    if edge is None or not link.flexible:
-        return link.start
-    frame = built.system.frames[edge.frame_a if link.branch.reverse else edge.frame_b]
-    return link.start.of(frame.place)
 
 
 def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarray:
@@ -134,24 +123,6 @@ def _twists(built: Tables, link_frames: np.ndarray, bodies: dict) -> np.ndarray:
         arm = R @ (place.p + place.R @ np.array(getattr(bodies[name], "com", (0.0, 0.0, 0.0))))
         found += [omega, v + np.cross(omega, arm)]
     return np.concatenate(found).copy()
-
-
-def check_residual(built: Tables, residuals: np.ndarray) -> float:
-    """Largest residual of the loops as given [m]; InputError when they are too far from closed."""
-    if not len(residuals):
-        return 0.0
-    worst = int(np.argmax(np.abs(residuals)))
-    residual = float(np.abs(residuals[worst]))
-    if residual > WORST_GUESS * built.system.length:
-        first_rows = built.packed.table("CLOSURES")[:, ROW0]
-        closure = int(np.searchsorted(first_rows, worst, side="right")) - 1
-        edge = built.system.closures[built.closure_order[closure]][0]
-        raise InputError(
-            f"[joint.{edge.name}.between]",
-            f"its two frames start {residual:.3g} m (or rad) apart",
-            "correct the poses of the bodies, or the frames",
-        )
-    return residual
 
 
 def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -50,8 +51,8 @@ def order(scene: Scene) -> list[str]:
     return sorted(forces, key=lambda name: (forces[name].type, list(forces).index(name)))
 
 
-def tabulate(system: System, layout: Layout) -> Loaded:
-    """Check the loads of a system, give their frames sites, and fill their tables."""
+def tabulate(system: System, layout: Layout, given: Mapping[str, Pieces]) -> Loaded:
+    """Check the loads of a system, give their frames sites, and fill their tables; `given`: as `numbers.tabulate`."""
     scene, names = system.scene, order(system.scene)
     kinds = tuple(sorted({load.type for load in scene.forces().values()}))
     rows: list[tuple[int, ...]] = []
@@ -63,7 +64,10 @@ def tabulate(system: System, layout: Layout) -> Loaded:
         if row.counts_turns:
             turn, turns = turns, turns + 1
         first = layout.known + len(laws)
-        laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
+        if f"load.{name}" in given:
+            laws.append(given[f"load.{name}"])
+        else:
+            laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
         rows.append((a, b, first, turn, int(row.follows), *_motion(coordinate)))
         numbers.append([*row.numbers, *[0.0] * (5 - len(row.numbers))])
     counts = [sum(scene.load[n].type == kind for n in names) for kind in kinds]

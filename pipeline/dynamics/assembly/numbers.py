@@ -13,6 +13,7 @@ from pipeline.core.registry import lookup
 from pipeline.dynamics.assembly import contact_numbers, loading, wiring
 from pipeline.dynamics.assembly import flexible_numbers as flexible
 from pipeline.dynamics.assembly import laws as lawful
+from pipeline.dynamics.assembly.closing import assembled
 from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.driving import drive_laws, joint_class
 from pipeline.dynamics.assembly.layout import Layout, number
@@ -59,14 +60,18 @@ class Tables:
 
 
 def tabulate(system: System, given: Mapping[str, Pieces] = NONE) -> Tables:
-    """Number a system and fill its tables; `given`: laws of prescribed coordinates that replace the scene's."""
+    """Place a system's links so that its joints fit, number it and fill its tables.
+
+    given: laws of prescribed coordinates, and of loads along joints as ``load.NAME``, that replace the scene's.
+    """
+    system = assembled(system, given)
     layout = number(system)
     normals = contact_numbers.resolve(system)
     site_pairs = [(e.kind, layout.site(a), layout.site(b)) for e, a, b in system.closures]
     touching = [(layout.site(a), layout.site(b)) for _, _, a, b in system.contacts]
     closing = wiring.closures(layout, site_pairs)
     order = closing.pop("order")
-    loaded = loading.tabulate(system, layout)
+    loaded = loading.tabulate(system, layout, given)
     flexible_wiring, flexible_numbers = flexible.fill(layout)
     laws = drive_laws(system.scene, given)
     signs = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}

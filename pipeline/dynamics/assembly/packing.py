@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics import tables
+from pipeline.dynamics.assembly.places import PIVOT_SIZE
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.method import Method
 
@@ -74,7 +75,7 @@ def pack(
     for name in tables.SIZES:
         h[tables.place(name)] = all_sizes[name]
     start = 0
-    for name, length in _work_lengths(all_sizes, wiring, method, columns).items():
+    for name, length in _work_lengths(all_sizes, method, columns).items():
         h[tables.place(name)] = start
         start += length
     integers = state.INTEGERS + all_sizes["N_LAWS"] + all_sizes["N_CONTACTS"]
@@ -90,6 +91,7 @@ def _sizes(sizes: Mapping[str, int], wiring: Mapping[str, np.ndarray]) -> dict[s
         "N_FLEX": count["FLEXES"],
         "N_CLOSURES": count["CLOSURES"],
         "N_CLOSURE_ROWS": count["CLOSURE_ROWS"],
+        "N_KEPT_ROWS": count["CLOSURE_ENVELOPE"],
         "N_CONTACTS": count["CONTACTS"],
         "N_LAWS": count["LAWS"],
         "N_LOADS": count["LOADS"],
@@ -102,6 +104,7 @@ def _sizes(sizes: Mapping[str, int], wiring: Mapping[str, np.ndarray]) -> dict[s
         "N_GROUPS": sizes["rows of FLOORS"],
         "MASS_SIZE": envelope_size(wiring["ENVELOPE"]),
         "SCHUR_SIZE": envelope_size(wiring["CLOSURE_ENVELOPE"]),
+        "JACOBIAN_SIZE": int(sum(c[tables.N_ROWS] * c[tables.N_SUPPORT] for c in wiring["CLOSURES"])),
     }
 
 
@@ -113,11 +116,9 @@ def envelope_size(envelope: np.ndarray) -> int:
     return int(envelope[last, 1] + last - envelope[last, 0] + 1)
 
 
-def _work_lengths(
-    s: Mapping[str, int], wiring: Mapping[str, np.ndarray], method: Method, columns: int
-) -> dict[str, int]:
+def _work_lengths(s: Mapping[str, int], method: Method, columns: int) -> dict[str, int]:
     known, contacts, ny = s["N_DRIVES"], s["N_CONTACTS"], s["NY"]
-    jacobian = int(sum(c[tables.N_ROWS] * c[tables.N_SUPPORT] for c in wiring["CLOSURES"]))
+    jacobian = s["JACOBIAN_SIZE"]
     rows, coordinates, positions = s["N_CLOSURE_ROWS"], s["NV"] + known, s["NQ"] + known
     lengths = {
         "X": positions,
@@ -145,6 +146,8 @@ def _work_lengths(
         "JACOBIAN": jacobian,
         "SPREAD": jacobian,
         "SCHUR": s["SCHUR_SIZE"],
+        "ROW_SCALE": rows,
+        "PIVOT": PIVOT_SIZE,
         "MULTIPLIER": rows,
         "TOUCH": tables.TOUCH_SIZE * contacts,
         "LAW": tables.LAW_SIZE * s["N_LAWS"],

@@ -68,7 +68,8 @@ class Link:
 class System:
     """Links in tree order, closures, contacts and drives of a scene; lengths in the world's axes.
 
-    origin: point of the world that the kernels use as theirs, near the mechanism.
+    origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
+    start_residual: largest residual of a joint in the poses that the scene gives [m, or the sine of an angle].
     """
 
     scene: Scene
@@ -80,6 +81,7 @@ class System:
     contacts: list[tuple[str, Clearance, Site, Site]]
     origin: np.ndarray
     length: float
+    start_residual: float = 0.0
 
     @property
     def drives(self) -> list[str]:
@@ -124,7 +126,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
 
     closures = [(e, at(e.frame_a), at(e.frame_b)) for e in closing]
     contacts = [(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
-    length = _length(links, frames)
+    length = _length(scene, links, frames)
     return System(scene, bundles, frames, links, link_of, closures, contacts, origin, length)
 
 
@@ -202,8 +204,8 @@ def _centre_frame(scene: Scene, group: Group) -> Placement:
     return Placement(com, np.eye(3))
 
 
-def _length(links: list[Link], frames: Mapping[str, Frame]) -> float:
-    """Size of the mechanism [m]: the scale of what a length tolerance is relative to."""
+def _length(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
+    """Size of the mechanism [m], or of the clearance it moves in: what a length tolerance is relative to."""
     points = []
     for link in links:
         for name, place in link.places.items():
@@ -212,10 +214,27 @@ def _length(links: list[Link], frames: Mapping[str, Frame]) -> float:
                 points.append(link.start.of(Placement(link.inertia[1])).p)
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
+    size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)
     return size if size > 0.0 else 1.0
 
 
 def require_bodies(scene: Scene) -> None:
-    """InputError when nothing can move."""
-    if not scene.rigid() and not scene.flexible():
+    """InputError when nothing can move, and for a body that has been left out of a mechanism."""
+    moving = [*scene.rigid(), *scene.flexible()]
+    if not moving:
         raise InputError("[body]", "the scene has no body that could move", "add a rigid or flexible body")
+    frames = [f for part in (scene.joint, scene.load, scene.drive) for p in part.values() for f in _named_frames(p)]
+    held = {f.partition(".")[0] for f in frames}
+    for name in moving:
+        if scene.joint and name not in held:
+            raise InputError(
+                f"[body.{name}]",
+                f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
+                'join it; that a body shall fly freely is said by a joint of type "free"',
+            )
+
+
+def _named_frames(part: object) -> tuple[str, ...]:
+    between = getattr(part, "between", None)
+    frame = getattr(part, "frame", None)
+    return tuple(between) if between is not None else (frame,) if frame is not None else ()

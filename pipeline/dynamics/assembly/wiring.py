@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from pipeline.dynamics.assembly.driving import joint_class
 from pipeline.dynamics.assembly.layout import Layout
+from pipeline.dynamics.tables import KEPT0, N_KEPT
 
 
 def integers(rows: Sequence[tuple[int, ...]], width: int) -> np.ndarray:
@@ -68,7 +69,7 @@ def _port_products(layout: Layout, i: int) -> list[tuple[int, int, int, int]]:
 
 def closures(layout: Layout, site_pairs: list[tuple[str, int, int]]) -> dict[str, np.ndarray]:
     """Tables of the closures, given (joint type, site a, site b) each; ordered for a thin envelope."""
-    routes = [_closure_route(layout, a, b) for _, a, b in site_pairs]
+    routes = [closure_route(layout, a, b) for _, a, b in site_pairs]
     order = _order([{c for c, _, _ in route} for route in routes])
     closure: list[tuple[int, ...]] = []
     rows: list[tuple[int, int, int]] = []
@@ -86,24 +87,25 @@ def closures(layout: Layout, site_pairs: list[tuple[str, int, int]]) -> dict[str
         entry0 = len(entries)
         entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < layout.nv]
         known += [(new, c - layout.nv, col, sign) for c, col, sign in moved if c >= layout.nv]
-        closure.append((a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, len(entries) - entry0))
+        n_entries = len(entries) - entry0
+        closure.append((a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine)))
         rows += mine
         support += slots
         supports.append(slots)
         row0 += len(mine)
         jacobian0 += len(mine) * len(slots)
     return {
-        "CLOSURES": integers(closure, 9),
+        "CLOSURES": integers(closure, 11),
         "CLOSURE_ROWS": integers(rows, 3),
         "SUPPORT": np.array(support, dtype=np.int64),
         "ENTRIES": integers(entries, 3),
         "KNOWN_ENTRIES": integers(known, 4),
-        **_couplings(closure, supports),
+        **_couplings(integers(closure, 11), supports),
         "order": np.array(order, dtype=np.int64),
     }
 
 
-def _closure_route(layout: Layout, a: int, b: int) -> list[tuple[int, int, int]]:
+def closure_route(layout: Layout, a: int, b: int) -> list[tuple[int, int, int]]:
     """(coordinate, column, sign) of both sides."""
     return [(c, col, 1) for c, col in layout.route(b)] + [(c, col, -1) for c, col in layout.route(a)]
 
@@ -124,25 +126,34 @@ def _order(supports: list[set[int]]) -> list[int]:
     return [int(k) for k in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]
 
 
-def _couplings(closure: Sequence[tuple[int, ...]], supports: list[list[int]]) -> dict[str, np.ndarray]:
+def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[str, np.ndarray]:
     """Pairs of closures with common coordinates, the common slots, and the envelope of J M^-1 J^T."""
     pairs: list[tuple[int, ...]] = []
     common: list[tuple[int, int]] = []
-    first: dict[int, int] = {}
-    for b, support_b in enumerate(supports):
-        for a in range(b + 1):
-            shared = sorted(set(supports[a]) & set(support_b))
-            if shared or a == b:
-                pairs.append((a, b, len(common), len(shared)))
-                common += [(supports[a].index(c), support_b.index(c)) for c in shared]
-                first.setdefault(b, closure[a][2])
-    rows, start = [], 0
-    for b, entry in enumerate(closure):
-        for r in range(entry[3]):
-            rows.append((first[b], start))
-            start += entry[2] + r - first[b] + 1
+    users: dict[int, list[int]] = {}
+    for b, support in enumerate(supports):
+        for a in sorted({b, *(a for c in support for a in users.get(c, []))}):
+            shared = sorted(set(supports[a]) & set(support))
+            pairs.append((a, b, len(common), len(shared)))
+            common += [(supports[a].index(c), support.index(c)) for c in shared]
+        for c in support:
+            users.setdefault(c, []).append(b)
+    coupled = integers(pairs, 4)
     return {
-        "CLOSURE_PAIRS": integers(pairs, 4),
+        "CLOSURE_PAIRS": coupled,
         "COMMON": integers(common, 2),
-        "CLOSURE_ENVELOPE": integers(rows, 2),
+        "CLOSURE_ENVELOPE": closure_envelope(closure, coupled),
     }
+
+
+def closure_envelope(closures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """First column and start of each kept row of J M^-1 J^T; pairs: first two columns are coupled closures."""
+    first = closures[:, KEPT0].copy()
+    for a, b in pairs[:, :2]:
+        first[b] = min(first[b], closures[a, KEPT0])
+    rows, start = [], 0
+    for b, closure in enumerate(closures):
+        for k in range(closure[KEPT0], closure[KEPT0] + closure[N_KEPT]):
+            rows.append((first[b], start))
+            start += k - first[b] + 1
+    return integers(rows, 2)

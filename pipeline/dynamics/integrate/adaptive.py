@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from pipeline.dynamics.integrate import straddle
 from pipeline.dynamics.integrate.state import (
     END,
     EVALUATIONS,
@@ -23,6 +24,7 @@ from pipeline.dynamics.integrate.state import (
     TIME,
 )
 from pipeline.dynamics.integrate.stepper import finite, scaled_norm, set_magnitudes
+from pipeline.dynamics.integrate.straddle import steer
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
 
@@ -33,11 +35,11 @@ LEAST_NORM = 1e-4
 
 
 def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
-    """The kernels first_step, judge, after_rejection and next_step of the stepper."""
+    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
-    steady = method.steady
+    steady, gap = method.steady, method.gap
 
     @kernel
     def first_step(h, f, w, n):
@@ -94,4 +96,11 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 
-    return first_step, judge, after_rejection, next_step
+    @kernel
+    def lay(h, w, t):
+        """Length of the step to try from t: as planned, unless a singular pose is ahead."""
+        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap)
+
+    # a method whose work space is part of its step must not have it disturbed
+    foresee = straddle.foresee_nothing if method.ends else straddle.compose(evaluate)
+    return first_step, judge, after_rejection, next_step, lay, foresee

@@ -9,9 +9,11 @@ from types import ModuleType
 import numpy as np
 
 from pipeline.core.errors import InputError, SolverError
-from pipeline.dynamics.assembly import fuse, initial
+from pipeline.dynamics.assembly import fuse, initial, selection
+from pipeline.dynamics.assembly.mobility import Mobility, analyse
 from pipeline.dynamics.assembly.numbers import Tables
 from pipeline.dynamics.integrate import observe as observing
+from pipeline.dynamics.integrate import singular
 from pipeline.dynamics.integrate.method import scheme_of
 from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, LOAD_SIZE, OK, TOUCH_SIZE
 
@@ -25,10 +27,16 @@ RECORD_SHARE, ROUNDING = 1e-3, 1e-14
 
 @dataclass(frozen=True)
 class Engine:
-    """One per run: the work space is not shared."""
+    """One per run: the work space w, the integers n and the wiring h with the rows solved for are not shared.
+
+    kept: per closure row, whether it is solved for.  mobility: counts at the start.
+    """
 
     built: Tables
     entry: ModuleType
+    h: np.ndarray
+    kept: np.ndarray
+    mobility: Mobility
     w: np.ndarray
     n: np.ndarray
     start: float
@@ -53,6 +61,12 @@ class Engine:
         first = self.n[ACTIVE]
         self.n[first : first + self.built.packed.sizes["N_LAWS"]] = pieces_at(self.built, inside)
 
+    def keep(self, rows: np.ndarray) -> None:
+        """Solve for these closure rows from now on; the others must follow from them."""
+        self.kept[:] = rows
+        selection.write(self.built, self.h, self.kept)
+        self.view("ROW_SCALE", len(rows))[:] = 0.0
+
     def view(self, name: str, length: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
         o = self.built.packed.offset(name)
@@ -60,16 +74,20 @@ class Engine:
 
     def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
         """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
-        packed = self.built.packed
-        self.view("Y", len(y))[:] = y
-        self.entry.evaluate(packed.h, packed.f, self.w, self.n, t, repeat)
-        if self.n[EVALUATION] != OK:
-            joints = ", ".join(e.name for e, _, _ in self.built.system.closures) or "none"
-            raise SolverError(
-                f"at t = {t:.6g} s: the equations are singular in this pose (loops closed at joints {joints}); "
-                "move the mechanism away from it, or remove redundant joints"
-            )
+        if not self.attempt(y, t, repeat):
+            raise SolverError(f"at t = {t:.6g} s: the equations are singular in this pose: {singular.diagnosis(self)}")
         return self.view("SLOPES", len(y)).copy()
+
+    def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
+        """Evaluate f(t, y) in the work space; whether it could be."""
+        self.view("Y", len(y))[:] = y
+        self.entry.evaluate(self.h, self.built.packed.f, self.w, self.n, t, repeat)
+        return bool(self.n[EVALUATION] == OK)
+
+    def rows(self, stored: str) -> np.ndarray:
+        """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
+        size = self.built.packed.sizes["JACOBIAN_SIZE"]
+        return selection.dense(self.built, self.h, self.view(stored, size))
 
 
 def pieces_at(built: Tables, inside: float) -> np.ndarray:
@@ -82,25 +100,26 @@ def pieces_at(built: Tables, inside: float) -> np.ndarray:
 
 def prepare(built: Tables, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
-    scene = built.system.scene
+    scene, mobility = built.system.scene, analyse(built)
+    progress(None, mobility.text())
     scheme = scheme_of(scene.solver)
     w, n = built.packed.work_space()
     entry = fuse.entry(built.kinds, scheme)
-    engine = Engine(built, entry, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    h, kept = built.packed.h.copy(), np.ones(built.packed.sizes["N_CLOSURE_ROWS"], dtype=bool)
+    engine = Engine(built, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
     if not fuse.is_compiled(built.kinds, scheme):
         progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
         with fuse.compiling(built.kinds, scheme):
-            entry.evaluate(built.packed.h, built.packed.f, w, n, engine.start, 0)
+            entry.evaluate(h, built.packed.f, w, n, engine.start, 0)
     return engine
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
-    """State at the start with its loops closed, and the loops' residual as the scene gives them [m]."""
+    """State at the start with its loops closed, and the joints' largest residual as the scene gives them [m]."""
     built = engine.built
     engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
     y = initial.start_state(built)
-    engine.evaluate(y, engine.start)
-    residual = initial.check_residual(built, engine.view("RESIDUAL", built.packed.sizes["N_CLOSURE_ROWS"]))
+    singular.select_rows(engine, y, engine.start)
     y = project(engine, y)
     links, rows = built.packed.sizes["N_LINKS"], built.packed.sizes["N_CLOSURE_ROWS"]
 
@@ -113,7 +132,7 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     if built.kinds.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
-    return y, residual
+    return y, built.system.start_residual
 
 
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -174,6 +193,6 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> dict[st
     widths = observing.widths(packed.sizes)
     out = np.zeros((len(rows), sum(widths.values())))
     tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * built.system.length
-    engine.entry.observe(packed.h, packed.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
+    engine.entry.observe(engine.h, packed.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
     ends = np.cumsum(list(widths.values()))
     return {name: out[:, end - widths[name] : end] for name, end in zip(widths, ends, strict=True)}

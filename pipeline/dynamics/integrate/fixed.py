@@ -18,12 +18,13 @@ from pipeline.dynamics.integrate.state import (
     TIME,
 )
 from pipeline.dynamics.integrate.stepper import finite
+from pipeline.dynamics.integrate.straddle import foresee_nothing
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y
 from pipeline.dynamics.vectors import index, kernel
 
 
 def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
-    """The kernels first_step, judge, after_rejection and next_step of the stepper."""
+    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
 
     @kernel
     def first_step(h, f, w, n):
@@ -59,4 +60,9 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         """All steps are alike."""
         return w[index(h[CONTROL] + FIXED)]
 
-    return first_step, judge, after_rejection, next_step
+    @kernel
+    def lay(h, w, t):
+        """Singular poses are stepped over as they come."""
+        return w[index(h[CONTROL] + STEP)]
+
+    return first_step, judge, after_rejection, next_step, lay, foresee_nothing

@@ -45,6 +45,7 @@ class Method:
     interpolate: (h, w, share of the step, out) the dense output.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
+    gap: middle of the widest gap between the stages, as share of the step.
     memory: floats kept between steps, from the numbers of positions, speeds and state variables.
     parameter: the method's number in the scene's solver table.
     stability: reach of the region of stability along the negative real axis, of an explicit method whose last
@@ -59,6 +60,7 @@ class Method:
     interpolate: Callable
     ends: bool = False
     steady: float = 1.0
+    gap: float = 0.5
     memory: Callable[[int, int, int], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
     stability: float | None = None

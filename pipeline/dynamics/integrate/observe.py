@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.integrate.project import largest
+from pipeline.dynamics.assembly.places import JACOBIAN, JACOBIAN_SIZE, LAST_PIVOT, N_KEPT_ROWS, PIVOT
+from pipeline.dynamics.integrate.project import BLIND, largest
 from pipeline.dynamics.tables import (
     ACTIVE,
     BENT,
@@ -15,6 +16,7 @@ from pipeline.dynamics.tables import (
     FRAME_SIZE,
     GRAVITY,
     INERTIA_SIZE,
+    KEPT0,
     LATCHED,
     LINK_FRAMES,
     LOAD,
@@ -27,10 +29,10 @@ from pipeline.dynamics.tables import (
     N_CONTACTS,
     N_DRIVES,
     N_FLEX,
+    N_KEPT,
     N_LAWS,
     N_LINKS,
     N_LOADS,
-    N_ROWS,
     N_SITES,
     NOT_CLOSED,
     NQ,
@@ -42,6 +44,7 @@ from pipeline.dynamics.tables import (
     RESIDUAL,
     ROW0,
     ROWS,
+    SINGULAR,
     SITE_A,
     SITE_B,
     SITE_FRAMES,
@@ -78,6 +81,7 @@ def widths(sizes: dict[str, int]) -> dict[str, int]:
         "load": LOAD_SIZE * sizes["N_LOADS"],
         "drive_force": drives,
         "energy": 3,  # kinetic, potential of gravity, elastic
+        "jacobian": sizes["JACOBIAN_SIZE"],
         "residual": 1,
         "status": 1,
     }
@@ -146,8 +150,9 @@ def compose(
         for c in range(h[N_CLOSURES]):
             for e in range(6):
                 total = 0.0
-                for k in range(closure(h, c, ROW0), closure(h, c, ROW0) + closure(h, c, N_ROWS)):
-                    total += w[h[ROWS] + 6 * k + e] * w[h[MULTIPLIER] + k]
+                for k in range(closure(h, c, N_KEPT)):
+                    wrench_row = h[ROWS] + 6 * (closure(h, c, ROW0) + k)
+                    total += w[wrench_row + e] * w[h[MULTIPLIER] + closure(h, c, KEPT0) + k]
                 out[column + 6 * c + e] = total
                 w[wrench(h, site_link(h, closure(h, c, SITE_B))) + e] -= total
                 w[wrench(h, site_link(h, closure(h, c, SITE_A))) + e] += total
@@ -194,6 +199,8 @@ def compose(
         evaluate(h, f, w, n, t, h[Y], h[SLOPES])
         if n[EVALUATION] == OK and project(h, f, w, n, t, h[Y], h[SLOPES], tolerance) < 0:
             n[EVALUATION] = NOT_CLOSED
+        if n[EVALUATION] == OK and h[N_KEPT_ROWS] > 0 and w[h[PIVOT] + LAST_PIVOT] < BLIND:
+            n[EVALUATION] = SINGULAR  # multipliers so near to a singular pose are mostly rounding
 
     @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):
@@ -221,6 +228,7 @@ def compose(
             o = _copy(w, h[LOAD], LOAD_SIZE * h[N_LOADS], line, o)
             o = _copy(w, h[DRIVE_FORCE], h[N_DRIVES], line, o)
             o = energies(h, f, w, line, o)
+            o = _copy(w, h[JACOBIAN], h[JACOBIAN_SIZE], line, o)
             line[o], line[o + 1] = residual, status
 
     return observe

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT
 from pipeline.dynamics.tables import (
     C0,
     CORRECTION,
@@ -32,6 +33,8 @@ from pipeline.dynamics.tables import (
 from pipeline.dynamics.vectors import index, kernel
 
 ITERATIONS = 8
+#: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)
+BLIND = 1e-8
 #: rounding may stop the residuals this far above a very tight tolerance
 ROUNDING = 1e3
 
@@ -75,9 +78,12 @@ def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) ->
         """Correct y until residuals [m] and their rates [m/s] are below `tolerance`.
 
         Needs the work space of evaluate(t, y); leaves it, and dy, up to date.  Returns the number
-        of evaluations, or -1 when the loops do not close.
+        of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
+        residual says little about the error behind it, nothing is changed.
         """
         rows, step, used = h[N_CLOSURE_ROWS], h[CORRECTION], 0
+        if w[index(h[PIVOT] + LAST_PIVOT)] < BLIND:
+            return 0
         for _ in range(ITERATIONS):
             worst = max(largest(w, h[RESIDUAL], rows), largest(w, h[RESIDUAL_RATE], rows))
             if worst <= tolerance:

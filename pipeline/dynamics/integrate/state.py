@@ -12,23 +12,11 @@ from pipeline.dynamics.tables import STATE as LAST
 # control floats: time, next step, end of the segment, relative tolerance, length of the run,
 # size of the mechanism, largest violation of a closure before projection, error norm of the last
 # accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter,
-# largest rate of a closure before projection, largest rate of the equations that a step met
-(
-    TIME,
-    STEP,
-    END,
-    RTOL,
-    SPAN,
-    LENGTH,
-    DRIFT,
-    LAST_NORM,
-    MOST_GROWTH,
-    FIXED,
-    PARAMETER,
-    RATE_DRIFT,
-    STEEPEST,
-    N_CONTROLS,
-) = range(14)
+# largest rate of a closure before projection, largest rate of the equations that a step met;
+# then what `straddle` keeps: independence of the closure rows at the end of the step and at its start, its start,
+# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS, N_CONTROLS = range(13, 20)
 # integers
 (
     STATUS,
@@ -51,7 +39,7 @@ from pipeline.dynamics.tables import STATE as LAST
 ) = range(LAST + 1, LAST + 18)
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
-NOT_A_NUMBER, NO_CONVERGENCE = 8, 9
+NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR = 8, 9, 10, 11
 # columns of the events
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING, COMPRESSION, STICKING, SLIPPING = range(5)

@@ -12,8 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT, WANTED_PIVOT
 from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.integrate.state import (
+    AT_SINGULAR,
+    BLIND_STEPS,
     BUDGET,
     CAP,
     CAP_REACHED,
@@ -39,12 +42,14 @@ from pipeline.dynamics.integrate.state import (
     SEGMENT_END,
     SPAN,
     STATUS,
-    STEP,
     STEP_TOO_SMALL,
     STEPS,
+    STRADDLING,
     TIME,
+    WORN_ROWS,
 )
 from pipeline.dynamics.integrate.stiffness import detect
+from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -70,6 +75,10 @@ from pipeline.dynamics.vectors import index, kernel
 
 #: what settle returns for an event after which integration starts afresh; another positive number only records it
 RESTART = 1
+#: share of the mechanism's size to which closures are closed before a singular pose
+TIGHTLY = 1e-15
+#: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
+MOST_BLIND = 20.0
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
 
@@ -89,15 +98,18 @@ def snapshot(h, w, n, rows, t, y):
 
 @kernel
 def set_magnitudes(h, f, w, y):
-    """Scale of each error group: tolerance times its floor plus its largest value at both ends."""
+    """Scale of each error group: tolerance times its floor plus the length of its vector at the step's ends.
+
+    The length, not the largest component: that would depend on the axes in which a scene is written.
+    """
     m, o = h[MAGNITUDE], h[Y]
     for g in range(h[N_GROUPS]):
         w[index(m + g)] = 0.0
     for c in range(h[NY]):
         g = m + h[index(h[GROUPS] + c)]
-        w[index(g)] = max(w[index(g)], max(abs(w[index(y + c)]), abs(w[index(o + c)])))
+        w[index(g)] += 0.5 * (w[index(y + c)] ** 2 + w[index(o + c)] ** 2)
     for g in range(h[N_GROUPS]):
-        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + w[index(m + g)])
+        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + np.sqrt(w[index(m + g)]))
 
 
 @kernel
@@ -151,7 +163,7 @@ def compose(
     start_watch, make_settle = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
     feel = detect(method)
-    first_step, judge, after_rejection, next_step = stepping(evaluate, start_watch, begin, error, method)
+    first_step, judge, after_rejection, next_step, lay, foresee = stepping(evaluate, start_watch, begin, error, method)
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
@@ -163,6 +175,10 @@ def compose(
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
+        elif w[index(c + BLIND_STEPS)] > MOST_BLIND:
+            n[STATUS] = AT_SINGULAR
+        elif w[index(h[PIVOT] + LAST_PIVOT)] < w[index(h[PIVOT] + WANTED_PIVOT)]:
+            n[STATUS] = WORN_ROWS
         elif (
             n[N_RECORDED] + waiting + ROOM > rows.shape[0]
             or n[N_EVENTS] + ROOM + EVENTS_OF_A_CONTACT * h[N_CONTACTS] > events.shape[0]
@@ -200,7 +216,9 @@ def compose(
             return False
         w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
         w[index(c + RATE_DRIFT)] = max(w[index(c + RATE_DRIFT)], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
-        used = project(h, f, w, n, t_new, h[Y_NEW], slope, w[index(c + RTOL)] * w[index(c + LENGTH)])
+        share = TIGHTLY if near(h, w, t_new) else w[index(c + RTOL)]
+        used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[index(c + LENGTH)])
+        note(h, w)
         if used > 0:
             n[EVALUATIONS] += used
             n[PROJECTION_EVALUATIONS] += used
@@ -216,7 +234,7 @@ def compose(
         if norm != norm:
             n[EVALUATION] = NOT_FINITE
             return 1e9
-        if norm > 1.0:
+        if norm > allowed(h, w):
             return min(norm, 1e9)
         if not finish(h, f, w, n, t_new):
             return 1e9
@@ -238,9 +256,13 @@ def compose(
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
         c = h[CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
-            if n[FRESH] and not first_step(h, f, w, n):
-                return
-            step, t = w[index(c + STEP)], w[index(c + TIME)]
+            t = w[index(c + TIME)]
+            if n[FRESH]:
+                if not first_step(h, f, w, n):
+                    return
+                note(h, w)
+                forget(h, w, t)
+            step = lay(h, w, t)
             final = t + 1.0001 * step >= w[index(c + END)]
             if final:
                 step = w[index(c + END)] - t
@@ -252,7 +274,7 @@ def compose(
                 return
             t_new = w[index(c + END)] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
-            if norm > 1.0:
+            if norm > allowed(h, w):
                 n[REJECTED] += 1
                 if not after_rejection(h, w, n, step, norm):
                     return
@@ -262,12 +284,17 @@ def compose(
             if happened < 0:
                 return
             n[STEPS] += 1
+            straddling = w[index(c + STRADDLING)] > 0.0
+            if straddling:
+                snapshot(h, w, n, rows, t, h[Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
             keep(h, f, w, n, step)
             accept(h, w, t_new)
-            w[index(c + STEP)] = following
-            if happened > 0:
+            plan(h, w, step, following)
+            foresee(h, f, w, n, t_new)
+            if happened > 0 or straddling:
                 snapshot(h, w, n, rows, t_new, h[Y])
+            if happened > 0:
                 n[FRESH] = 1 if happened == RESTART else 0
 
     return advance

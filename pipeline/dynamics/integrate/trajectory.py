@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics.integrate import state
+from pipeline.dynamics.assembly.places import PIVOT_SIZE
+from pipeline.dynamics.integrate import singular, state
 from pipeline.dynamics.integrate.engine import Engine, Progress, overlapping
 from pipeline.dynamics.tables import MODE
 
@@ -15,6 +16,8 @@ from pipeline.dynamics.tables import MODE
 SLICE = 20_000
 #: events for which there is room at first
 EVENT_ROWS = 4096
+#: why the stepper stops that another choice of closure rows may mend
+STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
 
@@ -23,6 +26,7 @@ STIFF_SHARE = 0.3
 class Trajectory:
     """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`, by time.
 
+    selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
     """
@@ -30,6 +34,7 @@ class Trajectory:
     rows: np.ndarray
     events: np.ndarray
     counters: dict[str, int]
+    selections: tuple[tuple[float, np.ndarray], ...]
     drift: float = 0.0
     rate_drift: float = 0.0
     steepest: float = 0.0
@@ -38,6 +43,18 @@ class Trajectory:
     def time(self) -> np.ndarray:
         """Times of the rows [s], strictly increasing."""
         return self.rows[:, 0]
+
+    def parts(self) -> list[tuple[slice, np.ndarray]]:
+        """Stretches of rows, each with the closure rows that were solved for to reach them."""
+        starts = [start for start, _ in self.selections]
+        firsts = np.searchsorted(self.time, starts, side="right")
+        firsts[0] = 0
+        ends = [*firsts[1:], len(self.rows)]
+        return [(slice(a, b), kept) for a, b, (_, kept) in zip(firsts, ends, self.selections, strict=True)]
+
+    def selection(self, row: int) -> np.ndarray:
+        """Closure rows that were solved for to reach a row."""
+        return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
 
 
 @dataclass
@@ -49,6 +66,7 @@ class _Run:
     outputs: np.ndarray
     rows: np.ndarray
     events: np.ndarray
+    selections: list[tuple[float, np.ndarray]]
 
 
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
@@ -89,9 +107,12 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     rows = np.zeros((len(outputs) + room + state.ROOM, 1 + 2 * contacts + len(y)))
     rows[0, 0], rows[0, 1 + 2 * contacts :] = engine.start, y
     n[state.N_RECORDED], n[state.NEXT_OUTPUT] = 1, 1
+    ratio = singular.select_rows(engine, y, engine.start)
+    engine.view("Y", len(y))[:] = y
+    engine.view("PIVOT", PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
     events = np.full((room + state.ROOM, state.EVENT_SIZE), np.nan)
     _begin_closed(engine, y, rows[0], events)
-    return _Run(engine.w, n, outputs, rows, events)
+    return _Run(engine.w, n, outputs, rows, events, [(engine.start, engine.kept.copy())])
 
 
 def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.ndarray) -> None:
@@ -121,7 +142,7 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
     control = engine.view("CONTROL", state.N_CONTROLS)
     while True:
         n[state.BUDGET] = n[state.EVALUATIONS] + SLICE
-        engine.entry.advance(packed.h, packed.f, run.w, n, run.outputs, run.rows, run.events)
+        engine.entry.advance(engine.h, packed.f, run.w, n, run.outputs, run.rows, run.events)
         t = control[state.TIME]
         progress((t - engine.start) / control[state.SPAN], f"t = {t:.5f} s, {n[state.EVALUATIONS]} evaluations")
         status = n[state.STATUS]
@@ -130,31 +151,38 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
         if status == state.FULL:
             run.rows = np.concatenate([run.rows, np.zeros_like(run.rows)])
             run.events = np.concatenate([run.events, np.full_like(run.events, np.nan)])
+        elif status == state.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
+            if singular.improve(engine, float(t)):
+                run.selections.append((float(t), engine.kept.copy()))
+            elif status != state.WORN_ROWS:
+                raise SolverError(_refusal(engine, run))
         elif status != state.PAUSED:
             raise SolverError(_refusal(engine, run))
 
 
 def _refusal(engine: Engine, run: _Run) -> str:
     control, n = engine.view("CONTROL", state.N_CONTROLS), run.n
-    joints = ", ".join(e.name for e, _, _ in engine.built.system.closures) or "none"
+    where = singular.diagnosis(engine)
     contacts = [name for name, *_ in engine.built.system.contacts]
     culprit = contacts[n[state.CULPRIT]] if contacts else ""
     fixed = f"{control[state.FIXED]:.2g} s"
     too_long = f"; or the fixed step of {fixed} is too long for it" if control[state.FIXED] else ""
-    unsolvable = f"the loops at joints {joints} cannot be kept closed: a singular configuration"
+    unsolvable = f"the loops cannot be kept closed: a singular pose in which they can go on in several ways ({where})"
     if not engine.built.system.closures:
         unsolvable = "the equations cannot be solved here: the motion has grown beyond bounds"
     reasons = {
         state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
         + _why_so_many(n, control),
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
-        f"or stiffer than the integrator can follow (loops closed at joints {joints})",
-        state.NO_START: f"the equations are singular here (loops closed at joints {joints})",
+        f"or stiffer than the integrator can follow ({where})",
+        state.NO_START: f"the equations are singular here ({where})",
         state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
         + too_long,
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
+        state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
+        f"({where}); give it another motion",
         state.LOST_CLOSURE: unsolvable + too_long,
     }
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
@@ -188,4 +216,4 @@ def _collect(run: _Run, control: np.ndarray) -> Trajectory:
     # what happens inside a step is noted when the step is done: one contact after the other
     in_order = events[np.argsort(events[:, state.EVENT_TIME], kind="stable")]
     drift, rate_drift, steepest = (float(control[k]) for k in (state.DRIFT, state.RATE_DRIFT, state.STEEPEST))
-    return Trajectory(rows[keep], in_order, counters, drift, rate_drift, steepest)
+    return Trajectory(rows[keep], in_order, counters, tuple(run.selections), drift, rate_drift, steepest)

@@ -11,12 +11,13 @@ import xarray as xr
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly import initial
+from pipeline.dynamics.assembly import initial, selection
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.integrate import singular
 from pipeline.dynamics.integrate.engine import Engine, Progress, observe, prepare
-from pipeline.dynamics.tables import JACOBIAN0, MODE, N_ROWS, N_SUPPORT, OK, PIECE_SIZE, ROW0, SUPPORT0
+from pipeline.dynamics.tables import MODE, OK, PIECE_SIZE
 
 #: impact rate that a contact is given: at rest the hysteresis of an impact long past has no say
 NO_IMPACT = 1e300
@@ -49,8 +50,9 @@ class Bench:
 class Balance:
     """What acts on the coordinates in a state: M dv/dt + bias = J^T multipliers.
 
-    bias: generalised forces with their sign turned, shape (nv,).  mass: (nv, nv).  jacobian: (rows, nv).
-    slip: rates at which the loops open, shape (rows,).
+    bias: generalised forces with their sign turned, shape (nv,).  mass: (nv, nv).
+    jacobian: rows solved for, (rows, nv).
+    slip: rates at which the loops open along them, shape (rows,).
     """
 
     bias: np.ndarray
@@ -81,6 +83,8 @@ def hold(
     built = tabulate(build(driven, bundles), given)
     packed = replace(built.packed, h=built.packed.h.copy(), f=built.packed.f.copy())
     engine = prepare(replace(built, packed=packed), progress)
+    engine.select_pieces(engine.start)
+    singular.select_rows(engine, initial.start_state(built), engine.start)
     at = engine.start if time is None else time
     first, last = drive_state(engine, engine.start), drive_state(engine, at)
     if not moving:
@@ -98,8 +102,6 @@ def hold(
     bench = Bench(scene, engine, at, first, np.zeros(packed.sizes["N_TURNS"]))
     set_drives(bench, first)
     state = initial.start_state(built)
-    engine.evaluate(state, at)
-    initial.check_residual(built, engine.view("RESIDUAL", packed.sizes["N_CLOSURE_ROWS"]))
     q = carry(bench, closed(bench, state[: built.layout.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
@@ -128,7 +130,7 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
         straight = np.zeros(PIECE_SIZE)
         straight[:3] = bench.time, position, speed
         packed.table("PIECES")[first : first + count] = straight
-        packed.table("PIECE_HARMONICS")[first : first + count, 1] = 0
+        selection.view(packed, bench.engine.h, "PIECE_HARMONICS")[first : first + count, 1] = 0
     bench.engine.select_pieces(bench.time)
 
 
@@ -197,8 +199,8 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     return Balance(
         engine.view("BIAS", nv).copy(),
         _mass(engine),
-        _jacobian(engine),
-        engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"]).copy(),
+        engine.rows("JACOBIAN"),
+        engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"])[selection.kept_places(engine.built, engine.h)],
     )
 
 
@@ -210,15 +212,3 @@ def _mass(engine: Engine) -> np.ndarray:
     for i, (first, start) in enumerate(packed.table("ENVELOPE")):
         L[i, first : i + 1] = entries[start : start + i + 1 - first]
     return L @ L.T
-
-
-def _jacobian(engine: Engine) -> np.ndarray:
-    """Closure Jacobian of the last evaluation, dense."""
-    packed = engine.built.packed
-    J = np.zeros((packed.sizes["N_CLOSURE_ROWS"], engine.built.layout.nv))
-    support = packed.table("SUPPORT")[:, 0]
-    for c in packed.table("CLOSURES"):
-        rows, slots = c[N_ROWS], support[c[SUPPORT0] : c[SUPPORT0] + c[N_SUPPORT]]
-        block = engine.view("JACOBIAN", c[JACOBIAN0] + rows * len(slots))[c[JACOBIAN0] :]
-        J[c[ROW0] : c[ROW0] + rows, slots] = block.reshape(len(slots), rows).T
-    return J

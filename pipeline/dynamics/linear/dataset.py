@@ -27,7 +27,12 @@ def equilibrium(bench: Bench, found: Settled, moving: bool) -> xr.Dataset:
     rows = seen(bench, state(bench, found.at.q)[None, :])
     contacts = bench.contacts
     ahead = [np.full((1, 1), bench.time), np.ones((1, contacts)), np.full((1, contacts), NO_IMPACT)]
-    once = Trajectory(np.hstack([*ahead, rows["state"]]), np.zeros((0, slots.EVENT_SIZE)), {})
+    once = Trajectory(
+        np.hstack([*ahead, rows["state"]]),
+        np.zeros((0, slots.EVENT_SIZE)),
+        {},
+        ((bench.time, bench.engine.kept.copy()),),
+    )
     still = dataset(Run(bench.scene, bench.engine, once, rows, 0.0, None)).isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]

@@ -62,7 +62,9 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
     multipliers = np.linalg.lstsq(spread.T, load, rcond=RANK)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
-    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, b.slip, len(b.jacobian) - rank)
+    return Tangent(
+        q, Z, moves, b.bias, b.mass, multipliers, b.slip, len(b.jacobian) - rank + bench.engine.mobility.redundant
+    )
 
 
 def scales(bench: Bench) -> np.ndarray:

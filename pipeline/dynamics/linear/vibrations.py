@@ -58,7 +58,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     if _is_symmetric(K, error) and not np.any(D):
         k, axes = _principal(_symmetric(K, error), limp)
         # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
-        value, shape = np.sqrt(-k.astype(complex)), axes.astype(complex)
+        value, shape = np.sqrt((-k).astype(complex)), axes.astype(complex)
     else:
         value, shape = _damped(K, D, limp)
     order = np.lexsort((np.abs(value), np.abs(value.imag)))

@@ -18,6 +18,7 @@ from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.record import ledger
 from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
+from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.run import Run
 from pipeline.dynamics.tables import (
@@ -52,7 +53,7 @@ def dataset(run: Run) -> xr.Dataset:
     coordinates: dict[str, object] = {"time": trajectory.time}
     _motion(built, seen, variables, coordinates)
     _modes(built, seen, variables, coordinates)
-    _drives(built, seen, variables, coordinates)
+    _drives(built, seen, run.scene, variables, coordinates)
     _joint_coordinates(built, seen, variables, coordinates)
     if built.system.scene.forces():
         _loads(built, seen, variables, coordinates)
@@ -67,8 +68,9 @@ def dataset(run: Run) -> xr.Dataset:
         record = lookup("pipeline.dynamics.record", "stress", where="[output]")
         record(built, seen, run.scene.output.stress, variables, coordinates)
     variables.update(ledger.series(built, seen))
-    made = xr.Dataset(variables, coords=coordinates)
-    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_told(built, trajectory))
+    topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
+    made = xr.Dataset(variables | topological, coords=coordinates | named)
+    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run), **_told(built, trajectory))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
@@ -130,6 +132,15 @@ def _report(run: Run) -> dict[str, float | int]:
     return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
 
 
+def _counts(run: Run) -> dict[str, str | int]:
+    """Redundancy, in words for the attributes."""
+    redundant = run.engine.mobility.redundant
+    found: dict[str, str | int] = {"redundant_closure_rows": redundant}
+    if redundant:
+        found["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+    return found
+
+
 def _motion(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
     origin = built.system.origin
     links = link_motions(built, seen["link_frame"])
@@ -174,15 +185,24 @@ def _modes(built: Tables, seen: Seen, variables: Variables, coordinates: dict[st
     variables["modal_velocity"] = (("time", "mode"), np.concatenate([s.u for s in states.values()], axis=1))
 
 
-def _drives(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+def _drives(built: Tables, seen: Seen, scene: Scene, variables: Variables, coordinates: dict[str, object]) -> None:
     names = built.system.drives
     if not names:
         return
     sign_of = {name: link.stage.sign for link in built.system.links if link.stage for name in link.drives}
     signs = np.array([sign_of[name] for name in names])
     coordinates["drive"] = names
-    variables["drive_force"] = (("time", "drive"), signs * seen["drive_force"])
-    variables["drive_position"] = (("time", "drive"), signs * seen["coordinate"][:, built.layout.nq :])
+    force, position = signs * seen["drive_force"], signs * seen["coordinate"][:, built.layout.nq :]
+    sharing = [name for name in built.system.scene.forces() if name not in scene.load]
+    if sharing:  # actuators beyond the freedoms, which the engine has as loads
+        from pipeline.dynamics.record.loads import along_coordinates
+
+        coordinates["drive"] = [*names, *sharing]
+        known = joint_coordinates(built, seen)
+        force = np.concatenate([force, along_coordinates(built, seen, sharing)], axis=1)
+        position = np.concatenate([position, np.stack([known[name][0] for name in sharing], axis=1)], axis=1)
+    variables["drive_force"] = (("time", "drive"), force)
+    variables["drive_position"] = (("time", "drive"), position)
 
 
 def _joint_coordinates(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from pipeline.dynamics.assembly.loading import describe, order
 from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.loads.fields import FORCE, MOMENT, VALUE, A, B
-from pipeline.dynamics.tables import FRAME_SIZE, LOAD_SIZE, OMEGA, ORIGIN, VELOCITY
+from pipeline.dynamics.loads.fields import AXIS, FORCE, MOMENT, SIDE, TURNING, VALUE, A, B
+from pipeline.dynamics.tables import AXES, FRAME_SIZE, LOAD_SIZE, OMEGA, ORIGIN, VELOCITY
 
 Seen = dict[str, np.ndarray]
 
@@ -37,6 +37,19 @@ def load_series(built: Tables, seen: Seen) -> dict[str, tuple[tuple[str, ...], n
         "load_power": (("time", "load"), power),
     }
     return {name: (dims, values[:, shown]) for name, (dims, values) in series.items()}
+
+
+def along_coordinates(built: Tables, seen: Seen, names: list[str]) -> np.ndarray:
+    """Force [N] or torque [N m] of loads along their joint coordinates, shape (time, names)."""
+    table, found = _table(seen), []
+    sites = seen["site_frame"].reshape(len(table), -1, FRAME_SIZE)
+    for name in names:
+        k = order(built.system.scene).index(name)
+        row = built.packed.table("LOADS")[k]
+        axes = sites[:, row[B] if row[SIDE] else row[A], AXES : AXES + 9].reshape(-1, 3, 3)
+        part = MOMENT if row[TURNING] else FORCE
+        found.append(np.einsum("ti,ti->t", axes[:, :, row[AXIS]], table[:, k, part : part + 3]))
+    return np.stack(found, axis=1)
 
 
 def on_body(built: Tables, seen: Seen, body: str) -> tuple[np.ndarray, np.ndarray]:

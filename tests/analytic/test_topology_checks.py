@@ -1,0 +1,222 @@
+"""Closed loops with known answers: Andrews' and Bricard's mechanisms, four-bars that pass singular poses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.errors import SolverError
+from pipeline.core.scene.load import load_scene
+from tests.analytic import four_bars
+from tests.analytic.mechanism_runs import TREE, run
+from tests.properties.mechanisms import Table, simulate
+
+TIGHT = (("solver.rtol", 1e-12),)
+
+# Angles [rad] and rates [rad/s] of Andrews' mechanism at 0.03 s: independent solution whose scaled difference from
+# the solution published in the Test Set for IVP Solvers (Mazzia & Magherini, andrews.f) is 9e-11 in the
+# angles and 3e-8 in the rates.  Order: beta, theta, gamma, phi, delta, Omega, epsilon.
+ANDREWS = np.array([
+    15.810771195153439, -15.756371058411503, 0.04082224011964324, -0.534730116342084, 0.524409965879954,
+    0.5347301163420843, 1.0480807410419377,
+])  # fmt: skip
+ANDREWS_RATES = np.array([
+    1139.9203022591125, -1424.3792951775529, 11.032911910542026, 19.29337410489815, 0.5735699148254771,
+    -19.293374104898152, 0.3231791492467143,
+])  # fmt: skip
+#: accelerations of the published solution [rad/s^2]
+ANDREWS_ACCELERATIONS = np.array([
+    -24631.76316945196, 51850.37701610329, 324102.5686413781, 566749.3645176213, 16743.62929479361,
+    -566749.3645176222, 9826.520791458423,
+])  # fmt: skip
+#: kinetic energy and the spring's less 0.033 N m times beta, the same at all times [J]; beta at the start
+ANDREWS_ENERGY, ANDREWS_START = 1.4378329575321425, -0.06171389001427645
+
+# IFToMM A02 on the regular branch: (angle [rad], its rate [rad/s]) of the rods at 10 s, and the times of the singular
+# poses [s]; integrals of the one-degree-of-freedom equation at rtol 1e-13, and for N = 2 the published
+# converged (0.32845738, 0.94451879) of the top.
+FOUR_BARS = {2: (31.750597186984365, 1.5066421808370012), 40: (31.597433743984947, 1.1676221087499428)}
+SINGULAR = {
+    2: [
+        0.7143555292929554, 1.228159393314122, 2.6568704519001205, 3.1706743159212873, 4.599385374507356,
+        5.113189238528524, 6.541900297114673, 7.055704161135842, 8.484415219722077, 8.998219083743251,
+    ],
+    40: [
+        0.7215810248256522, 1.2440209038789913, 2.687182953530358, 3.209622832583697, 4.6527848822350695,
+        5.175224761288408, 6.618386810939828, 7.14082668999317, 8.58398873964471, 9.106428618698054,
+    ],
+}  # fmt: skip
+
+
+def angles(dataset: xr.Dataset, body: str) -> np.ndarray:
+    """Angle about z, turns counted [rad], of a body of a planar mechanism."""
+    R = quaternion_to_matrix(dataset["quaternion"].sel(body=body).values)
+    return np.asarray(np.unwrap(np.arctan2(R[:, 1, 0], R[:, 0, 0])))
+
+
+def andrews(dataset: xr.Dataset, field: str) -> np.ndarray:
+    """The source's seven coordinates, or rates of them, at the end of a run."""
+    if field == "angle":
+        K = {k: angles(dataset, f"K{k}")[-1] for k in range(1, 8)}
+    else:
+        K = {k: float(dataset[field].sel(body=f"K{k}").values[-1, 2]) for k in range(1, 8)}
+    return np.array([K[1], K[2] - K[1], K[3], K[4] - K[5], K[5], K[6] - K[7], K[7]])
+
+
+def test_andrews_mechanism_at_default_settings() -> None:
+    """Accepted: 1e-5 relative by default settings."""
+    assert andrews(run("checks/andrews_squeezer"), "angle") == pytest.approx(ANDREWS, rel=1e-5)
+
+
+def test_andrews_mechanism_at_tight_tolerance() -> None:
+    """Accepted: 1e-8; the reference itself is known to 1e-10 in angles, 3e-8 in rates, of the largest of each."""
+    dataset = run("checks/andrews_squeezer", (("solver.rtol", 1e-13),))
+    assert andrews(dataset, "angle") == pytest.approx(ANDREWS, rel=1e-8, abs=1e-9)
+    assert andrews(dataset, "angular_velocity") == pytest.approx(ANDREWS_RATES, rel=0, abs=1e-8 * 1424.0)
+    # the published accelerations belong to its positions and rates, which differ by those 3e-8
+    largest = np.abs(ANDREWS_ACCELERATIONS).max()
+    assert andrews(dataset, "angular_acceleration") == pytest.approx(ANDREWS_ACCELERATIONS, rel=0, abs=1e-6 * largest)
+
+
+def test_andrews_mechanism_has_one_freedom_and_out_of_plane_reactions_that_nothing_determines() -> None:
+    dataset = run("checks/andrews_squeezer")
+    assert set(dataset.mobility.values) == {1}
+    # three loops of five rows in space, of two in the plane
+    assert set(dataset["rank"].values) == {6}
+    assert dataset.attrs["redundant_closure_rows"] == 9
+    assert dataset.reaction_redundant.values.all()
+    energy = dataset.kinetic + dataset.potential + dataset.elastic - dataset.load_work
+    assert energy.values - 0.033 * ANDREWS_START == pytest.approx(ANDREWS_ENERGY, rel=1e-9)
+
+
+# Four-bars ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("loops", four_bars.LOOPS)
+def test_the_committed_scene_is_the_generated_one(loops: int) -> None:
+    assert four_bars.path(loops).read_text() == four_bars.text(loops)
+
+
+@pytest.mark.parametrize("loops", four_bars.LOOPS)
+def test_four_bars_stay_on_the_regular_branch_through_ten_singular_poses(loops: int) -> None:
+    """Accepted: 1e-4 m at 10 s, energy within 0.1 J. All along, because a wrong branch may come back."""
+    dataset = run(f"checks/four_bars_{loops}")
+    theta = four_bars.inclination(loops, dataset.time.values)
+    top = dataset.frame_position.sel(frame="rod0.top").values[:, :2]
+    assert top == pytest.approx(np.column_stack([np.sin(theta), np.cos(theta)]), abs=1e-6)
+    assert np.abs(dataset.energy_error.values).max() < 1e-4
+    assert len(dataset.pass_time) == 10
+
+
+@pytest.mark.parametrize("loops", [2, 40])
+def test_four_bars_at_tight_tolerance(loops: int) -> None:
+    """To 1e-8: ten passes at rtol 1e-12 each leave some 1e-10."""
+    dataset = run(f"checks/four_bars_{loops}", TIGHT)
+    angle, rate = FOUR_BARS[loops]
+    top = dataset.frame_position.sel(frame="rod0.top").values[-1, :2]
+    assert top == pytest.approx([np.sin(angle), np.cos(angle)], abs=1e-8)
+    assert dataset.angular_velocity.sel(body="rod0").values[-1, 2] == pytest.approx(-rate, rel=1e-7)
+    last = dataset.frame_position.sel(frame=f"rod{loops}.top").values[-1, :2] - [loops, 0.0]
+    assert last == pytest.approx(top, abs=1e-8)
+
+
+@pytest.mark.parametrize("loops", [2, 40])
+def test_singular_passes_are_recorded_with_time_condition_and_joint(loops: int) -> None:
+    dataset = run(f"checks/four_bars_{loops}", TIGHT)
+    # located on an interpolant between recorded rows some hundredths of a second apart
+    assert dataset.pass_time.values == pytest.approx(SINGULAR[loops], abs=1e-5)
+    assert set(dataset.pass_rank_loss.values) == {loops}
+    assert (dataset.pass_condition.values > 1e3).all()
+    assert set(dataset.pass_joint.values) <= {f"right{k}" for k in range(1, loops + 1)}
+    assert set(dataset.mobility.values) == {1}
+
+
+# Redundant rows -----------------------------------------------------------------------------------------------------
+
+
+def table(name: str, **overrides: object) -> Table:
+    return load_scene(TREE / "scenes" / "checks" / f"{name}.toml", overrides).model_dump(exclude_none=True)
+
+
+def same_motion(a: xr.Dataset, b: xr.Dataset, within: float) -> None:
+    for field in ("position", "velocity", "angular_velocity", "acceleration"):
+        known = b[field].values
+        assert np.abs(a[field].values - known).max() <= within * np.abs(known).max(), field
+
+
+def test_bricards_mechanism_moves_as_the_one_without_redundant_rows() -> None:
+    """A joint that may also slide takes the redundant row away, and does not slide."""
+    redundant = table("bricard", **{"time.end": 2.0, "solver": {"rtol": 1e-12}})
+    free = {**redundant, "joint": {**redundant["joint"], "R6": {**redundant["joint"]["R6"], "type": "cylindrical"}}}
+    with_row, without = simulate(redundant), simulate(free)
+    assert (with_row.attrs["redundant_closure_rows"], without.attrs["redundant_closure_rows"]) == (1, 0)
+    assert set(with_row.mobility.values) == {1}
+    assert set(without.mobility.values) == {1}
+    same_motion(with_row, without, 1e-9)
+    assert with_row.reaction_redundant.values.all()
+    assert not without.reaction_redundant.values.any()
+
+
+def test_bricards_mechanism_keeps_its_energy_and_its_loop() -> None:
+    dataset = run("checks/bricard", TIGHT)
+    # some hundred steps of rtol 1e-12 at energies of some ten joules
+    assert np.abs(dataset.energy_error.values).max() < 1e-8
+    assert dataset.constraint_error.values.max() < 1e-12
+
+
+def test_a_planar_four_bar_in_space_moves_as_the_one_without_redundant_rows() -> None:
+    """R, S, C, R joints take away the three redundant rows of R, R, R, R."""
+    redundant = table("four_bars_1", **{"time.end": 0.6, "solver": {"rtol": 1e-12}})
+    joints = dict(redundant["joint"])
+    joints["left1"] = {**joints["left1"], "type": "spherical"}
+    joints["right1"] = {**joints["right1"], "type": "cylindrical"}
+    with_rows, without = simulate(redundant), simulate({**redundant, "joint": joints})
+    assert (with_rows.attrs["redundant_closure_rows"], without.attrs["redundant_closure_rows"]) == (3, 0)
+    same_motion(with_rows, without, 1e-9)
+    # what is determined is the same: forces in the plane
+    names = list(redundant["joint"])
+    forces = [d.joint_force.sel(joint=names).values[:, :, :2] for d in (with_rows, without)]
+    assert forces[0] == pytest.approx(forces[1], rel=0, abs=1e-8 * np.abs(forces[1]).max())
+
+
+def test_rows_are_chosen_anew_where_the_first_choice_fails() -> None:
+    """Bricard's loop turns far enough to make any four of its five rows nearly dependent; its answer shows nothing of it."""
+    dataset = run("checks/bricard", (("time.end", 10.0), *TIGHT))
+    assert dataset.condition.values.max() < 1e4
+
+
+# Singular poses ------------------------------------------------------------------------------------------------------
+
+
+def driven(**law: object) -> Table:
+    """A parallelogram whose crank is turned by a law."""
+    found = table("four_bars_1", **{"solver": {"rtol": 1e-12}, "time.end": 1.0, "output.interval": 0.25})
+    for body in found["body"].values():
+        body.pop("velocity", None)
+        body.pop("angular_velocity", None)
+    return {**found, "drive": {"crank": {"joint": "foot0", "law": law}}}
+
+
+def test_a_row_in_a_singular_pose_itself_is_the_limit_of_its_neighbours() -> None:
+    """The crank turns steadily and lies exactly at an output time; the parallelogram goes on as one."""
+    with np.errstate(all="ignore"):
+        dataset = simulate(driven(type="polynomial", coefficients=(0.0, -np.pi)))
+    at = dataset.sel(time=0.5)
+    assert 0.5 in dataset.time.values
+    assert dataset.pass_time.values == pytest.approx([0.5], abs=1e-6)
+    # the mean of both sides of the pose, some 1e-4 s away
+    assert at.angular_velocity.sel(body="rod1").values == pytest.approx([0.0, 0.0, -np.pi], abs=1e-6)
+    assert at.acceleration.sel(body="rod1").values == pytest.approx([-0.5 * np.pi**2, 0.0, 0.0], abs=1e-4)
+    assert dataset.position.sel(body="rod1").values[-1] == pytest.approx([1.0, -0.5, 0.0], abs=1e-9)
+
+
+def test_a_mechanism_that_comes_to_rest_in_a_singular_pose_is_refused() -> None:
+    """Where the bars lie in one line and nothing moves, nothing says how the loop goes on."""
+    law = {"type": "step", "start": (0.0,), "end": (0.5,), "change": (-0.5 * np.pi,)}
+    with pytest.raises(SolverError) as caught:
+        simulate(driven(**law))
+    assert caught.value.exit_code == 3
+    for part in ("t = 0.", "singular", "condition number", "joint right1"):
+        assert part in str(caught.value), part

@@ -1,0 +1,179 @@
+"""Mechanisms that cannot be are refused in words, before anything is compiled."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from typing import Any
+
+import pytest
+from pydantic import ValidationError
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.assembly import fuse
+from pipeline.dynamics.run import engine_of
+from tests.analytic.mechanism_runs import TREE
+from tests.properties.mechanisms import Table
+
+
+@pytest.fixture(autouse=True)
+def _nothing_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
+    def entry(*args: Any) -> None:
+        raise AssertionError("came as far as the kernels")
+
+    monkeypatch.setattr(fuse, "entry", entry)
+
+
+def four_bar() -> Table:
+    """A parallelogram on two pins, standing upright."""
+    path = TREE / "scenes" / "checks" / "four_bars_1.toml"
+    return deepcopy(load_scene(path).model_dump(exclude_none=True))
+
+
+def refusal(table: Table) -> InputError:
+    with pytest.raises(InputError) as caught:
+        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+    assert caught.value.exit_code == 2
+    return caught.value
+
+
+def test_a_sound_mechanism_gets_as_far_as_the_kernels() -> None:
+    with pytest.raises(AssertionError, match="as far as the kernels"):
+        engine_of(Scene.model_validate(four_bar()), {}, lambda share, text: None)
+
+
+def test_a_frame_that_is_not_there() -> None:
+    table = four_bar()
+    table["joint"]["left1"]["between"] = ("rod0.topp", "beam1.left")
+    error = refusal(table)
+    assert error.place == "[joint.left1.between]"
+    assert "rod0.topp" in error.problem
+    assert "rod0.top" in str(error.remedy)
+
+
+def test_a_drive_of_a_joint_that_is_not_there() -> None:
+    table = four_bar()
+    table["drive"] = {"crank": {"joint": "foot9", "law": {"type": "constant", "value": 0.0}}}
+    error = refusal(table)
+    assert error.place == "[drive.crank.joint]"
+    assert "foot9" in error.problem
+    assert error.remedy
+
+
+def test_a_body_joined_to_nothing() -> None:
+    table = four_bar()
+    table["body"]["lost"] = deepcopy(table["body"]["beam1"])
+    error = refusal(table)
+    assert error.place == "[body.lost]"
+    assert "joined to nothing" in error.problem
+    assert "free" in str(error.remedy)
+
+
+def test_a_body_that_says_it_is_free_is_accepted() -> None:
+    table = four_bar()
+    table["body"]["bird"] = deepcopy(table["body"]["beam1"])
+    table["joint"]["flight"] = {"type": "free", "between": ("ground.pin0", "bird.left")}
+    with pytest.raises(AssertionError, match="as far as the kernels"):
+        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+
+
+def step(change: float) -> Table:
+    return {"type": "step", "start": (0.0,), "end": (1.0,), "change": (change,)}
+
+
+def test_drives_that_contradict_each_other() -> None:
+    table = four_bar()
+    table["drive"] = {n: {"joint": n, "law": step(c)} for n, c in (("foot0", 0.3), ("foot1", 0.2))}
+    error = refusal(table)
+    assert error.place in {"[drive.foot0]", "[drive.foot1]"}
+    assert "over-driven" in error.problem
+    assert "foot0, foot1" in error.problem
+    assert "remove" in str(error.remedy)
+
+
+def test_a_locked_mechanism() -> None:
+    table = four_bar()
+    table["body"]["brace"] = deepcopy(table["body"]["beam1"])
+    table["body"]["brace"]["pose"] = {"position": (0.0, 0.0, 0.0)}
+    table["body"]["brace"]["frames"] = {"a": {}, "b": {"position": (1.0, 1.0, 0.0)}}
+    for body in table["body"].values():
+        body.pop("velocity", None)
+        body.pop("angular_velocity", None)
+    table["joint"]["low"] = {"type": "revolute", "between": ("ground.pin0", "brace.a")}
+    table["joint"]["high"] = {"type": "revolute", "between": ("brace.b", "rod1.top")}
+    error = refusal(table)
+    assert error.place == "[joint]"
+    assert "locked" in error.problem
+    assert error.remedy
+
+
+def test_a_joint_whose_frames_are_metres_apart() -> None:
+    table = four_bar()
+    table["body"]["beam1"]["pose"] = {"position": (3.0, 1.0, 0.0)}
+    error = refusal(table)
+    assert error.place in {"[joint.left1.between]", "[joint.right1.between]"}
+    assert "3 m apart" in error.problem
+    assert "%" in error.problem  # the rule
+    assert "poses" in str(error.remedy)
+
+
+def test_a_joint_whose_axes_are_far_from_parallel() -> None:
+    table = four_bar()
+    table["body"]["rod1"]["pose"]["rotation_vector"] = (0.0, 0.3, 0.0)
+    error = refusal(table)
+    assert "axes" in error.problem
+    assert "deg" in error.problem
+
+
+def test_a_joint_whose_axes_point_opposite_ways() -> None:
+    table = four_bar()
+    table["body"]["beam1"]["frames"]["left"] = {"rotation_vector": (3.141592653589793, 0.0, 0.0)}
+    error = refusal(table)
+    assert error.place == "[joint.left1.between]"
+    assert "same way" in error.problem
+
+
+def test_a_mechanism_that_cannot_be_assembled_tells_the_residual_of_every_joint() -> None:
+    """A stretched pair of rods that would have to be 2 % longer."""
+    table = four_bar()
+    bodies, joints = table["body"], table["joint"]
+    del bodies["rod1"], joints["foot1"]
+    bodies["ground"]["frames"] = {"pin0": {}, "far": {"position": (2.02, 0.0, 0.0)}}
+    bodies["rod0"]["pose"] = {"rotation_vector": (0.0, 0.0, -1.5707963267948966)}
+    bodies["beam1"]["pose"] = {"position": (1.0, 0.0, 0.0)}
+    joints["right1"] = {"type": "revolute", "between": ("beam1.right", "ground.far")}
+    error = refusal(table)
+    assert "cannot be assembled" in error.problem
+    assert "right1 " in error.problem
+    assert error.remedy
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "rule"),
+    [
+        ("inertia", [1.0, 1.0, 3.0], "at most the sum of the others"),
+        ("inertia", [-1.0, 1.0, 1.0], "each is >= 0"),
+        ("mass", 0.0, "greater than 0"),
+    ],
+)
+def test_a_body_that_cannot_exist(key: str, value: object, rule: str) -> None:
+    table = four_bar()
+    table["body"]["rod0"][key] = value
+    with pytest.raises(ValidationError, match=rule) as caught:
+        Scene.model_validate(table)
+    assert caught.value.errors()[0]["loc"][:2] == ("body", "rod0")
+
+
+def test_a_start_in_a_singular_pose_is_refused_with_time_joint_and_condition() -> None:
+    """All rods lie in one line: the loop may become a parallelogram or its twin."""
+    table = four_bar()
+    lying = {"rotation_vector": (0.0, 0.0, -1.5707963267948966)}
+    for rod, x in (("rod0", 0.0), ("rod1", 1.0)):
+        table["body"][rod] |= {"pose": {"position": (x, 0.0, 0.0), **lying}}
+    table["body"]["beam1"]["pose"] = {"position": (1.0, 0.0, 0.0)}
+    with pytest.raises(SolverError) as caught:
+        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+    assert caught.value.exit_code == 3
+    for part in ("t = 0 s", "singular", "condition number", "joints"):
+        assert part in str(caught.value), part
