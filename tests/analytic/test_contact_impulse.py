@@ -32,3 +32,13 @@ def test_impulse_only_grows_in_contact():
     assert steps.min() >= 0.0
     # a contact may fall between two outputs; events are outputs too, so none falls between two open ones
     assert np.abs(steps[apart]).max() == 0.0
+
+
+def test_every_recorded_penetration_carries_its_force():
+    """Also in the step that ends with the opening, after which the contact has no force any more."""
+    bounce = run("checks/bounce", (("output.interval", 1e-5), ("time.end", 0.2)))
+    depth, force = bounce.contact_penetration.values[:, 0], bounce.contact_normal_force.values[:, 0]
+    inside = depth > 1e-9  # far above rounding of the 0.1 m gap
+    assert inside.sum() > 10
+    assert (force[inside] > 0.0).all()
+    assert (force[depth == 0.0] == 0.0).all()
