@@ -50,7 +50,7 @@ def _integration(scene: Scene) -> Iterator[Design]:
     def design(group: str, solver: Mapping[str, Any], **factors: Any) -> Design:
         setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
         located = ", unlocated contacts" if "events" in solver else ""
-        key = f"{solver['integrator']}, {setting}{located}"
+        key = f"{solver['integrator']}, {setting}{located}" + (", as the paper" if group == "paper" else "")
         return Design(key, group, factors, edited(scene, {"solver": dict(solver), "accuracy": None, "ensemble": None}))
 
     yield design("reference", REFERENCE)
@@ -63,8 +63,8 @@ def _integration(scene: Scene) -> Iterator[Design]:
     for method, steps in STEPS.items():
         for step in steps:
             yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)
-    if scene.contacts():
-        yield design("paper", PAPER)
+    located = {k: v for k, v in PAPER.items() if k != "events"}
+    yield design("paper", PAPER if scene.contacts() else located)
 
 
 def _sampling(scene: Scene) -> Iterator[Design]:
