@@ -57,7 +57,7 @@ def forget(h, w, t):
     c = h[CONTROL]
     w[index(c + PAST_SIGMA)], w[index(c + PAST_TIME)] = w[index(c + SIGMA)], t
     w[index(c + PASS_TIME)], w[index(c + STRADDLING)] = NEVER, 0.0
-    blind = 0.0 < w[index(c + SIGMA)] and w[index(c + SIGMA)] ** 2 < BLIND
+    blind = w[index(c + SIGMA)] > 0.0 and w[index(c + SIGMA)] ** 2 < BLIND
     w[index(c + BLIND_STEPS)] = w[index(c + BLIND_STEPS)] + 1.0 if blind else 0.0
 
 
