@@ -26,10 +26,10 @@ check: $(READY) ## Format, lint, types and import rules
 	$(VENV)/bin/lint-imports
 
 test: $(READY) ## Tests, except those marked slow
-	$(RUN) -m pytest -q
+	$(RUN) -m pytest -q -n auto --dist loadfile
 
 test-slow: $(READY) ## The tests marked slow
-	$(RUN) -m pytest -q -m slow
+	$(RUN) -m pytest -q -n auto --dist loadfile -m slow
 
 bench: $(READY) ## Benchmarks of accuracy against cost
 	$(RUN) -m benchmarks

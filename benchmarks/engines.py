@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.measure import once
+from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.parts import ClearanceSpherical, IdealJoint
+from pipeline.core.scene.parts import IdealJoint
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.integrate.engine import Engine, consistent_start
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate

@@ -26,10 +26,10 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.laws import derivative, holds_at_zero, joint_laws
-from pipeline.core.registry import lookup
-from pipeline.core.scene.parts import ClearanceSpherical
+from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
+from pipeline.dynamics.contact.surfaces import BallInSocket
 from pipeline.dynamics.drives.pieces import Piece
 
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
@@ -284,7 +284,7 @@ def _contact(model: Model, joint: ClearanceSpherical) -> None:
             spheresRadii=[joint.ball_radius, joint.ball_radius + joint.clearance],
             isHollowSphere1=True,
             impactModel=1,
-            contactStiffness=lookup("pipeline.dynamics.contact", joint.type, where="[joint]")(joint),
+            contactStiffness=BallInSocket.stiffness(joint, joint.normal.exponent),
             contactStiffnessExponent=joint.normal.exponent,
             restitutionCoefficient=1.0 - 0.5 * (1.0 - restitution**2),
             minimumImpactVelocity=joint.floor,

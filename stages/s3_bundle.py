@@ -21,7 +21,7 @@ WHERE = "[output] stress"
 
 
 def params(scene: Scene, body: str) -> dict[str, Any]:
-    """Whether stresses shall be recovered and bending shall shorten the body; nothing where the scene asks for neither."""
+    """Whether stresses are to be recovered and bending shortens the body; nothing where the scene asks for neither."""
     asked = {"stress": True} if body in (scene.output.stress or ()) else {}
     return asked | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
 

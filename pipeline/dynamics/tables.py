@@ -156,7 +156,9 @@ GAP, RATE, NORMAL_FORCE, FRICTION_POWER, DAMPING_POWER, STORED, BENT, SLIP = ran
 TOUCH_FORCE, TOUCH_OFFSET, TOUCH_POINT, TOUCH_SIZE = 8, 11, 14, 17
 # ledger before the contacts' slots (normal loss, work of friction each; then three deflections of each contact
 # with bristles): work of drives, loss of modal damping
-DRIVE_WORK, MODAL_LOSS, CONTACT_LOSS = 0, 1, 2
+DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = 0, 1, 2
+# a contact's slots: losses of its damping and of friction, impulse of its normal force
+DAMPING_LOSS, FRICTION_LOSS, IMPULSE, PER_CONTACT = range(4)
 # what evaluate reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 #: first entries of n, the integers that change: report of the last evaluation; where the laws' active pieces

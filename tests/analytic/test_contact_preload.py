@@ -116,3 +116,21 @@ def test_a_start_in_contact_without_a_declared_speed_is_refused() -> None:
 
     with pytest.raises(InputError, match="initial_approach_speed"):
         run(PRELOAD, (("joint.contact.initial_approach_speed", None),))
+
+
+def test_slope_of_friction_is_told_as_the_stiffness_that_limits_the_steps() -> None:
+    dataset = run(ROLLING)
+    # slope 1.5 mu_s N / v_s over the mass that the contact point feels, 1/m + R^2/I of a solid ball
+    pressed = float(dataset.contact_normal_force.max())
+    known = 1.5 * 0.15 * pressed / 2e-5 * (1.0 / MASS + 0.02**2 / 57.6e-6)
+    # an estimate of the spectral radius, from two slopes
+    assert dataset.attrs["largest_rate"] == pytest.approx(known, rel=0.05)
+    assert dataset.attrs["stiff_share"] > 0.3
+    assert run(PRELOAD).attrs["stiff_steps"] == 0
+
+
+def test_a_run_that_stiffness_makes_too_long_is_refused_in_words() -> None:
+    from pipeline.core.errors import SolverError
+
+    with pytest.raises(SolverError, match="limited by stability"):
+        run(ROLLING, (("solver.evaluations", 20000),))

@@ -125,7 +125,7 @@ def test_matrices_that_are_no_free_body_are_refused(tmp_path: Path, solid: xr.Da
     )
     write(tmp_path, sp.block_diag([model.stiffness] * 2), sp.block_diag([model.mass] * 2), both)
     twice = build(recipe(THREE, frames), tmp_path)
-    with pytest.raises(InputError, match="falls into parts: 2 of them"):
+    with pytest.raises(InputError, match="of 2 bodies that share no node"):
         model_of(twice)
     write(tmp_path, sp.triu(model.stiffness), model.mass, table)
     with pytest.raises(InputError, match="stiffness matrix is not symmetric"):

@@ -112,11 +112,11 @@ class Touch:
         # the table holds inertial minus applied wrenches (moment about the origin; force)
         self.wrench = {name: -w[o : o + 6] for name, o in zip(self.links, wrench, strict=True)}
         self.touch = w[packed.offset("TOUCH") :][: tables.TOUCH_SIZE]
-        losses = packed.offset("LEDGER_RATE") + tables.CONTACT_LOSS
+        losses = packed.offset("LEDGER_RATE") + tables.CONTACT_SLOTS
         self.losses = w[losses : losses + 2]
         self.bending = 0.0  # power that bends the bristles at this normal force
         if self.place >= 0:
-            rate = turned @ w[losses + 2 : losses + 5]
+            rate = turned @ w[losses + tables.PER_CONTACT :][:3]
             self.bending = 1e5 * self.touch[tables.NORMAL_FORCE] * float(self.bent @ rate)
             self.out_of_plane = float(rate @ self.axis)
 

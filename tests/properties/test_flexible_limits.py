@@ -13,6 +13,7 @@ from pipeline import dynamics
 from pipeline.core.scene.load import load_scene, read_toml
 from pipeline.structure.fe import mesh
 from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes.geometric_stiffness import variables
 from tests.analytic.mechanism_runs import TREE
 
 END = 0.01
@@ -35,7 +36,7 @@ def stroke(
         recipe["material"]["youngs_modulus"] *= stiffer
         grid = mesh.build({**recipe, "elements": elements})
         shapes = solve(grid, body.modes.reference, body.modes.count, interfaces=body.modes.interfaces)
-        bundles[name] = bundle.build(grid, shapes)
+        bundles[name] = bundle.build(grid, shapes, variables(grid, shapes))
     return dynamics.simulate(loaded, bundles, lambda share, text: None)
 
 

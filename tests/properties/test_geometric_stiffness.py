@@ -13,6 +13,7 @@ from pipeline import dynamics
 from pipeline.core.scene.load import load_scene, read_toml
 from pipeline.structure.fe import mesh
 from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes.geometric_stiffness import variables
 from tests.analytic.mechanism_runs import TREE
 
 RECIPE = TREE / "meshes" / "checks" / "slender_beam.toml"
@@ -29,13 +30,13 @@ def reduce(reference: str, count: int | None, interfaces: tuple[str, ...] | None
     """A beam's bundle; `recipe` replaces whole parts of the recipe."""
     grid = mesh.build({**read_toml(Path(RECIPE)), **recipe})
     modes = solve(grid, reference, count, interfaces=interfaces)
-    return Reduced(grid, modes, bundle.build(grid, modes))
+    return Reduced(grid, modes, bundle.build(grid, modes, variables(grid, modes)))
 
 
 def slopes_squared(reduced: Reduced, q: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Places and v'^2 + w'^2 of cubic elements, at the middles of `points` parts of each element."""
     x = reduced.mesh["node_position"].values[:, 0]
-    d = reduced.modes["shape"].values @ q
+    d = (reduced.modes["vector"].values @ q).reshape(-1, 6)
     s = (np.arange(points) + 0.5) / points
     at, total = [], []
     for i in range(len(x) - 1):

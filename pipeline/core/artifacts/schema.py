@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.body_schema import DEFICITS, MATRICES, SOLID, STRESS
+from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
 from pipeline.core.artifacts.variable import Schema, Variable
 
 __all__ = [
@@ -33,116 +33,6 @@ QUATERNION = ("w", "x", "y", "z")
 
 
 _V = Variable
-
-#: stage 1: nodes and two-node beam cells in the mesh frame
-MESH: Schema = {
-    "node_position": _V(("node", "axis"), "m", "node position in the mesh frame"),
-    "cell": _V(("cell", "corner"), "1", "node indices of each cell, from start to end"),
-    "area": _V(("cell",), "m2", "cross-section area"),
-    "second_moment": _V(("cell", "axis"), "m4", "torsion constant and bending second moments (stiffness)"),
-    "inertia_moment": _V(("cell", "axis"), "m4", "polar and bending second moments of area (mass)"),
-    "youngs_modulus": _V(("cell",), "Pa", "Young's modulus"),
-    "shear_modulus": _V(("cell",), "Pa", "shear modulus"),
-    "density": _V(("cell",), "kg m-3", "mass density"),
-    "frame_node": _V(("frame",), "1", "node to which the named frame is tied"),
-    "frame_position": _V(("frame", "axis"), "m", "origin of the named frame in the mesh frame"),
-    "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, frame to mesh frame"),
-    "abscissa": _V(("node",), "m", "place of the node along the rod", optional=True),
-    "rod_rotation": _V(
-        ("axis", "axis2"), "1", "rotation matrix, rod axes (x along the rod) to mesh frame", optional=True
-    ),
-    "shear_coefficient": _V(
-        ("cell", "axis"), "1", "share of the area that carries force along x, y and z of the rod", optional=True
-    ),
-    "product_moment": _V(("cell",), "m4", "integral of y z over the section (stiffness)", optional=True),
-    "inertia_product": _V(("cell",), "m4", "integral of y z over the section (mass)", optional=True),
-    "area_profile": _V(("cell", "point"), "1", "area at the Gauss points over that of the cell", optional=True),
-    "second_moment_profile": _V(
-        ("cell", "point", "axis"), "1", "second moments at the Gauss points over those of the cell", optional=True
-    ),
-    "inertia_moment_profile": _V(("cell", "point", "axis"), "1", "second moments of the mass likewise", optional=True),
-    "shear_coefficient_profile": _V(("cell", "point", "axis"), "1", "shear coefficients likewise", optional=True),
-    "lump_node": _V(("lump",), "1", "node that carries the lumped mass", optional=True),
-    "lump_mass": _V(("lump",), "kg", "lumped mass", optional=True),
-    "lump_offset": _V(("lump", "axis"), "m", "centre of the lumped mass seen from its node, mesh axes", optional=True),
-    "lump_inertia": _V(
-        ("lump", "axis", "axis2"), "kg m2", "inertia of the lumped mass about its centre, mesh axes", optional=True
-    ),
-}
-
-#: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
-MODES: Schema = DEFICITS | {
-    "frequency": _V(("mode",), "Hz", "natural frequency of the kept coordinate in the reduced basis"),
-    "shape": _V(
-        ("node", "dof", "mode"), "kg-0.5", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"
-    ),
-    "node_position": _V(("node", "axis"), "m", "node position in the mesh frame"),
-    "cell": _V(("cell", "corner"), "1", "node indices of each drawn cell"),
-    "vector": _V(("unknown", "mode"), "kg-0.5", "mass-normalised shape, every unknown of the model"),
-    "rigid_frequency": _V(("rigid_mode",), "Hz", "frequencies of the removed rigid-body modes", optional=True),
-    "kind": _V(("mode",), "1", "bending, torsion or axial by share of kinetic energy"),
-    "exact_euler_bernoulli": _V(
-        ("mode",), "Hz", "exact frequency of the uniform rod, Euler-Bernoulli bending", optional=True
-    ),
-    "exact_rayleigh": _V(
-        ("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia", optional=True
-    ),
-    "exact_timoshenko": _V(
-        ("mode",), "Hz", "exact frequency of the uniform rod, bending with rotary inertia and shear", optional=True
-    ),
-}
-
-#: stage 3: all that the dynamics needs of a flexible body, in its body frame
-BUNDLE: Schema = (
-    DEFICITS
-    | STRESS
-    | {
-        "mass": _V((), "kg", "mass"),
-        "first_moment": _V(("axis",), "kg m", "integral of rho X"),
-        "second_moment": _V(("axis", "axis2"), "kg m2", "integral of rho X X^T"),
-        "modal_first_moment": _V(("axis", "mode"), "kg0.5", "integral of rho S"),
-        "position_mode_moment": _V(("axis", "axis2", "mode"), "kg0.5 m", "integral of rho X_k S_lj"),
-        "mode_mode_moment": _V(("axis", "axis2", "mode", "mode2"), "1", "integral of rho S_ki S_lj"),
-        "modal_mass": _V(("mode", "mode2"), "1", "modal mass matrix"),
-        "modal_stiffness": _V(("mode", "mode2"), "rad2 s-2", "modal stiffness matrix"),
-        "frequency": _V(("mode",), "Hz", "natural frequency of the coordinate"),
-        "frame_position": _V(("frame", "axis"), "m", "undeformed origin of the named frame in the body frame"),
-        "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, named frame to body frame, undeformed"),
-        "frame_translation_shape": _V(
-            ("frame", "axis", "mode"), "kg-0.5", "displacement of the frame per modal coordinate, body axes"
-        ),
-        "frame_rotation_shape": _V(
-            ("frame", "axis", "mode"), "kg-0.5 m-1", "rotation vector of the frame per modal coordinate, body axes"
-        ),
-        "shortening_first_moment": _V(
-            ("mode", "mode2"),
-            "m-1",
-            "integral of rho times the displacement along x that bending causes, second derivative",
-            optional=True,
-        ),
-        "shortening_second_moment": _V(
-            ("mode", "mode2"),
-            "1",
-            "integral of rho x times the displacement along x that bending causes, second derivative",
-            optional=True,
-        ),
-        "frame_shortening": _V(
-            ("frame", "mode", "mode2"),
-            "kg-1 m-1",
-            "displacement of the frame along x that bending causes, second derivative by modal coordinates",
-            optional=True,
-        ),
-        "node_position": _V(("node", "axis"), "m", "undeformed node position in the body frame"),
-        "cell": _V(("cell", "corner"), "1", "node indices of each cell"),
-        "shape_translation": _V(
-            ("node", "axis", "mode"), "kg-0.5", "node displacement per modal coordinate, body axes"
-        ),
-        "shape_rotation": _V(
-            ("node", "axis", "mode"), "kg-0.5 m-1", "node rotation vector per modal coordinate, body axes"
-        ),
-        "radius": _V(("cell",), "m", "radius of the drawn section"),
-    }
-)
 
 #: stage 4: one run
 RUN: Schema = {
@@ -214,6 +104,7 @@ RUN: Schema = {
     "contact_damping_loss": _V(
         ("time", "contact"), "J", "energy lost to the normal damping of the contact since the start", optional=True
     ),
+    "contact_impulse": _V(("time", "contact"), "N s", "impulse of the normal force since the start", optional=True),
     "contact_friction_loss": _V(
         ("time", "contact"), "J", "energy lost to the friction of the contact since the start", optional=True
     ),

@@ -17,14 +17,14 @@ class Stepping(Part):
     """What all integrators have.
 
     rtol: relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations.
-    ledger_tolerance: largest energy error of a run, as a share of the energy that it turns over.
+    ledger_tolerance: largest energy error of a run, as a share of the energy that it turns over; default 1e-3 where
+        the error chooses the steps, and 1 for fixed steps.
     evaluations: most right-hand sides of one run.  step: present means steps of this length.
     events: where contacts begin and end, ``at step ends`` only with fixed steps.
     """
 
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
-    # no contact law is known to a thousandth of its energy; a run that is off by more says something else
-    ledger_tolerance: Annotated[Number, Field(gt=0.0)] = 1e-3
+    ledger_tolerance: Annotated[Number, Field(gt=0.0)] | None = None
     evaluations: Annotated[int, Field(gt=0)] = 50_000_000
     step: Annotated[Time, Field(gt=0.0)] | None = None
     events: Literal["located", "at step ends"] = "located"

@@ -71,7 +71,8 @@ def fill(
 
 def ledger_groups(system: System, energy: float) -> list[tuple[float, int]]:
     """(floor, number of variables) of every error group after positions and speeds: ledger, then bristles."""
-    ledger = [(energy, 1)] * (tables.CONTACT_LOSS + 2 * len(system.contacts))
+    contact = [(energy, 1), (energy, 1), (energy / system.length, 1)]  # losses [J], impulse [N s]
+    ledger = [(energy, 1)] * tables.CONTACT_SLOTS + contact * len(system.contacts)
     return ledger + [(size, 3) for size in _bristles(system) if size is not None]
 
 
@@ -82,7 +83,7 @@ def ledger_size(system: System) -> int:
 
 def bristle_places(layout: Layout) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    place = layout.nq + layout.nv + tables.CONTACT_LOSS + 2 * len(layout.system.contacts)
+    place = layout.nq + layout.nv + tables.CONTACT_SLOTS + tables.PER_CONTACT * len(layout.system.contacts)
     found = []
     for size in _bristles(layout.system):
         found.append(-1 if size is None else place)

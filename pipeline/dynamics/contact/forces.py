@@ -18,14 +18,17 @@ from pipeline.dynamics.tables import (
     BENT,
     BRISTLE,
     CLEARANCE,
-    CONTACT_LOSS,
+    CONTACT_SLOTS,
+    DAMPING_LOSS,
     DAMPING_POWER,
     FLEX_C0,
     FLOOR,
     FRICTION_KIND,
     FRICTION_LAW,
+    FRICTION_LOSS,
     FRICTION_POWER,
     GAP,
+    IMPULSE,
     INNER,
     LATCHED,
     LEDGER_RATE,
@@ -41,6 +44,7 @@ from pipeline.dynamics.tables import (
     OMEGA,
     ORIGIN,
     OUTER,
+    PER_CONTACT,
     PORT_COLUMN,
     PORT_FLEX,
     RADIUS,
@@ -65,6 +69,12 @@ from pipeline.dynamics.tables import (
     wrench,
 )
 from pipeline.dynamics.vectors import accumulate, add, at, at9, cross, dot, kernel, put, scale, sub, turn, turn_back
+
+
+@kernel
+def contact_slots(h, c):
+    """Where w holds the rates of contact c's slots in the ledger."""
+    return h[LEDGER_RATE] + CONTACT_SLOTS + PER_CONTACT * c
 
 
 @kernel
@@ -146,7 +156,7 @@ def rubbing(traction: Callable) -> Callable:
         if place >= 0:
             bristle_rate(h, w, n, c, axes, normal, turning, z, z_rate)
         w[o + FRICTION_POWER], w[o + BENT], w[o + SLIP] = -loss, bent, np.sqrt(dot(slip, slip))
-        w[h[LEDGER_RATE] + CONTACT_LOSS + 2 * c + 1] = -dot(force, slip)
+        w[contact_slots(h, c) + FRICTION_LOSS] = -dot(force, slip)
         return force
 
     return rub
@@ -187,7 +197,8 @@ def compose(separation: Callable, normal: Callable, stored: Callable, rub: Calla
         f_n = max(0.0, elastic + damping)
         w[o + NORMAL_FORCE], w[o + STORED] = f_n, stored(kind, depth, law)
         w[o + DAMPING_POWER] = damping * rate
-        w[h[LEDGER_RATE] + CONTACT_LOSS + 2 * c] = damping * rate
+        slots = contact_slots(h, c)
+        w[slots + DAMPING_LOSS], w[slots + IMPULSE] = damping * rate, f_n
         outer, inner = contact(h, c, OUTER), contact(h, c, INNER)
         p_WQ = add(at(w, site_frame(h, inner) + ORIGIN), scale(f[numbers + RADIUS], axis))
         force = add(scale(-f_n, axis), rub(h, f, w, n, c, axis, turning, p_WQ, f_n))

@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT, WANTED_PIVOT
 from pipeline.dynamics.integrate.project import largest
+from pipeline.dynamics.integrate.rows import hold_modes, snapshot
 from pipeline.dynamics.integrate.state import (
     AT_SINGULAR,
     BLIND_STEPS,
@@ -55,9 +56,7 @@ from pipeline.dynamics.tables import (
     EVALUATION,
     FLOORS,
     GROUPS,
-    LATCHED,
     MAGNITUDE,
-    MODE,
     N_CLOSURE_ROWS,
     N_CONTACTS,
     N_GROUPS,
@@ -81,19 +80,6 @@ TIGHTLY = 1e-15
 MOST_BLIND = 20.0
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
-
-
-@kernel
-def snapshot(h, w, n, rows, t, y):
-    """Append a row to the record: time, modes and impact rates of the contacts, state."""
-    row, contacts = rows[n[N_RECORDED]], h[N_CONTACTS]
-    row[0] = t
-    for c in range(contacts):
-        row[1 + c] = n[index(n[MODE] + c)]
-        row[1 + contacts + c] = w[index(h[LATCHED] + c)]
-    for k in range(h[NY]):
-        row[1 + 2 * contacts + k] = w[index(y + k)]
-    n[N_RECORDED] += 1
 
 
 @kernel
@@ -280,6 +266,7 @@ def compose(
                     return
                 continue
             following = next_step(h, w, step, norm)
+            hold_modes(h, w, n)
             happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
@@ -293,6 +280,7 @@ def compose(
             plan(h, w, step, following)
             foresee(h, f, w, n, t_new)
             if happened > 0 or straddling:
+                hold_modes(h, w, n)
                 snapshot(h, w, n, rows, t_new, h[Y])
             if happened > 0:
                 n[FRESH] = 1 if happened == RESTART else 0

@@ -35,7 +35,9 @@ def family(model: Model, vectors: np.ndarray) -> list[str]:
     families = model.families
     share = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
     totals = np.stack([share[families.member == k].sum(axis=0) for k in range(len(families.names))])
-    return [families.names[k] for k in np.argmax(totals, axis=0)]
+    # a solid's torsion has equal shares along y and z; rounding must not choose
+    largest = totals >= (1.0 - 1e-6) * totals.max(axis=0)
+    return [families.names[k] for k in np.argmax(largest, axis=0)]
 
 
 def signed(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:

@@ -76,7 +76,7 @@ def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarra
     if pieces > 1:
         raise InputError(
             WHERE,
-            f"the stiffness matrix falls into parts: {pieces} of them share no node",
+            f"the stiffness matrix is that of {pieces} bodies that share no node",
             "make each a body of its own",
         )
     try:

@@ -1,0 +1,128 @@
+"""Figures of the verdict page, as PNG files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+
+from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, PLACES, RIGID
+
+Row = dict[str, Any]
+COLORS = dict(zip(CONDITIONS, ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000"), strict=True))
+MARKERS = dict(zip(CONDITIONS, "osDv^", strict=True))
+#: shares of error below this are drawn at it
+FLOOR = 1e-7
+
+
+def write(rows: dict[str, list[Row]], folder: Path) -> list[str]:
+    """Write every figure whose rows are there; names of the files."""
+    found = []
+    for name, needs, draw in (
+        ("compliance", "statics", _compliance),
+        ("frequencies", "frequencies", _frequencies),
+        ("far", "far", _far),
+        ("clearance", "clearance", _clearance),
+    ):
+        if needs in rows:
+            figure = draw(rows[needs])
+            figure.savefig(folder / f"{name}.png", dpi=110, metadata={"Software": None})
+            plt.close(figure)
+            found.append(f"{name}.png")
+    return found
+
+
+def _compliance(rows: list[Row]) -> Any:
+    figure, axes = plt.subplots(2, 3, figsize=(12, 6.4), sharex=True, sharey=True, layout="constrained")
+    for column, place in enumerate(PLACES):
+        for line, (direction, label) in enumerate((("x", "bending"), ("z", "axial"))):
+            ax = axes[line, column]
+            for condition in CONDITIONS:
+                points = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition)]
+                count, share = ([r[name] for r in points] for name in ("count", direction))
+                ax.step(count, share, where="post", color=COLORS[condition], label=condition, linewidth=1.6)
+            ax.set_title(f"{label}, joint at {place} mm", fontsize=10)
+            ax.set_ylim(-0.03, 1.05)
+            _plain(ax)
+        axes[1, column].set_xlabel("coordinates")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("share of the compliance")
+    axes[0, 0].legend(fontsize=8, loc="center right")
+    return figure
+
+
+def _frequencies(rows: list[Row]) -> Any:
+    figure, axes = plt.subplots(1, 3, figsize=(12, 4), sharey=True, layout="constrained")
+    for ax, place in zip(axes, PLACES, strict=True):
+        here = [r for r in rows if r["place_mm"] == place and r["time"] == 0.0]
+        full = np.array(next(r for r in here if r["condition"] == FULL)["frequency"])
+        for condition in CONDITIONS:
+            found = np.array(next(r for r in here if r["condition"] == condition)["frequency"])
+            n = min(len(found), len(full))
+            error = np.maximum(np.abs(found[:n] / full[:n] - 1.0), FLOOR)
+            ax.semilogy(np.arange(1, n + 1), error, MARKERS[condition] + "-", color=COLORS[condition], label=condition)
+        ax.set_title(f"joint at {place} mm", fontsize=10)
+        ax.set_xlabel("vibration of the mechanism")
+        _plain(ax)
+    axes[0].set_ylabel("error of the frequency (share)")
+    axes[0].legend(fontsize=8)
+    return figure
+
+
+def _far(rows: list[Row]) -> Any:
+    figure, axes = plt.subplots(1, 2, figsize=(12, 4.4), sharey=True, layout="constrained")
+    first = next(iter(PLACES))
+    for condition in CONDITIONS:
+        of = [r for r in rows if r["condition"] == condition and r["finer"] == 1]
+        line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
+        style = {"color": COLORS[condition], "marker": MARKERS[condition], "label": condition}
+        axes[0].semilogy([r["count"] for r in line], [max(r["velocity_error"], FLOOR) for r in line], **style)
+        at = [min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES]
+        axes[1].semilogy(list(PLACES), [max(r["velocity_error"], FLOOR) for r in at], **style)
+    axes[0].set_xlabel("coordinates (joint at 0 mm)")
+    axes[1].set_xlabel("place of the prismatic joint (mm), 13 or 14 coordinates")
+    axes[1].set_xticks(list(PLACES))
+    axes[0].set_ylabel("error of the platform's velocity,\nshare of the full rod's effect")
+    axes[0].legend(fontsize=8)
+    for ax in axes:
+        _plain(ax)
+    return figure
+
+
+def _clearance(rows: list[Row]) -> Any:
+    figure, axes = plt.subplots(1, 2, figsize=(12, 4.4), sharey=True, layout="constrained")
+    first = next(iter(PLACES))
+    for k, condition in enumerate(CONDITIONS):
+        of = [r for r in rows if r["condition"] == condition]
+        at = [min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES]
+        _bars(axes[0], [p + 2.5 * (k - 2) for p in PLACES], at, condition)
+        line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
+        if len(line) > 1:
+            _bars(axes[1], [r["count"] + 0.25 * (k - 2) for r in line], line, condition)
+    for place in PLACES:
+        rigid = next(r for r in rows if r["condition"] == RIGID and r["place_mm"] == place)["peak_force"]
+        axes[0].plot([place - 8, place + 8], [rigid, rigid], color="#888888", label="rigid" if place == first else None)
+    axes[0].set_xticks(list(PLACES))
+    axes[0].set_xlabel("place of the prismatic joint (mm), 13 or 14 coordinates")
+    axes[1].set_xlabel("coordinates (joint at 0 mm)")
+    axes[0].set_ylabel("peak contact force (N)")
+    for ax in axes:
+        ax.legend(fontsize=8)
+        _plain(ax)
+    return figure
+
+
+def _bars(ax: Any, x: list[float], rows: list[Row], condition: str) -> None:
+    mean, spread = ([r[name] for r in rows] for name in ("peak_force", "peak_force_std"))
+    style = {"color": COLORS[condition], "marker": MARKERS[condition], "linestyle": "none", "capsize": 3}
+    ax.errorbar(x, mean, yerr=spread, label=condition, **style)
+
+
+def _plain(ax: Any) -> None:
+    ax.grid(visible=True, color="#e3e3e3", linewidth=0.7)
+    ax.tick_params(labelsize=8)
