@@ -8,8 +8,8 @@ What is the same: everything of rigid and flexible bodies, joints and drives (th
 and the normal contact force: Exudyn's Hunt-Crossley model is K d^n (1 + 3/2 (1 - e) d'/d'0), which with
 e = 1 - (1 - c_r^2)/2 is Lankarani and Nikravesh's.
 
-What differs: friction. Exudyn's built-in law is linear up to one speed and constant above; it is given the dynamic
-coefficient and the same slope at rest. The contact point lies half a penetration off.
+What differs: friction. Exudyn's built-in law is linear up to one speed and constant above; for the paper's law it is
+given the dynamic coefficient and the same slope at rest. The contact point lies half a penetration off.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from benchmarks import exudyn_contact
 from benchmarks.laws import derivative, holds_at_zero, joint_laws
 from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
-from pipeline.dynamics.contact.surfaces import BallInSocket
 from pipeline.dynamics.drives.pieces import Piece
 
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
@@ -127,6 +127,8 @@ def _flexible_body(model: Model, scene: Scene, i: int, exudyn: Any) -> None:
     name = model.groups[i].host
     b, parts = model.bundles[name], model.parts
     n, damping = b.sizes["mode"], scene.flexible()[name].damping or 0.0
+    if not isinstance(damping, float):
+        raise ValueError(f"[body.{name}.damping] is not one ratio for all modes")
     zeros = [0.0] * n
     modal = model.system.AddNode(
         parts.NodeGenericODE2(
@@ -224,7 +226,7 @@ def _joints(model: Model, scene: Scene) -> None:
         elif joint.type == "spherical":
             add(parts.SphericalJoint(markerNumbers=[marker(model, a), marker(model, b)]))
         elif isinstance(joint, ClearanceSpherical):
-            _contact(model, joint)
+            exudyn_contact.add(model.system, parts, joint, marker(model, a), marker(model, b))
         elif name in laws:
             _driven(model, a, b, laws[name])
         else:
@@ -262,33 +264,5 @@ def _driven(model: Model, a: str, b: str, law: tuple[Piece, ...]) -> None:
             markerNumbers=[model.ground_coordinate, coordinate],
             offsetUserFunction=lambda mbs, t, item, offset: position(t),
             offsetUserFunction_t=lambda mbs, t, item, offset: rate(t),
-        )
-    )
-
-
-def _contact(model: Model, joint: ClearanceSpherical) -> None:
-    socket, ball = joint.between
-    restitution = joint.normal.restitution
-    if joint.normal.law != "lankarani-nikravesh" or restitution is None:
-        raise ValueError(f"no Exudyn object has the normal law '{joint.normal.law}'")
-    friction = joint.friction
-    # the slope of mu at rest is 3/2 mu_s / v_s here and mu_d / v there
-    regular = friction.dynamic * friction.v_static / (1.5 * friction.static) if friction else 1e-3
-    data = model.system.AddNode(
-        model.parts.NodeGenericData(initialCoordinates=[joint.clearance, 0.0, 0.0, 0.0], numberOfDataCoordinates=4)
-    )
-    model.system.AddObject(
-        model.parts.ObjectContactSphereSphere(
-            markerNumbers=[marker(model, ball), marker(model, socket)],
-            nodeNumber=data,
-            spheresRadii=[joint.ball_radius, joint.ball_radius + joint.clearance],
-            isHollowSphere1=True,
-            impactModel=1,
-            contactStiffness=BallInSocket.stiffness(joint, joint.normal.exponent),
-            contactStiffnessExponent=joint.normal.exponent,
-            restitutionCoefficient=1.0 - 0.5 * (1.0 - restitution**2),
-            minimumImpactVelocity=joint.floor,
-            dynamicFriction=friction.dynamic if friction else 0.0,
-            frictionProportionalZone=regular,
         )
     )

@@ -190,7 +190,7 @@ def _level_row(case: str, level: dict[str, Any]) -> list[str]:
         return [name, "", "", "", "", ""]
     mark = "" if level["reached"] else "> "  # their finest run does not get there
     seconds, step = f"{mark}{level['exudyn_s']:.3g}", f"{level['step']:g}"
-    return [name, seconds, step, f"{level['ours_s']:.3g}", f"{level['rtol']:g}", f"{mark}{level['ratio']:.2g}"]
+    return [name, seconds, step, f"{level['ours_s']:.3g}", f"{level['rtol']:g}", f"{mark}{level['ratio']:.3g}"]
 
 
 def _run_row(run: dict[str, Any]) -> list[str]:
@@ -199,5 +199,5 @@ def _run_row(run: dict[str, Any]) -> list[str]:
         return [name, "failed", "", "", "", "", ""]
     errors = [short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
     equal = run["ours"].get("equal")
-    matched = [f"{equal['rtol']:g}", f"{equal['s']:.3g}", f"{equal['ratio']:.2g}"] if equal else ["", "", ""]
+    matched = [f"{equal['rtol']:g}", f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""]
     return [name, *errors, *matched]

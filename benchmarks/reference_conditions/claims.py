@@ -120,10 +120,12 @@ def _insensitive(rows: Rows) -> tuple[bool, str]:
 
 def _apart(rows: Rows) -> tuple[bool, str]:
     free, fixed = rows.free("clearance"), rows.fixed("clearance")
-    size = {n: abs(free[n] - fixed[n]) / max(free[f"{n}_std"], fixed[f"{n}_std"]) for n in ("peak_force", "acceleration")}
+    size = {
+        n: abs(free[n] - fixed[n]) / max(free[f"{n}_std"], fixed[f"{n}_std"]) for n in ("peak_force", "acceleration")
+    }
     return size["peak_force"] > DIFFER, (
-        f"peak force {_mean(free, 'peak_force')} N and {_mean(fixed, 'peak_force')} N, {size['peak_force']:.1f} standard "
-        f"deviations; acceleration {size['acceleration']:.1f}"
+        f"peak force {_mean(free, 'peak_force')} N and {_mean(fixed, 'peak_force')} N, "
+        f"{size['peak_force']:.1f} standard deviations; acceleration {size['acceleration']:.1f}"
     )
 
 

@@ -82,7 +82,9 @@ def _far(rows: list[Row]) -> Any:
         line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
         style = {"color": COLORS[condition], "marker": MARKERS[condition], "label": condition}
         axes[0].semilogy([r["count"] for r in line], [max(r["velocity_error"], FLOOR) for r in line], **style)
-        at = [min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES]
+        at = [
+            min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES
+        ]
         axes[1].semilogy(list(PLACES), [max(r["velocity_error"], FLOOR) for r in at], **style)
     axes[0].set_xlabel("coordinates (joint at 0 mm)")
     axes[1].set_xlabel("place of the prismatic joint (mm), 13 or 14 coordinates")
@@ -99,7 +101,9 @@ def _clearance(rows: list[Row]) -> Any:
     first = next(iter(PLACES))
     for k, condition in enumerate(CONDITIONS):
         of = [r for r in rows if r["condition"] == condition]
-        at = [min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES]
+        at = [
+            min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES
+        ]
         _bars(axes[0], [p + 2.5 * (k - 2) for p in PLACES], at, condition)
         line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
         if len(line) > 1:
@@ -112,7 +116,8 @@ def _clearance(rows: list[Row]) -> Any:
     axes[1].set_xlabel("coordinates (joint at 0 mm)")
     axes[0].set_ylabel("peak contact force (N)")
     for ax in axes:
-        ax.legend(fontsize=8)
+        if ax.get_legend_handles_labels()[0]:
+            ax.legend(fontsize=8)
         _plain(ax)
     return figure
 

@@ -42,7 +42,8 @@ def identity(case: Case) -> Row:
 def static_rows() -> Iterator[Row]:
     """Shares of the static compliance, over all whole counts; and the full rod's own."""
     for place in PLACES:
-        yield {"place_mm": place, "condition": FULL, "count": 0} | statics.full(place)
+        highest = float(statics.solved(Case(place, FULL))["frequency"].max())
+        yield {"place_mm": place, "condition": FULL, "count": 0, "highest": highest} | statics.full(place)
         for condition in CONDITIONS:
             for count in statics.whole_counts(place, condition, max(design.COUNTS)):
                 shares = statics.shares(Case(place, condition, count))
@@ -93,7 +94,9 @@ def clearance_rows(place: Workplace, members: int) -> Iterator[Row]:
             effects = [max_deviation(run, ideal, BODY)]
             acceleration = [float(np.abs(run["acceleration"].values[:, 0, 2]).max())]
         else:
-            spread = {"peak_force": run["peak_force"].values[:, 0], "impacts": run["impact_count"].values[:, 0]}
+            spread = {
+                n: run[v].values[:, 0].tolist() for n, v in (("peak_force", "peak_force"), ("impacts", "impact_count"))
+            }
             effects = ensemble_deviations(run, ideal, BODY)
             acceleration = np.abs(run["acceleration"].values[:, :, 0, 2]).max(axis=1).tolist()
         spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}

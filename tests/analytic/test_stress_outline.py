@@ -11,7 +11,7 @@ import xarray as xr
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.record.stress import peak_stresses
+from pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
 from pipeline.structure.fe import section as sections
 from pipeline.structure.modes import bundle, solve
 from pipeline.structure.stress.beam import recover
@@ -148,6 +148,38 @@ def test_slices_add_up_to_the_rod() -> None:
     assert beyond[0].all()
     assert not beyond[-1].any()
     assert found["frame_beyond"].values[[0, -1]].tolist() == [[0, 1], [0, 1]]
+
+
+def at_rest(a: np.ndarray, modes: int, **given: np.ndarray) -> Motion:
+    """One instant of a body that does not deform."""
+    still, flat = np.zeros((1, 3)), np.zeros((1, modes))
+    return Motion(a[None], given.get("omega", still), given.get("alpha", still), flat, flat, flat)
+
+
+def test_a_lumped_mass_shows_as_a_jump() -> None:
+    """1 kg in the middle, 10 mm beside the axis, pushed along the rod: N jumps by m a, Mz by m a times the arm."""
+    lump = {"x": 0.12, "mass": 1.0, "com": [0.0, 0.01, 0.0], "inertia": [1e-4, 1e-4, 1e-4]}
+    found = reduced(masses={"ball": lump})
+    none = np.zeros((1, 2, 3))
+    forces = section_forces(found, at_rest(np.array([5.0, 0.0, 0.0]), 6), none, none)[0]
+    before, after = forces[11], forces[12]
+    assert found["section_place"].values[[11, 12]] == pytest.approx([0.12, 0.12])
+    assert before[0] - after[0] == pytest.approx(-5.0, rel=1e-12)
+    assert before[5] - after[5] == pytest.approx(5.0 * 0.01, rel=1e-12)
+
+
+def test_a_turning_body_is_balanced_from_either_side() -> None:
+    """Forces and moments at the first section are those that give the whole body its rates of momentum: m a_C and the
+    inertia about the section, J alpha + omega x J omega, from the bundle's own integrals."""
+    found = reduced()
+    omega, alpha = np.array([3.0, -2.0, 5.0]), np.array([40.0, 70.0, -30.0])
+    none = np.zeros((1, 2, 3))
+    motion = at_rest(np.zeros(3), 6, omega=omega[None], alpha=alpha[None])
+    force, moment = np.split(section_forces(found, motion, none, none)[0, 0], 2)
+    first, second = found["first_moment"].values, found["second_moment"].values
+    J = np.trace(second) * np.eye(3) - second
+    assert force == pytest.approx(-np.cross(alpha, first) - np.cross(omega, np.cross(omega, first)), abs=1e-12)
+    assert moment == pytest.approx(-J @ alpha - np.cross(omega, J @ omega), abs=1e-13)
 
 
 # Scenes -------------------------------------------------------------------------------------------------------------

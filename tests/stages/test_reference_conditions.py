@@ -1,0 +1,98 @@
+"""The verdict page says what its numbers say: every statement turns when its numbers do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.reference_conditions import claims, design, page
+from benchmarks.reference_conditions.design import CONDITIONS, FULL, PLACES, RIGID, Case
+
+Row = dict[str, Any]
+EFFECT = {"angle": 3e-6, "displacement": 3e-7, "velocity": 7e-4}
+
+
+def far_row(place: int, condition: str, count: int) -> Row:
+    row = {"place_mm": place, "condition": condition, "count": count, "finer": 1, "force": 10.0, "evaluations": 9000}
+    return row | EFFECT | {"velocity_error": 0.01, "force_error": 0.02, "seconds": 1.2}
+
+
+def clearance_row(place: int, condition: str, count: int, peak: float) -> Row:
+    mean = {"angle": 1.6e-3, "displacement": 2e-4, "velocity": 15e-3, "acceleration": 800.0, "impacts": 25.0}
+    row = {"place_mm": place, "condition": condition, "count": count, "finer": 1, "members": 16, "evaluations": 90000}
+    row |= mean | {"peak_force": peak} | {f"{name}_std": 0.01 * value for name, value in mean.items()}
+    return row | {"peak_force_std": 20.0, "seconds": 2.0}
+
+
+def rows() -> dict[str, list[Row]]:
+    """Numbers under which every statement holds: fixed-fixed right, free-free off with clearance only."""
+    far, clearance = [], []
+    for place in PLACES:
+        far += [far_row(place, condition, 13) for condition in CONDITIONS] + [far_row(place, FULL, 0)]
+        far.append(far_row(place, RIGID, 0) | dict.fromkeys(EFFECT, 0.0) | {"seconds": 1.0})
+        peaks = dict.fromkeys(CONDITIONS, 1500.0) | {"free-free": 1700.0}
+        clearance += [clearance_row(place, condition, 13, peak) for condition, peak in peaks.items()]
+        clearance.append(clearance_row(place, RIGID, 0, 2600.0) | {"seconds": 1.0, "members": 1})
+        for name in EFFECT:
+            clearance[-1][name] *= 0.99
+    return {"far": far, "clearance": clearance}
+
+
+def outcome(groups: dict[str, list[Row]], words: str) -> str:
+    return next(claims.sentence(at) for claim, at in claims.verdicts(groups) if words in claim.paper)
+
+
+def changed(group: str, place: int, condition: str, **values: float) -> dict[str, list[Row]]:
+    groups = rows()
+    groups[group] = [
+        row | values if (row["place_mm"], row["condition"]) == (place, condition) else row for row in groups[group]
+    ]
+    return groups
+
+
+def test_all_statements_can_hold() -> None:
+    assert {claims.sentence(at) for _, at in claims.verdicts(rows())} == {"**Holds** at all three places."}
+
+
+@pytest.mark.parametrize(
+    "words, group, condition, values",
+    [
+        ("give consistent answers", "far", "fixed-fixed", {"displacement": 0.8 * EFFECT["displacement"]}),
+        ("free-free modes are suitable", "far", "free-free", {"force_error": 0.11}),
+        ("so are fixed-fixed modes", "far", "fixed-fixed", {"velocity_error": 1.0}),
+        ("hardly moves the platform", "far", FULL, {"displacement": 3e-6}),
+        ("do not depend on the mode set", "clearance", "free-free", {"velocity": 17e-3}),
+        ("do depend on it", "clearance", "free-free", {"peak_force": 1539.0}),
+        ("to impose is fixed-fixed", "clearance", "fixed-fixed", {"peak_force": 1900.0}),
+        ("softens the impacts", "clearance", "craig-bampton", {"peak_force": 2500.0}),
+        ("together deviate more", "clearance", "craig-bampton", {"velocity": 14e-3}),
+        ("costs hardly more", "far", "free-free", {"seconds": 1.6}),
+        ("doubles the cost", "clearance", "free-free", {"seconds": 4.0}),
+    ],
+)
+def test_each_statement_turns_with_its_numbers(
+    words: str, group: str, condition: str, values: dict[str, float]
+) -> None:
+    at_60 = changed(group, 60, condition, **values)
+    assert outcome(at_60, words) == "**Holds at 0 mm and 120 mm, not at 60 mm.**"
+
+
+def test_the_page_has_a_section_per_group(tmp_path: Path) -> None:
+    written = page.write(rows(), tmp_path).read_text()
+    assert "## What holds of the paper's statements" in written
+    assert "## Clearance at A1" in written
+    assert "## Static compliance" not in written
+    assert (tmp_path / "reference-conditions" / "clearance.png").is_file()
+
+
+def test_cases_take_the_scene_of_their_place() -> None:
+    for place, frame in PLACES.items():
+        scene = design.scene(Case(place, "craig-bampton", 13, clearance=True, members=3))
+        assert scene.joint["P1"].between[1] == f"rod1.{frame}"
+        assert scene.contacts().keys() == {"A1"}
+        assert scene.ensemble is not None
+        assert scene.ensemble.members == 3
+        assert scene.flexible()["rod1"].modes.interfaces == (frame, "top")
+    assert design.scene(Case(0, RIGID)).flexible() == {}
