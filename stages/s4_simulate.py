@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from pipeline.core.workflow.execute import Progress
 
 DYNAMICS = "pipeline.dynamics"
+#: methods that may be given up for an implicit one on the way (pipeline.dynamics.run)
+EXPLICIT, IMPLICIT = ("dop853", "dopri5"), "radau"
 #: what the generated kernel entry composes (pipeline.dynamics.assembly.fuse): for every scene, and
 #: for scenes with flexible bodies and with contacts
 KERNELS = (
@@ -66,6 +68,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     joints = f"{DYNAMICS}.joints"
     found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
+    if scene.solver.integrator in EXPLICIT and scene.solver.step is None:
+        found.add(module(f"{DYNAMICS}.integrate", IMPLICIT, where="[solver]"))
     found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
     laws = {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
     kernels: tuple[str, ...] = KERNELS + (ADAPTIVE_KERNELS if scene.solver.step is None else FIXED_KERNELS)
@@ -101,10 +105,29 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """One run (schema RUN); inputs are ``bundle/<body>``."""
+    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
     from pipeline import dynamics
 
-    return {"nc": dynamics.simulate(rebuild(params), bundles(inputs), progress)}
+    scene, reduced = rebuild(params), bundles(inputs)
+    lacks = missing_compliance(scene, reduced)
+    for text in lacks:
+        progress(None, text)
+    found = dynamics.simulate(scene, reduced, progress)
+    told = "\n".join(filter(None, [str(found.attrs.get("warnings", "")), *lacks]))
+    return {"nc": found.assign_attrs(warnings=told) if told else found}
+
+
+def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
+    """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
+    from pipeline.core.artifacts import deficits
+
+    found = []
+    for body, bundle in reduced.items():
+        ends = (end.partition(".") for joint in scene.joint.values() for end in joint.between)
+        used = [frame for owner, _, frame in ends if owner == body]
+        if used and "compliance_share" in bundle:
+            found += deficits.warnings(bundle, used, body)
+    return found
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import SolverError
+from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.integrate.beside import beside
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
-from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics.integrate.trajectory import StiffError, Trajectory
 from pipeline.dynamics.integrate.trajectory import integrate as step
 from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.tables import SINGULAR
 
 if TYPE_CHECKING:
     from pipeline.dynamics.sensitivity import Twin
+
+#: what takes over where an explicit integrator would crawl
+IMPLICIT = "radau"
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,7 @@ class Run:
     scene: as the user gave it; the engine may hold another, made for it.
     start_residual: loops' residual as the scene gives its start [m].
     twin: the run's twin, of scenes with contacts.
+    switched: why an implicit integrator took the place of the scene's; empty when none did.
     """
 
     scene: Scene
@@ -40,6 +45,7 @@ class Run:
     observed: dict[str, np.ndarray]
     start_residual: float
     twin: Twin | None
+    switched: str = ""
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
@@ -54,6 +60,18 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
         from pipeline.dynamics.inverse import actuated
 
         driven, given = actuated(scene, bundles, progress)
+    try:
+        return _run(scene, driven, given, bundles, progress)
+    except StiffError as stiff:
+        progress(None, f"{stiff}; going on with {IMPLICIT}")
+        implicit = edited(driven, {"solver.integrator": IMPLICIT})
+        return replace(_run(scene, implicit, given, bundles, progress), switched=str(stiff))
+
+
+def _run(
+    scene: Scene, driven: Scene, given: dict[str, Pieces], bundles: Mapping[str, xr.Dataset], progress: Progress
+) -> Run:
+    """One run of `driven`, which stands for the user's scene."""
     engine = prepare(tabulate(build(driven, bundles), given), progress)
     start, residual = consistent_start(engine)
     trajectory = step(engine, start, progress)

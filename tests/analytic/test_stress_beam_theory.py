@@ -135,8 +135,11 @@ def falling() -> dict[str, Any]:
 
 
 def chimney(x: np.ndarray) -> np.ndarray:
-    """My of a rigid rod that falls about its end: -(m g / 4) x (1 - x/L)^2, with alpha = 3 g / 2 L."""
-    return -0.25 * WEIGHT * ROD.length * x * (1.0 - x / ROD.length) ** 2
+    """My of a rigid rod that falls about its end; thin, it is -(m g / 4) x (1 - x/L)^2, here with rotary inertia."""
+    L, line, turn = ROD.length, ROD.density * AREA, ROD.density * SECOND
+    alpha = 0.5 * WEIGHT * L**2 / (line * L**3 / 3.0 + turn * L)
+    swing = line * ((L**3 - x**3) / 3.0 - 0.5 * x * (L**2 - x**2))
+    return 0.5 * WEIGHT * rest(x) ** 2 - alpha * (swing + turn * rest(x))
 
 
 def test_a_rod_let_go_bends_as_a_falling_chimney() -> None:

@@ -20,6 +20,12 @@ EVENT_ROWS = 4096
 STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
+#: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
+TRIAL, HOPELESS = 400_000, 10_000_000
+
+
+class StiffError(SolverError):
+    """An explicit method crawls along at the limit of its stability; an implicit one may go on in long steps."""
 
 
 @dataclass(frozen=True)
@@ -158,6 +164,17 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
                 raise SolverError(_refusal(engine, run))
         elif status != state.PAUSED:
             raise SolverError(_refusal(engine, run))
+        elif _crawls(engine, run):
+            raise StiffError(f"at t = {t:.6g} s: {_why_so_many(n, control)}")
+
+
+def _crawls(engine: Engine, run: _Run) -> bool:
+    """Whether stability limits the steps so much that the run would take far too long."""
+    n, control = run.n, engine.view("CONTROL", state.N_CONTROLS)
+    if engine.built.method.stability is None or control[state.FIXED] or n[state.EVALUATIONS] < TRIAL:
+        return False
+    done = max((control[state.TIME] - engine.start) / control[state.SPAN], 1e-12)
+    return bool(n[state.STIFF_STEPS] > STIFF_SHARE * n[state.STEPS] and n[state.EVALUATIONS] / done > HOPELESS)
 
 
 def _refusal(engine: Engine, run: _Run) -> str:

@@ -133,9 +133,12 @@ def _report(run: Run) -> dict[str, float | int]:
 
 
 def _counts(run: Run) -> dict[str, str | int]:
-    """Redundancy, in words for the attributes."""
+    """Redundancy, and the integrator that made the run, in words for the attributes."""
     redundant = run.engine.mobility.redundant
     found: dict[str, str | int] = {"redundant_closure_rows": redundant}
+    found["method"] = run.engine.built.system.scene.solver.integrator
+    if run.switched:
+        found["switched"] = run.switched
     if redundant:
         found["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
     return found

@@ -27,14 +27,15 @@ class Kind:
     write_vtu: the mesh dataset to a file that ParaView opens.
     assemble: the mesh dataset to matrices.
     words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
-    exact: closed-form frequencies [Hz] beside those of a reference condition, by variable, from the modes' families.
+    exact: closed-form frequencies [Hz] beside those of a reference condition, by variable, from the modes'
+        families and the interfaces' names.
     """
 
     build: Callable[[Mapping[str, Any], Path], xr.Dataset]
     write_vtu: Callable[[xr.Dataset, Path], None]
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
-    exact: Callable[[xr.Dataset, str, list[str]], dict[str, np.ndarray]]
+    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]]
 
 
 def name_of(recipe: Mapping[str, Any]) -> str:

@@ -29,7 +29,7 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     return ["elastic"] * vectors.shape[1]
 
 
-def _exact(mesh: xr.Dataset, reference: str, families: list[str]) -> dict[str, np.ndarray]:
+def _exact(mesh: xr.Dataset, reference: str, families: list[str], interfaces: tuple[str, ...]) -> dict[str, np.ndarray]:
     return {}
 
 

@@ -52,7 +52,7 @@ def _word(along: float, out: float, turn: float) -> str:
     return "axial" if along > out + turn else "bending"
 
 
-def _exact(mesh: xr.Dataset, reference: str, families: list[str]) -> dict[str, np.ndarray]:
+def _exact(mesh: xr.Dataset, reference: str, families: list[str], interfaces: tuple[str, ...]) -> dict[str, np.ndarray]:
     return {}
 
 

@@ -62,7 +62,10 @@ def solve(
     vectors = orient.orient(model, values, vectors)
     families = orient.family(model, vectors)
     vectors = orient.signed(model, vectors, families)
-    data = _variables(model, values, vectors) | _words(kind, mesh, model, reference, families, vectors)
+    data = _variables(model, values, vectors) | _words(kind, model, families, vectors)
+    data |= {
+        theory: (("mode",), hertz) for theory, hertz in kind.exact(mesh, reference, families, tuple(names)).items()
+    }
     if shapes.rigid_frequency.size:
         data["rigid_frequency"] = (("rigid_mode",), shapes.rigid_frequency)
     lacks, attributes = deficits.measure(flexibility(), vectors, progress)
@@ -93,10 +96,5 @@ def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[st
     }
 
 
-def _words(
-    kind: Kind, mesh: xr.Dataset, model: Model, reference: str, families: list[str], vectors: np.ndarray
-) -> dict[str, Any]:
-    data: dict[str, Any] = {"kind": (("mode",), np.array(kind.words(model, families, vectors)))}
-    for theory, hertz in kind.exact(mesh, reference, families).items():
-        data[theory] = (("mode",), hertz)
-    return data
+def _words(kind: Kind, model: Model, families: list[str], vectors: np.ndarray) -> dict[str, Any]:
+    return {"kind": (("mode",), np.array(kind.words(model, families, vectors)))}
