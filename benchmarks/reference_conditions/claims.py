@@ -169,23 +169,23 @@ def _mean(row: Row, name: str) -> str:
 CLAIMS = (
     Claim(
         "With ideal joints, free-free and fixed-fixed modes give consistent answers (Table 7).",
-        f"The effects of the rod's flexibility differ by less than {AGREE:.0%} of that of the full rod.",
+        f"The effects of the rod's flexibility differ by less than {100.0 * AGREE:g} % of that of the full rod.",
         _alike,
     ),
     Claim(
         "With ideal joints, free-free modes are suitable.",
-        f"Velocity of the platform and force at A1 are within {AGREE:.0%} of the full rod's effect.",
+        f"Velocity of the platform and force at A1 are within {100.0 * AGREE:g} % of the full rod's effect.",
         _suited("free"),
     ),
     Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _suited("fixed")),
     Claim(
         "Beside clearance, the rod's flexibility hardly moves the platform (Tables 7 and 8).",
-        f"Angle and displacement change by less than {SMALL:.0%} of what clearance does to them.",
+        f"Angle and displacement change by less than {100.0 * SMALL:g} % of what clearance does to them.",
         _dominates,
     ),
     Claim(
         "With clearance, angle, displacement and velocity do not depend on the mode set (Table 9).",
-        f"Means of their deviations from ideal with free-free and fixed-fixed modes differ by less than {AGREE:.0%}.",
+        f"Mean deviations from ideal with free-free and fixed-fixed modes differ by less than {100.0 * AGREE:g} %.",
         _insensitive,
     ),
     Claim(
@@ -200,7 +200,7 @@ CLAIMS = (
     ),
     Claim(
         "The flexible rod softens the impacts.",
-        f"The peak force of the most complete set is below that of the rigid rod by more than {AGREE:.0%}.",
+        f"The peak force of the most complete set is below that of the rigid rod by more than {100.0 * AGREE:g} %.",
         _softens,
     ),
     Claim(

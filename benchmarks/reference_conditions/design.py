@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -85,11 +85,17 @@ def task(case: Case) -> Task:
         scene=given.name,
         run=f"{module}:{'members' if case.clearance and case.condition != RIGID else 'single'}",
         params=s4_simulate.params(given, ensemble=case.clearance),
-        inputs={f"bundle/{body}": made for body, made in graph.bundle.items()},
-        modules=(f"{module}", *s4_simulate.modules(given)),
+        inputs={f"bundle/{body}": _told_apart(made, case) for body, made in graph.bundle.items()},
+        modules=(module, *s4_simulate.modules(given)),
         folder="",
         part=f"{case.place} mm, {case.label}" + (", clearance" if case.clearance else ""),
     )
+
+
+def _told_apart(made: Task, case: Case) -> Task:
+    """The task and its inputs under the case's name: progress is told by name, and many cases share a scene."""
+    above = {name: _told_apart(task, case) for name, task in made.inputs.items()}
+    return replace(made, scene=f"{made.scene}, {case.label}, elements x {case.finer}", inputs=above)
 
 
 @cache

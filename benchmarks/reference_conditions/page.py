@@ -91,7 +91,8 @@ def _statics(rows: dict[str, list[Row]], drawn: list[str]) -> str:
         "Motion of the upper end under a force or torque there, the place of the prismatic joint held: axial, bending "
         "and torsion, per cent of the full rod (last line: m/N, m/N, rad/(N m)).\n\n"
         + table(head, [*body, full])
-        + f"\n\nComplete (at least {COMPLETE:.0%} of each) with {COUNT} coordinates: {', '.join(complete) or 'none'}. "
+        + f"\n\nComplete (at least {100.0 * COMPLETE:g} % of each) with {COUNT} coordinates: "
+        f"{', '.join(complete) or 'none'}. "
         f"Below half with {max(COUNTS)} coordinates at some place: {', '.join(never) or 'none'}.\n"
         + _image("compliance.png", "Share of the compliance over the number of coordinates", drawn)
     )
@@ -132,7 +133,7 @@ def _frequencies(rows: dict[str, list[Row]], drawn: list[str]) -> str:
         "## Frequencies of the assembled mechanism\n\n"
         "The lowest vibrations [Hz] with ideal joints, drives held where they are at that time.\n\n"
         + table(head, filled)
-        + f"\n\nThe first three within {RESOLVED:.0%} of the full rod's at every place and time: "
+        + f"\n\nThe first three within {100.0 * RESOLVED:g} % of the full rod's at every place and time: "
         f"{', '.join(right) or 'none'}.\n"
         + _image("frequencies.png", "Errors of the mechanism's frequencies at the start", drawn)
     )

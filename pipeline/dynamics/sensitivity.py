@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.core.errors import SolverError
 from pipeline.dynamics.integrate.engine import Engine, observe
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
 from pipeline.dynamics.perturbation import offset_jacobian, perturbed
@@ -26,7 +27,7 @@ SMALLEST = 1e-14
 
 @dataclass(frozen=True)
 class Twin:
-    """Distance of the velocities of two runs. perturbation [m]; time [s], separation [m/s], shape (n,); horizon [s]."""
+    """Distance of the velocities of two runs. perturbation [m]; time [s], separation [m/s], shape (n,); horizon [s]: the start where the twin fails."""
 
     perturbation: float
     time: np.ndarray
@@ -40,7 +41,11 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     size = max(engine.rtol * engine.built.system.length, SMALLEST)
     direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
     moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
-    other = integrate(engine, moved, _quiet)
+    try:
+        other = integrate(engine, moved, _quiet)
+    except SolverError:
+        # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
+        return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
     time = output_times(engine.breaks, engine.built.system.scene.output.interval)[::EVERY]
     one, two = (_velocities(engine, t, time) for t in (trajectory, other))
     separation = np.linalg.norm(one - two, axis=2).max(axis=1)
