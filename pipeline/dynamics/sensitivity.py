@@ -27,7 +27,10 @@ SMALLEST = 1e-14
 
 @dataclass(frozen=True)
 class Twin:
-    """Distance of the velocities of two runs. perturbation [m]; time [s], separation [m/s], shape (n,); horizon [s]: the start where the twin fails."""
+    """Distance of the velocities of two runs.
+
+    perturbation [m]; time [s], separation [m/s], shape (n,); horizon [s], the start where the twin fails.
+    """
 
     perturbation: float
     time: np.ndarray
