@@ -27,6 +27,8 @@ CONDITIONS = ("free-free", "fixed-fixed", "pinned-pinned", "cantilever", "craig-
 COUNT, COUNTS = 13, (7, 13, 25, 49)
 #: of these, in the scene with clearance, where each costs an ensemble
 CLEARANCE_COUNTS = (7, 13, 25)
+#: there, the most complete sets; the last is the reference, and by the one before it is told how far it is settled
+MOST_COMPLETE = (25, 37)
 #: factors of the recipe's elements
 FINER = (1, 2, 4)
 #: times at which the assembled mechanism's frequencies are taken: the start and the full stroke [s]
@@ -131,7 +133,8 @@ def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Cas
     found = []
     for place in places:
         found.append(Case(place, RIGID, clearance=True))
-        sets = [(c, COUNT) for c in CONDITIONS] + [("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 25)]
+        sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in ("free-free", "fixed-fixed")]
+        sets += [("craig-bampton", n) for n in MOST_COMPLETE]
         found += [Case(place, c, whole(place, c, n), clearance=True, members=members) for c, n in sets]
     first = places[0]
     for condition in ("free-free", "craig-bampton"):

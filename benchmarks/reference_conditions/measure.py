@@ -74,7 +74,7 @@ def far_rows(place: Workplace) -> Iterator[Row]:
     for case, run in runs.items():
         rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
         effect = max_deviation(run, rigid, BODY)
-        row = identity(case) | _deviation(effect) | {name: run.attrs[name] for name in ("evaluations", "seconds")}
+        row = identity(case) | _deviation(effect) | _costs(run)
         yield row | {
             "force": _largest(run, rigid),
             "force_error": _largest(run, full) / _largest(full, rigid),
@@ -88,9 +88,9 @@ def clearance_rows(place: Workplace, members: int) -> Iterator[Row]:
     rigid = bring([Case(where, RIGID) for where in PLACES], place)
     for case, run in runs.items():
         ideal = rigid[Case(case.place, RIGID)]
-        costs = {name: run.attrs[name] for name in ("evaluations", "seconds")}
+        costs = _costs(run)
         if case.condition == RIGID:
-            spread = {"peak_force": [run.attrs["peak_force"]], "impacts": [run.attrs["impacts"]]}
+            spread = {"peak_force": [float(run.attrs["peak_force"])], "impacts": [int(run.attrs["impacts"])]}
             effects = [max_deviation(run, ideal, BODY)]
             acceleration = [float(np.abs(run["acceleration"].values[:, 0, 2]).max())]
         else:
@@ -101,6 +101,11 @@ def clearance_rows(place: Workplace, members: int) -> Iterator[Row]:
             acceleration = np.abs(run["acceleration"].values[:, :, 0, 2]).max(axis=1).tolist()
         spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}
         yield identity(case) | costs | _statistics(spread | {"acceleration": acceleration}) | {"members": len(effects)}
+
+
+def _costs(run: xr.Dataset) -> Row:
+    """Evaluations and processor time [s] of one run."""
+    return {"evaluations": int(run.attrs["evaluations"]), "seconds": float(run.attrs["seconds"])}
 
 
 def _deviation(effect: Deviation) -> Row:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
-from benchmarks.reference_conditions import claims, figures
-from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, PLACES, RIGID, TIMES
+from benchmarks.reference_conditions import claims, figures, responses
+from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, PLACES, TIMES
+from benchmarks.reference_conditions.responses import at, full_row, image
 from benchmarks.tables import table
 
 Row = dict[str, Any]
@@ -31,14 +33,14 @@ def write(rows: dict[str, list[Row]], docs: Path) -> Path:
     folder = docs / "reference-conditions"
     folder.mkdir(parents=True, exist_ok=True)
     drawn = figures.write(rows, folder)
-    parts = [HEAD]
+    parts = [HEAD, _short(rows)]
     if "far" in rows and "clearance" in rows:
         parts.append(_verdicts(rows))
     sections = {
         "statics": _statics,
         "frequencies": _frequencies,
-        "far": _far,
-        "clearance": _clearance,
+        "far": responses.far,
+        "clearance": responses.clearance,
         "mesh": _mesh,
     }
     for name, section in sections.items():
@@ -49,6 +51,57 @@ def write(rows: dict[str, list[Row]], docs: Path) -> Path:
     return page
 
 
+def _short(rows: dict[str, list[Row]]) -> str:
+    """Which conditions are right in each respect, with the least whole count from COUNT at every place."""
+    lines = ["## In short\n", f"With {COUNT} coordinates (or the next whole count), at all three places:\n"]
+    if "statics" in rows:
+        good = [c for c in CONDITIONS if _least(rows["statics"], c, COUNT) >= COMPLETE]
+        lines.append(f"- static compliance complete to {100.0 * COMPLETE:g} %: {_or_none(good)};")
+    if "frequencies" in rows:
+        good = [c for c in CONDITIONS if _frequency_error(rows["frequencies"], c) < RESOLVED]
+        lines.append(f"- first three frequencies of the mechanism within {100.0 * RESOLVED:g} %: {_or_none(good)};")
+    if "far" in rows:
+        good = [c for c in CONDITIONS if all(_far_error(rows["far"], place, c) < claims.AGREE for place in PLACES)]
+        lines.append(f"- effects of the rod with ideal joints within {100.0 * claims.AGREE:g} %: {_or_none(good)};")
+    if "clearance" in rows:
+        good = [c for c in CONDITIONS if all(_peak_right(rows["clearance"], place, c) for place in PLACES)]
+        lines.append(
+            f"- peak contact force within {100.0 * claims.AGREE:g} % of the most complete set's, beyond what that is "
+            f"unsettled by: {_or_none(good)}."
+        )
+        lines += [f"  - at {place} mm: {_peaks(rows['clearance'], place)}." for place in PLACES]
+    return "\n".join(lines) + "\n"
+
+
+def _or_none(names: list[str]) -> str:
+    return ", ".join(names) or "none"
+
+
+def _far_error(rows: list[Row], place: int, condition: str) -> float:
+    return max(claims.off(at(rows, place, condition, COUNT), full_row(rows, place)).values())
+
+
+def _peak_error(rows: list[Row], place: int, condition: str) -> float:
+    best = claims.Rows([], [r for r in rows if r["place_mm"] == place]).best()["peak_force"]
+    return float(abs(at(rows, place, condition, COUNT)["peak_force"] / best - 1.0))
+
+
+def _peak_right(rows: list[Row], place: int, condition: str) -> bool:
+    return _peak_error(rows, place, condition) - _unsettled(rows, place) < claims.AGREE
+
+
+def _unsettled(rows: list[Row], place: int) -> float:
+    here = claims.Rows([], [r for r in rows if r["place_mm"] == place])
+    share = claims.unsettled(here) / here.best()["peak_force"]
+    return 0.0 if math.isnan(share) else share
+
+
+def _peaks(rows: list[Row], place: int) -> str:
+    errors = ", ".join(f"{c} {100.0 * _peak_error(rows, place, c):.1f} %" for c in CONDITIONS)
+    settled = f"{100.0 * _unsettled(rows, place):.1f} %"
+    return f"off by {errors}, the reference itself being settled to {settled}"
+
+
 def _verdicts(rows: dict[str, list[Row]]) -> str:
     lines = ["## What holds of the paper's statements\n"]
     for claim, outcomes in claims.verdicts(rows):
@@ -57,16 +110,6 @@ def _verdicts(rows: dict[str, list[Row]]) -> str:
         lines += [f"- {place} mm: {numbers}" for place, (_, numbers) in outcomes.items()]
         lines.append("")
     return "\n".join(lines)
-
-
-def _image(name: str, words: str, drawn: list[str]) -> str:
-    return f"\n![{words}](reference-conditions/{name})\n" if name in drawn else ""
-
-
-def _at(rows: list[Row], place: int, condition: str, count: int) -> Row:
-    """The row of a condition with the least count that is not below `count`."""
-    of = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition) and r.get("finer", 1) == 1]
-    return min((r for r in of if r["count"] >= count), key=lambda r: r["count"])
 
 
 def _statics(rows: dict[str, list[Row]], drawn: list[str]) -> str:
@@ -80,7 +123,7 @@ def _statics(rows: dict[str, list[Row]], drawn: list[str]) -> str:
             cells += [" ".join(_share(r[d]) for d in ("z", "x", "rz")) for r in at]
             body.append(cells)
     full = ["full", ""] + [
-        f"{_row(found, place)['z']:.3g}, {_row(found, place)['x']:.3g}, {_row(found, place)['rz']:.3g}"
+        f"{full_row(found, place)['z']:.3g}, {full_row(found, place)['x']:.3g}, {full_row(found, place)['rz']:.3g}"
         for place in PLACES
     ]
     head = ("condition", "coordinates", *(f"{place} mm" for place in PLACES))
@@ -92,19 +135,15 @@ def _statics(rows: dict[str, list[Row]], drawn: list[str]) -> str:
         "and torsion, per cent of the full rod (last line: m/N, m/N, rad/(N m)).\n\n"
         + table(head, [*body, full])
         + f"\n\nComplete (at least {100.0 * COMPLETE:g} % of each) with {COUNT} coordinates: "
-        f"{', '.join(complete) or 'none'}. "
-        f"Below half with {max(COUNTS)} coordinates at some place: {', '.join(never) or 'none'}.\n"
-        + _image("compliance.png", "Share of the compliance over the number of coordinates", drawn)
+        f"{_or_none(complete)}. "
+        f"Below half with {max(COUNTS)} coordinates at some place: {_or_none(never)}.\n"
+        + image("compliance.png", "Share of the compliance over the number of coordinates", drawn)
     )
 
 
 def _nearest(rows: list[Row], place: int, condition: str, count: int) -> Row:
     of = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition)]
     return max((r for r in of if r["count"] <= count + 1), key=lambda r: (r["count"] <= count, r["count"]))
-
-
-def _row(rows: list[Row], place: int) -> Row:
-    return next(r for r in rows if r["place_mm"] == place and r["condition"] == FULL)
 
 
 def _least(rows: list[Row], condition: str, count: int) -> float:
@@ -134,8 +173,7 @@ def _frequencies(rows: dict[str, list[Row]], drawn: list[str]) -> str:
         "The lowest vibrations [Hz] with ideal joints, drives held where they are at that time.\n\n"
         + table(head, filled)
         + f"\n\nThe first three within {100.0 * RESOLVED:g} % of the full rod's at every place and time: "
-        f"{', '.join(right) or 'none'}.\n"
-        + _image("frequencies.png", "Errors of the mechanism's frequencies at the start", drawn)
+        f"{_or_none(right)}.\n" + image("frequencies.png", "Errors of the mechanism's frequencies at the start", drawn)
     )
 
 
@@ -147,103 +185,6 @@ def _frequency_error(rows: list[Row], condition: str) -> float:
         off = [abs(a / b - 1.0) for a, b in zip(row["frequency"], full, strict=False)]
         worst = max([worst, *off] if len(off) == len(full) else [1.0])
     return worst
-
-
-def _far(rows: dict[str, list[Row]], drawn: list[str]) -> str:
-    body = [
-        [
-            f"{r['place_mm']} mm",
-            _label(r),
-            f"{r['angle']:.2e}",
-            f"{1e3 * r['displacement']:.2e}",
-            f"{1e3 * r['velocity']:.3f}",
-            f"{r['force']:.2f}",
-            f"{100.0 * r['velocity_error']:.2g} %",
-            f"{100.0 * r['force_error']:.2g} %",
-            str(r["evaluations"]),
-            f"{r['seconds']:.2f}",
-        ]
-        for r in sorted(rows["far"], key=_order)
-        if r["finer"] == 1 and r["condition"] != RIGID
-    ]
-    head = (
-        "joint at",
-        "set",
-        "angle [rad]",
-        "z [mm]",
-        "v [mm/s]",
-        "force [N]",
-        "v error",
-        "force error",
-        "evaluations",
-        "seconds",
-    )
-    return (
-        "## Ideal joints (FAR)\n\n"
-        "Largest deviation of the platform, and of the force at A1, from the ideal mechanism; then the largest "
-        "difference of velocity and force from the run with the full rod, as a share of the full rod's effect. No "
-        "damping. Seconds are processor time of a warm run.\n\n"
-        + table(head, body)
-        + "\n"
-        + _image("far.png", "Errors over the number of coordinates, and over the place of the joint", drawn)
-    )
-
-
-def _clearance(rows: dict[str, list[Row]], drawn: list[str]) -> str:
-    body = [
-        [
-            f"{r['place_mm']} mm",
-            _label(r),
-            str(r["members"]),
-            _spread(r, "peak_force", 1.0, 0),
-            _spread(r, "impacts", 1.0, 1),
-            _spread(r, "angle", 1e3, 3),
-            _spread(r, "displacement", 1e3, 4),
-            _spread(r, "velocity", 1e3, 2),
-            _spread(r, "acceleration", 1.0, 0),
-            str(r["evaluations"]),
-            f"{r['seconds']:.2f}",
-        ]
-        for r in sorted(rows["clearance"], key=_order)
-    ]
-    head = (
-        "joint at",
-        "set",
-        "members",
-        "peak force [N]",
-        "impacts",
-        "angle [mrad]",
-        "z [mm]",
-        "v [mm/s]",
-        "acceleration [m/s²]",
-        "evaluations",
-        "seconds",
-    )
-    return (
-        "## Clearance at A1 (FAR-CSJ)\n\n"
-        "Mean ± standard deviation over the members of an ensemble (starts that differ by 1e-8 m), since single runs "
-        "mean nothing beyond some tens of milliseconds; one run of the rigid rod. Largest deviations of the platform "
-        "are from the ideal mechanism."
-        + _why_not_all(rows)
-        + " 25 coordinates beside 13 show what more would change.\n\n"
-        + table(head, body)
-        + "\n"
-        + _image("clearance.png", "Peak contact forces", drawn)
-    )
-
-
-def _why_not_all(rows: dict[str, list[Row]]) -> str:
-    """Why no ensemble has the complete basis, with the numbers."""
-    if "statics" not in rows or "far" not in rows:
-        return ""
-    highest = 1e-3 * _row(rows["statics"], 0)["highest"]
-    full, best = (_at(rows["far"], 0, c, n) for c, n in ((FULL, 0), ("craig-bampton", COUNT)))
-    times = full["seconds"] / best["seconds"]
-    return (
-        f" The complete basis reaches up to {highest:.0f} kHz, a run with it takes {times:.0f} times that of {COUNT} "
-        f"Craig-Bampton coordinates, and with ideal joints those are within {100.0 * best['velocity_error']:.2g} % of "
-        "it; it has no ensemble here."
-    )
 
 
 def _mesh(rows: dict[str, list[Row]], drawn: list[str]) -> str:
@@ -279,17 +220,3 @@ def _mesh(rows: dict[str, list[Row]], drawn: list[str]) -> str:
 
 def _is_mesh_study(row: Row) -> bool:
     return (row["place_mm"], row["condition"], row["count"]) == (next(iter(PLACES)), "craig-bampton", COUNT)
-
-
-def _label(row: Row) -> str:
-    return row["condition"] if row["condition"] in (FULL, RIGID) else f"{row['condition']} {row['count']}"
-
-
-def _order(row: Row) -> tuple[int, int, int]:
-    names = (RIGID, *CONDITIONS, FULL)
-    return row["place_mm"], names.index(row["condition"]), row["count"]
-
-
-def _spread(row: Row, name: str, factor: float, digits: int) -> str:
-    mean = f"{factor * row[name]:.{digits}f}"
-    return mean if row["members"] == 1 else f"{mean} ± {factor * row[f'{name}_std']:.{digits}f}"

@@ -48,6 +48,7 @@ from pipeline.dynamics.tables import (
     KEPT0,
     MASS,
     MULTIPLIER,
+    N_CLOSURE_ROWS,
     N_CLOSURES,
     N_ENTRIES,
     N_KEPT,
@@ -175,7 +176,7 @@ def prepare(h, w, n):
         couple(h, w, p)
     for r in range(h[N_KEPT_ROWS]):
         size = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)]
-        w[index(h[ROW_SCALE] + r)] = max(w[index(h[ROW_SCALE] + r)], size)
+        w[index(h[ROW_SCALE] + h[N_CLOSURE_ROWS] + r)] = size
     ratio = factor(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_KEPT_ROWS], SINGULAR_PIVOT)
     pivot = independence(h, w) if ratio > SINGULAR_PIVOT else 0.0
     w[index(h[PIVOT] + LAST_PIVOT)] = pivot
@@ -184,11 +185,12 @@ def prepare(h, w, n):
 
 @kernel
 def independence(h, w):
-    """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been in this run."""
+    """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
     least = 1.0
     for r in range(h[N_KEPT_ROWS]):
         pivot = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)] ** 2
-        least = min(least, pivot / w[index(h[ROW_SCALE] + r)])
+        o = h[ROW_SCALE] + r
+        least = min(least, pivot / max(w[index(o)], w[index(o + h[N_CLOSURE_ROWS])]))
     return least
 
 

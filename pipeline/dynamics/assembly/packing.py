@@ -146,7 +146,7 @@ def _work_lengths(s: Mapping[str, int], method: Method, columns: int) -> dict[st
         "JACOBIAN": jacobian,
         "SPREAD": jacobian,
         "SCHUR": s["SCHUR_SIZE"],
-        "ROW_SCALE": rows,
+        "ROW_SCALE": 2 * rows,
         "PIVOT": PIVOT_SIZE,
         "MULTIPLIER": rows,
         "TOUCH": tables.TOUCH_SIZE * contacts,

@@ -12,9 +12,10 @@ N_CLOSURE_PAIRS, N_KNOWN_ENTRIES = place("N_CLOSURE_PAIRS"), place("N_KNOWN_ENTR
 CLOSURE_ROWS, SUPPORT, ENTRIES = place("CLOSURE_ROWS"), place("SUPPORT"), place("ENTRIES")
 KNOWN_ENTRIES = place("KNOWN_ENTRIES")
 CLOSURE_PAIRS, COMMON, CLOSURE_ENVELOPE = place("CLOSURE_PAIRS"), place("COMMON"), place("CLOSURE_ENVELOPE")
-#: work space; ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T so far; PIVOT: what follows
+#: work space; ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
+#: room for all rows, that of the last evaluation, which may be a trial far away; PIVOT: what follows
 GAMMA, JACOBIAN, SPREAD, SCHUR = (place(name) for name in ("GAMMA", "JACOBIAN", "SPREAD", "SCHUR"))
 ROW_SCALE, PIVOT = place("ROW_SCALE"), place("PIVOT")
-# smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry so far (1: rows at right angles, 0:
+# smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
 # dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)

@@ -50,7 +50,7 @@ from pipeline.dynamics.integrate.state import (
     WORN_ROWS,
 )
 from pipeline.dynamics.integrate.stiffness import detect
-from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan
+from pipeline.dynamics.integrate.straddle import allowed, forget, keep_scales, near, note, plan
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,
@@ -236,6 +236,7 @@ def compose(
             w[index(h[Y] + k)] = w[index(h[Y_NEW] + k)]
             w[index(slope + k)] = w[index(final + k)]
         w[index(h[CONTROL] + TIME)] = t_new
+        keep_scales(h, w)
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
