@@ -11,7 +11,7 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from benchmarks.reference_conditions.claims import off
+from benchmarks.reference_conditions.claims import Rows, off
 from benchmarks.reference_conditions.design import (
     CLEARANCE_COUNTS,
     CONDITIONS,
@@ -125,6 +125,10 @@ def _clearance(rows: list[Row]) -> Any:
     for place in PLACES:
         rigid = next(r for r in rows if r["condition"] == RIGID and r["place_mm"] == place)["peak_force"]
         axes[0].plot([place - 8, place + 8], [rigid, rigid], color="#888888", label="rigid" if place == first else None)
+        best = Rows([], [r for r in rows if r["place_mm"] == place]).best()
+        dashed: dict[str, Any] = {"color": "#000000", "linestyle": "--", "linewidth": 1.0}
+        words = f"craig-bampton, {best['count']} coordinates" if place == first else None
+        axes[0].plot([place - 8, place + 8], [best["peak_force"]] * 2, label=words, **dashed)
     axes[0].set_xticks(list(PLACES))
     axes[0].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
     axes[1].set_xlabel("coordinates (joint at 0 mm)")
@@ -132,7 +136,7 @@ def _clearance(rows: list[Row]) -> Any:
     axes[0].set_ylabel("peak contact force (N)")
     for ax in axes:
         if ax.get_legend_handles_labels()[0]:
-            ax.legend(fontsize=8)
+            ax.legend(fontsize=7, loc="center left" if ax is axes[0] else "upper right")
         _plain(ax)
     return figure
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.reference_conditions import claims, figures, responses
-from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, PLACES, TIMES
+from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, TIMES
 from benchmarks.reference_conditions.responses import at, full_row, image
 from benchmarks.tables import table
 
@@ -69,6 +69,9 @@ def _short(rows: dict[str, list[Row]]) -> str:
             f"- peak contact force within {100.0 * claims.AGREE:g} % of the most complete set's, beyond what that is "
             f"unsettled by: {_or_none(good)}."
         )
+        enough = _enough(rows["clearance"])
+        if enough is not None:
+            lines.append(f"  - Craig-Bampton is so from {enough} coordinates (or the next whole count) on;")
         lines += [f"  - at {place} mm: {_peaks(rows['clearance'], place)}." for place in PLACES]
     return "\n".join(lines) + "\n"
 
@@ -81,9 +84,9 @@ def _far_error(rows: list[Row], place: int, condition: str) -> float:
     return max(claims.off(at(rows, place, condition, COUNT), full_row(rows, place)).values())
 
 
-def _peak_error(rows: list[Row], place: int, condition: str) -> float:
+def _peak_error(rows: list[Row], place: int, condition: str, count: int = COUNT) -> float:
     best = claims.Rows([], [r for r in rows if r["place_mm"] == place]).best()["peak_force"]
-    return float(abs(at(rows, place, condition, COUNT)["peak_force"] / best - 1.0))
+    return float(abs(at(rows, place, condition, count)["peak_force"] / best - 1.0))
 
 
 def _peak_right(rows: list[Row], place: int, condition: str) -> bool:
@@ -94,6 +97,18 @@ def _unsettled(rows: list[Row], place: int) -> float:
     here = claims.Rows([], [r for r in rows if r["place_mm"] == place])
     share = claims.unsettled(here) / here.best()["peak_force"]
     return 0.0 if math.isnan(share) else share
+
+
+def _enough(rows: list[Row]) -> int | None:
+    """The least count from which on Craig-Bampton has the peak force at every place."""
+    measured = {place: {r["count"] for r in rows if _is_craig_bampton(r, place)} for place in PLACES}
+    known = [n for n in (COUNT, *MOST_COMPLETE) if all(max(counts) >= n for counts in measured.values())]
+    good = [all(_peak_error(rows, p, "craig-bampton", n) < claims.AGREE for p in PLACES) for n in known]
+    return next((n for k, n in enumerate(known) if all(good[k:])), None)
+
+
+def _is_craig_bampton(row: Row, place: int) -> bool:
+    return (row["condition"], row["place_mm"]) == ("craig-bampton", place)
 
 
 def _peaks(rows: list[Row], place: int) -> str:

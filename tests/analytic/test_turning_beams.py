@@ -122,6 +122,7 @@ def test_the_spun_beam_ends_stretched_by_its_centrifugal_force(case: str) -> Non
 @pytest.mark.parametrize("case", SCENES)
 def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
     found = spun(case)
-    # some 8000 steps of tolerance 1e-10 add up; a shortening that were not Lagrangian would show at 1e-4
-    assert np.abs(found.energy_error).max() < 1e-11 * found.kinetic.max()
+    # errors of 1e-10 of some 8000 steps add up to 1e-8 like a random walk; a shortening that were not Lagrangian
+    # would show at 1e-4
+    assert np.abs(found.energy_error).max() < 1e-8 * found.kinetic.max()
     assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-9)

@@ -135,8 +135,15 @@ def reversed_joints(table: Table) -> Table:
 
 def _negative(law: Table) -> Table:
     if law["type"] == "constant":
-        return {**law, "value": -law["value"]}
-    return {**law, "change": tuple(-h for h in law["change"])}
+        return {**law, "value": _opposite(law["value"])}
+    return {**law, "change": tuple(_opposite(h) for h in law["change"])}
+
+
+def _opposite(value: float | str) -> float | str:
+    """Of a number, or of text with a unit."""
+    if not isinstance(value, str):
+        return -value
+    return value[1:] if value.startswith("-") else f"-{value}"
 
 
 @cache
