@@ -94,6 +94,6 @@ DISCREPANCIES = (
     Discrepancy(
         "Table 10",
         "CPU ratios are given at one step size, without the errors of the runs.",
-        "Times at equal error, and beside them at the paper's equal step; the number of evaluations stands beside them.",
+        "Times at equal error, and beside them at the paper's equal step, with the evaluations that they take.",
     ),
 )

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from pipeline.dynamics.assembly.places import JACOBIAN, JACOBIAN_SIZE, LAST_PIVOT, N_KEPT_ROWS, PIVOT
 from pipeline.dynamics.integrate.project import BLIND, largest
+from pipeline.dynamics.integrate.scales import keep_scales
 from pipeline.dynamics.tables import (
     ACTIVE,
     BENT,
@@ -215,6 +216,8 @@ def compose(
             for k in range(h[N_LAWS]):
                 n[n[ACTIVE] + k] = pieces[r, k]
             settle(h, f, w, n, row[0], tolerance)
+            if n[EVALUATION] == OK:
+                keep_scales(h, w)
             status, residual = n[EVALUATION], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS])
             o = _copy(w, h[Y], h[NY], line, 0)
             o = _copy(w, h[X], h[NQ] + h[N_DRIVES], line, o)

@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT, WANTED_PIVOT
 from pipeline.dynamics.integrate.project import largest
 from pipeline.dynamics.integrate.rows import hold_modes, snapshot
+from pipeline.dynamics.integrate.scales import keep_scales
 from pipeline.dynamics.integrate.state import (
     AT_SINGULAR,
     BLIND_STEPS,
@@ -50,7 +51,7 @@ from pipeline.dynamics.integrate.state import (
     WORN_ROWS,
 )
 from pipeline.dynamics.integrate.stiffness import detect
-from pipeline.dynamics.integrate.straddle import allowed, forget, keep_scales, near, note, plan
+from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan
 from pipeline.dynamics.tables import (
     CONTROL,
     EVALUATION,

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.assembly.places import LAST_PIVOT, N_KEPT_ROWS, PIVOT, ROW_SCALE
+from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT
 from pipeline.dynamics.integrate.project import BLIND
 from pipeline.dynamics.integrate.state import (
     BLIND_STEPS,
@@ -26,7 +26,7 @@ from pipeline.dynamics.integrate.state import (
     STEP,
     STRADDLING,
 )
-from pipeline.dynamics.tables import CONTROL, EVALUATION, N_CLOSURE_ROWS, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
+from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
 
 NEVER = 1e300
@@ -49,14 +49,6 @@ A_LITTLE = 1e-4
 def note(h, w):
     """Remember how independent the closure rows are in the state just evaluated."""
     w[index(h[CONTROL] + SIGMA)] = np.sqrt(max(w[index(h[PIVOT] + LAST_PIVOT)], 0.0))
-
-
-@kernel
-def keep_scales(h, w):
-    """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
-    for r in range(h[N_KEPT_ROWS]):
-        o = h[ROW_SCALE] + r
-        w[index(o)] = max(w[index(o)], w[index(o + h[N_CLOSURE_ROWS])])
 
 
 @kernel
