@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core import quantities
-from pipeline.core.errors import InputError
+from pipeline.core.errors import InputError, SolverError
 from pipeline.core.quantities import Quantity
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
@@ -33,6 +33,8 @@ ENOUGH, WASTEFUL = 1.0, 1.0 / 3.0
 #: what the next try aims at, between the two
 AIM = 0.6
 TRIES = 12
+#: a run that is refused at a looser tolerance than this is tried again at a share of it
+REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
 #: an error that does not fall below this share when the tolerance falls by FINER has another cause than the steps
 STUCK = 0.3
 
@@ -121,7 +123,15 @@ def _search(search: Search, progress: Progress) -> Attempt:
     nearest: Attempt | None = None
     too_loose = math.inf
     for _ in range(TRIES):
-        now = search.attempt(rtol)
+        try:
+            now = search.attempt(rtol)
+        except SolverError:
+            if rtol <= REFUSED_FOR_GOOD:
+                raise
+            # a tolerance so loose that the run is refused, as its ledger does not close
+            too_loose = min(too_loose, rtol)
+            rtol = _next(rtol, 1.0 / TIGHTER, enough, too_loose)
+            continue
         progress(None, f"tolerance {rtol:.1e}: error {now.share:.2g} of what is wanted")
         if nearest is None or now.share < nearest.share:
             nearest = now
