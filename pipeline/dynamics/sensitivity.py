@@ -7,7 +7,7 @@ parted from the run's by a visible share, values of the run are one draw out of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,15 +44,26 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     size = max(engine.rtol * engine.built.system.length, SMALLEST)
     direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
     moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
+    time = output_times(engine.breaks, engine.built.system.scene.output.interval)[::EVERY]
+    one = _velocities(engine, trajectory, time)
+    visible = SHARE * float(np.linalg.norm(one, axis=2).max())
+
+    def parted(rows: np.ndarray) -> bool:
+        """Whether the twin is already beyond the horizon, where following it further tells nothing."""
+        k = int(np.searchsorted(time, rows[-1, 0], side="right")) - 1
+        w, n = engine.w.copy(), engine.n.copy()  # the twin's integration goes on with these
+        two = _velocities(engine, replace(trajectory, rows=rows), time[[k]])
+        engine.w[:], engine.n[:] = w, n
+        return bool(np.linalg.norm(one[[k]] - two, axis=2).max() > visible)
+
     try:
-        other = integrate(engine, moved, _quiet)
+        other = integrate(engine, moved, _quiet, parted)
     except SolverError:
         # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
         return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
-    time = output_times(engine.breaks, engine.built.system.scene.output.interval)[::EVERY]
-    one, two = (_velocities(engine, t, time) for t in (trajectory, other))
-    separation = np.linalg.norm(one - two, axis=2).max(axis=1)
-    beyond = np.flatnonzero(separation > SHARE * np.linalg.norm(one, axis=2).max())
+    time = time[time <= other.time[-1]]
+    separation = np.linalg.norm(one[: len(time)] - _velocities(engine, other, time), axis=2).max(axis=1)
+    beyond = np.flatnonzero(separation > visible)
     return Twin(size, time, separation, float(time[beyond[0]] if len(beyond) else engine.end))
 
 

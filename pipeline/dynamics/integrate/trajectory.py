@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,14 @@ STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
 STIFF_SHARE = 0.3
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
+
+
+Stop = Callable[[np.ndarray], bool]
+
+
+def never(rows: np.ndarray) -> bool:
+    """A run goes to its end."""
+    return False
 
 
 class StiffError(SolverError):
@@ -84,14 +93,18 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     return np.union1d(regular[apart], breaks)
 
 
-def integrate(engine: Engine, y: np.ndarray, progress: Progress) -> Trajectory:
-    """The trajectory from a consistent start; SolverError when the stepper gives up."""
+def integrate(engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = never) -> Trajectory:
+    """The trajectory from a consistent start; SolverError when the stepper gives up.
+
+    stop: asked now and then with the rows recorded so far, whether they are enough.
+    """
     run = _begin(engine, y)
     control = engine.view("CONTROL", state.N_CONTROLS)
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         engine.select_pieces(0.5 * (a + b))
         control[state.END], run.n[state.FRESH] = b, 1
-        _segment(engine, run, progress)
+        if _segment(engine, run, progress, stop):
+            break
     return _collect(run, control)
 
 
@@ -143,7 +156,8 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
     row[1 : 1 + count], row[1 + count : 1 + 2 * count] = modes, latched
 
 
-def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
+def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
+    """To the end of the segment; True when it was stopped before."""
     packed, n = engine.built.packed, run.n
     control = engine.view("CONTROL", state.N_CONTROLS)
     while True:
@@ -153,7 +167,7 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
         progress((t - engine.start) / control[state.SPAN], f"t = {t:.5f} s, {n[state.EVALUATIONS]} evaluations")
         status = n[state.STATUS]
         if status == state.SEGMENT_END:
-            return
+            return False
         if status == state.FULL:
             run.rows = np.concatenate([run.rows, np.zeros_like(run.rows)])
             run.events = np.concatenate([run.events, np.full_like(run.events, np.nan)])
@@ -166,6 +180,8 @@ def _segment(engine: Engine, run: _Run, progress: Progress) -> None:
             raise SolverError(_refusal(engine, run))
         elif _crawls(engine, run):
             raise StiffError(f"at t = {t:.6g} s: {_why_so_many(n, control)}")
+        elif stop(run.rows[: n[state.N_RECORDED]]):
+            return True
 
 
 def _crawls(engine: Engine, run: _Run) -> bool:
