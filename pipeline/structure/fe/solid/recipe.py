@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.fields import Direction, Length, Part, Pose, Position
@@ -59,18 +59,27 @@ class MeshFile(Part):
     length_unit: Literal["m", "cm", "mm", "um", "in"]
 
 
+def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(direction):
+        raise ValueError("a direction of length zero points nowhere")
+    return direction
+
+
+Pointing = Annotated[Direction, AfterValidator(_pointing)]
+
+
 class Plane(Part):
     """Nodes on a plane."""
 
     point: Position
-    normal: Direction
+    normal: Pointing
 
 
 class Tube(Part):
     """Nodes on a cylinder's surface around the line through `point` along `axis`."""
 
     point: Position
-    axis: Direction
+    axis: Pointing
     radius: Annotated[Length, Positive]
 
 
