@@ -162,7 +162,7 @@ def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
 
 
 def _cut(nodes: int) -> list[list[int]]:
-    """Corners of the plane pieces of a face with so many nodes, corners first and then edges in turn."""
+    """Corners of the pieces of a face with so many nodes, which are in the order of `Element.face_nodes`."""
     if nodes in (3, 4, 8):
         return [[0, 1, 2]] if nodes == 3 else [[0, 1, 2, 3]]
     if nodes == 6:
