@@ -29,7 +29,7 @@ def assemble(mesh: xr.Dataset) -> Model:
     return Model(
         stiffness=beam.stiffness,
         mass=beam.mass,
-        rigid=beams.rigid_vectors(beam),
+        rigid=beams.rigid_vectors(beam, beam.node_position.mean(axis=0)),
         place=_place(beam),
         interfaces=_interfaces(mesh, beam),
         ends=_ends(mesh, beam),

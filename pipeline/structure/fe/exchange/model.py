@@ -10,10 +10,9 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 import xarray as xr
 
-from pipeline.core.algebra import skew
 from pipeline.core.errors import InputError, SolverError
 from pipeline.structure.fe.exchange.files import COMPONENTS
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
 from pipeline.structure.fe.solid import ties
 from pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
 from pipeline.structure.sparse.multifrontal import cholesky
@@ -30,7 +29,7 @@ def assemble(mesh: xr.Dataset) -> Model:
     component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
     place, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
-    rigid = _rigid(place, component)
+    rigid = rigid_motions(place, component, place.mean(axis=0))
     _check(K, M, rigid, place)
     interfaces = _interfaces(mesh, component)
     names = mesh.attrs["interfaces"].split()
@@ -50,13 +49,6 @@ def assemble(mesh: xr.Dataset) -> Model:
 def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
     row, column, value = (mesh[f"{name}_{part}"].values for part in ("row", "column", "value"))
     return sp.csr_array(sp.coo_array((value, (row, column)), shape=(n, n)))
-
-
-def _rigid(place: np.ndarray, component: np.ndarray) -> np.ndarray:
-    motion = np.zeros((len(place), 7, 6))
-    motion[:, range(6), range(6)] = 1.0
-    motion[:, :3, 3:] = -skew(place)
-    return motion[np.arange(len(place)), component]
 
 
 def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarray) -> None:

@@ -9,8 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.algebra import skew
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
 from pipeline.structure.fe.solid import elasticity, ties
 from pipeline.structure.fe.solid.elasticity import Solid
 from pipeline.structure.fe.solid.elements import ELEMENTS
@@ -46,7 +45,7 @@ def assemble(mesh: xr.Dataset) -> Model:
     return Model(
         stiffness=_symmetric(K),
         mass=_symmetric(M),
-        rigid=_rigid(unknowns),
+        rigid=rigid_motions(unknowns.place, unknowns.component, unknowns.place.mean(axis=0)),
         place=unknowns.place,
         interfaces=interfaces,
         ends=ends,
@@ -111,14 +110,6 @@ def _unknowns(mesh: xr.Dataset) -> _Unknowns:
     spread = sp.csr_array(sp.coo_array((np.concatenate(values), where), shape=(3 * n, size)))
     spread.eliminate_zeros()
     return _Unknowns(spread, np.vstack(place), np.concatenate(component), first)
-
-
-def _rigid(unknowns: _Unknowns) -> np.ndarray:
-    """Rigid motions about the mesh origin, shape (ndof, 6)."""
-    full = np.zeros((len(unknowns.place), 6, 6))
-    full[:, range(6), range(6)] = 1.0
-    full[:, :3, 3:] = -skew(unknowns.place)
-    return full[np.arange(len(full)), unknowns.component]
 
 
 def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
