@@ -11,7 +11,9 @@ import scipy.sparse.csgraph
 import xarray as xr
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.structure.fe.exchange import lumped
 from pipeline.structure.fe.exchange.files import COMPONENTS
+from pipeline.structure.fe.inertia_integrals import integrate
 from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
 from pipeline.structure.fe.solid import ties
 from pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
@@ -90,11 +92,15 @@ def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Call
         blocks = [(k, l, M[rows[k]][:, rows[l]]) for k in range(3) for l in range(3)]
         same = all(abs(block - line if k == l else block).max() <= alike for k, l, block in blocks)
     if not same:
-        raise InputError(
-            WHERE,
-            "the mass matrix differs for motion along x, y and z, so that it does not tell the volume integrals",
-            "use nodes with three displacements and a consistent or lumped mass, or an npz with the integrals",
-        )
+        rigid = lumped.nodes(M, node, component, mesh["unknown_position"].values)
+        if rigid is None:
+            raise InputError(
+                WHERE,
+                "the mass matrix differs for motion along x, y and z and is not lumped at the nodes, so that it does "
+                "not tell the volume integrals",
+                "lump the mass, use nodes with three displacements, or give an npz with the integrals",
+            )
+        return partial(integrate, rigid)
     order = np.stack(rows, axis=1).ravel()
     spread = sp.csr_array(sp.eye_array(len(node), format="csr")[order])
     return partial(integrals, line, mesh["unknown_position"].values[rows[0]], spread)
