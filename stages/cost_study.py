@@ -32,13 +32,16 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     title = params["title"]
     result: dict[str, Any] = {"nc": study}
     result |= files("price", price.price_list(study, f"What accuracy costs: {title}"))
+    result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
     marks = tuple(m for m in (_paper(points, runs, chosen),) if m is not None)
     result |= work_precision.make("work_precision", study, f"Error against cost: {title}", marks)
     ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    ensembles = {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
     if ensembles:
         result |= files("statistics", statistics.table(ensembles, f"Beyond the horizon: {title}"))
+        result |= statistics.make("statistics", ensembles, f"Beyond the horizon: {title}")
     return result
 
 

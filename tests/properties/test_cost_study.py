@@ -105,7 +105,45 @@ def test_the_cheapest_way_to_each_accuracy():
     assert price.cheapest(found, 1e-12) is None
     rows = price.price_list(found, "t").rows
     assert rows[2][1] == "cannot be had"
-    assert "1.7e-07 at best" in rows[2][4]  # 1e-7 s of 0.6 s
+    # 1e-7 s of 0.6 s, and the 1e-8 s by which the reference and its confirmation differ
+    assert "1.8e-07 at best" in rows[2][4]
+
+
+def test_each_quantity_has_a_price_of_its_own():
+    found, *_ = study()
+    rows = {row[0]: row for row in price.by_quantity(found, "t").rows}
+    # 1e-7 m of 2 m and 1e-7 s of 0.6 s, each with the reference's uncertainty of a tenth of it
+    assert [rows[name][-1] for name in ("slider.position", "pin.impact_times")] == ["5.5e-08", "1.8e-07"]
+    assert rows["slider.position"][2] == "dop853, rtol 1e-09 (0.2 s)"  # 5e-6 at 1e-6 is not enough
+    assert rows["pin.impact_times"][3] == "cannot be had"
+
+
+def test_an_error_below_the_references_uncertainty_is_not_claimed():
+    found, *_ = study(uncertainty=1e-5)
+    assert price.cheapest(found, 1e-6) is None
+
+
+def test_a_study_of_which_every_run_is_refused_says_so():
+    _, points, runs = study()
+    refused = {p.key: xr.Dataset(attrs={"refused": "no"}) for p in points if p.group not in ("reference",)}
+    rows = price.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t").rows
+    assert all(row[1] == "cannot be had" and row[-1] == "every run is refused" for row in rows)
+
+
+def test_larger_ensembles_know_their_mean_better():
+    values = np.random.default_rng(3).normal(10.0, 1.0, size=64)
+    errors = [statistics.relative_error(values[:size]) for size in statistics.growing(64)]
+    assert statistics.growing(64) == [4, 8, 16, 32, 64]
+    # 1.96 standard deviations of 0.1 over the root of 64, from one draw of them
+    assert errors[-1] == pytest.approx(1.96 * 0.1 / 8.0, rel=0.2)
+    assert errors[-1] < errors[1]
+
+
+def test_the_figure_of_ensembles_is_drawn():
+    random = np.random.default_rng(1)
+    data = {name: (("member", "contact"), random.uniform(1, 2, (16, 1))) for name in statistics.STATISTICS}
+    one = xr.Dataset(data, {"contact": ["pin"]}, {"cpu_seconds": 0.5})
+    assert set(statistics.make("s", {"rtol 1e-06": one, "rtol 1e-08": one}, "t")) == {"s.png", "s.svg"}
 
 
 def test_the_pareto_front_holds_what_nothing_beats():

@@ -22,7 +22,7 @@ def price_list(study: xr.Dataset, title: str) -> Table:
     for target in TARGETS:
         found = cheapest(study, target)
         if found is None:
-            best = min(_choices(study), key=lambda c: c.error)
+            best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
             rows.append((f"{target:g}", "cannot be had", "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
             seconds = f"{found.seconds:.3f}"
@@ -32,15 +32,37 @@ def price_list(study: xr.Dataset, title: str) -> Table:
     return Table(title, COLUMNS, tuple(rows), tuple(_notes(study)))
 
 
+def by_quantity(study: xr.Dataset, title: str) -> Table:
+    """The same for each quantity by itself, where the worst of all does not decide."""
+    rows = []
+    for name in study["quantity"].values:
+        one = study.sel(quantity=[name])
+        best = min(_choices(one), key=lambda c: c.error, default=NOTHING)
+        rows.append((str(name), *(_cell(cheapest(one, target)) for target in TARGETS), f"{best.error:.1e}"))
+    heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
+    return Table(title, heads, tuple(rows), ("In brackets: processor time of one run.",))
+
+
+def _cell(choice: Choice | None) -> str:
+    return "cannot be had" if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
+
+
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One way to integrate: its name, cost, largest relative error and the quantity that has it."""
+    """One way to integrate: its name, cost, largest relative error and the quantity that has it.
+
+    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be told.
+    """
 
     name: str
     evaluations: float
     seconds: float
     error: float
     worst: str
+
+
+#: where every run of a study is refused
+NOTHING = Choice("–", np.nan, np.nan, np.inf, "every run is refused")
 
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
@@ -51,6 +73,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 def _choices(study: xr.Dataset) -> list[Choice]:
     found = []
+    unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
         if f"error_by_{group}" not in study:
             continue
@@ -58,7 +81,7 @@ def _choices(study: xr.Dataset) -> list[Choice]:
         for m in study[method].values:
             for s in study[setting].values:
                 one = study.sel({method: m, setting: s})
-                error = one[f"error_by_{group}"]
+                error = one[f"error_by_{group}"] + unsure
                 if not np.isfinite(error).all():
                     continue
                 worst = str(study["quantity"].values[int(np.argmax(error.values))])
@@ -73,14 +96,15 @@ def _notes(study: xr.Dataset) -> list[str]:
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a share of its own size.",
+        + "; each as a share of its own size, the reference's uncertainty included.",
         f"Reference: {study.attrs['reference']}. Confirmed by {study.attrs['confirmation']}, "
         f"which differs by at most {uncertain:.1e}.",
     ]
     hidden = sum(int((~resolved(study, g) & np.isfinite(study[f"error_by_{g}"])).sum()) for g in _present(study))
     if hidden:
         notes.append(
-            f"{hidden} errors are too near to the reference's own uncertainty to be told; they are drawn hollow."
+            f"{hidden} errors are less than 10 times the reference's own uncertainty and are not drawn; "
+            "the figure shows that bound."
         )
     if study.attrs["horizon"] != "none":
         notes.append(f"Pointwise errors count up to the horizon of the reference, t = {study.attrs['horizon']:.4g} s.")

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+from matplotlib.patches import Patch
 
-from pipeline.post.cost.study import GROUPS, resolved
-from pipeline.post.plotting.style import INK, SOFT, files, grid, heading, style
+from pipeline.post.cost.study import GROUPS, MARGIN, resolved
+from pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
 
 #: one colour and mark per integrator, the same in every figure
 LOOKS = {
@@ -53,7 +54,8 @@ def make(name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = ())
         figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
         for k, ax in enumerate(axes.ravel()):
             if k < len(chosen):
-                _panel(ax, chosen[k], k, found, marks)
+                bound = MARGIN * float(study["reference_uncertainty"].values[k])
+                _panel(ax, chosen[k], k, found, marks, bound)
             else:
                 ax.set_visible(False)
         _legend(figure, found, marks)
@@ -86,14 +88,12 @@ def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     return np.array(kept, dtype=int)
 
 
-def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, ...]) -> None:
+def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, ...], bound: float) -> None:
+    """One quantity. bound: error below which the reference tells nothing."""
     for curve in found:
         color, mark = LOOKS.get(curve.name, (SOFT, "x"))
-        there = np.isfinite(curve.error[:, k]) & (curve.error[:, k] > 0.0)
-        ax.plot(curve.seconds[there], curve.error[there, k], color=color, linewidth=1.0)
-        for told, face in ((True, color), (False, "white")):
-            pick = there & (curve.told[:, k] == told)
-            ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, markerfacecolor=face, markersize=4.5)
+        pick = np.isfinite(curve.error[:, k]) & curve.told[:, k]
+        ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
     seconds = np.concatenate([c.seconds for c in found])
     error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in found])
     front = pareto(seconds, error)
@@ -103,20 +103,21 @@ def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, .
             ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
             ax.annotate(m.name, (m.seconds, m.error[name]), xytext=(4, 4), textcoords="offset points", fontsize=6.8)
     ax.set(xscale="log", yscale="log", title=name)
-    # plain numbers at 1, 2 and 5: a range of less than a decade has hardly any power of ten
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    plain(ax.xaxis)
+    if bound > 0.0:
+        ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
+        ax.set_ylim(bottom=0.3 * bound)
     ax.set_xlabel("CPU time of one run (s)")
     ax.set_ylabel("relative error")
 
 
 def _legend(figure: object, found: list[Curve], marks: tuple[Mark, ...]) -> None:
-    handles = [
+    handles: list[Artist] = [
         Line2D([], [], color=LOOKS.get(c.name, (SOFT, "x"))[0], marker=LOOKS.get(c.name, (SOFT, "x"))[1], label=c.name)
         for c in found
     ]
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
+    handles.append(Patch(color=GRID, label="cannot be told"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5), fontsize=8.4)  # type: ignore[attr-defined]
@@ -125,5 +126,5 @@ def _legend(figure: object, found: list[Curve], marks: tuple[Mark, ...]) -> None
 def _subtitle(study: xr.Dataset) -> str:
     horizon = study.attrs["horizon"]
     span = "over the whole run" if horizon == "none" else f"up to the horizon of the reference, t = {horizon:.4g} s"
-    uncertain = float(study["reference_uncertainty"].max())
-    return f"errors {span}, relative to each quantity's size; hollow: nearer to the reference than 10 x {uncertain:.0e}"
+    told = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
+    return f"errors {span}, relative to each quantity's size; {told}"

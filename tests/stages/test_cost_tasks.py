@@ -1,0 +1,46 @@
+"""The tasks of a cost study: what is measured alone, what is compiled once for many points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.artifacts.store import Store
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import Task, in_order
+from stages import cost
+from stages.run import Workplace
+
+
+@pytest.fixture
+def study(root: Path, tmp_path: Path) -> Task:
+    scene = load_scene(root / "scenes" / "sps4" / "csj.toml")
+    return cost.study(scene, Workplace(Store(tmp_path), Sources(root)))
+
+
+def test_points_are_measured_alone_and_their_kernels_compiled_beforehand_side_by_side(study: Task):
+    points = [task for task in in_order([study]) if task.stage == "cost-point"]
+    ahead = [task for task in in_order([study]) if task.stage == "kernels"]
+    assert all(point.exclusive for point in points)
+    assert not any(task.exclusive for task in ahead)
+    # three methods with chosen steps, three with fixed ones, and the paper's, whose contacts are not located
+    assert len(ahead) == 7
+    assert all(point.inputs["kernels"] in ahead for point in points)
+    for point in points:
+        mine, compiled = (t.params["simulate"]["scene"]["solver"] for t in (point, point.inputs["kernels"]))
+        assert (mine["integrator"], mine["events"]) == (compiled["integrator"], compiled["events"])
+        assert ("step" in mine) == ("step" in compiled)
+
+
+def test_a_study_goes_on_where_it_was(study: Task, root: Path):
+    """Every point has an artifact of its own, whose key depends on that point alone."""
+    points = [task for task in in_order([study]) if task.stage == "cost-point"]
+    assert len({task.part for task in points}) == len(points)
+
+
+def test_a_scene_without_a_quantity_is_refused(root: Path):
+    with pytest.raises(InputError, match="did you mean 'position'"):
+        load_scene(root / "scenes" / "sps4" / "csj.toml", {"accuracy": {"platform.positon": "1 um"}})
