@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.core.scene.load import edited
 from pipeline.core.workflow.task import Task
 from stages import cost_design, kernels, s4_simulate
+from stages.cost_peers import Track
 from stages.graph import Graph
 from stages.run import Workplace, check
 
@@ -29,9 +30,10 @@ FIGURES = {
 }
 
 
-def study(scene: Scene, place: Workplace) -> Task:
+def study(scene: Scene, place: Workplace, peers: Sequence[Track] = ()) -> Task:
     """The task of a scene's study; its points are its inputs, so that an interrupted study goes on where it was.
 
+    peers: runs of other programs, see `stages.cost_peers`.
     Raises InputError when the scene has nothing to measure.
     """
     chosen = scene.wanted()
@@ -47,25 +49,30 @@ def study(scene: Scene, place: Workplace) -> Task:
         stage="cost",
         scene=scene.name,
         run="stages.cost_study:run",
-        params={"points": listed, "quantities": [[q.owner, q.kind] for q in chosen], "title": scene.title},
+        params={
+            "points": listed,
+            "quantities": [[q.owner, q.kind] for q in chosen],
+            "title": scene.title,
+            "peers": list(peers),
+        },
         inputs=points | _ensembles(scene, names, compiled),
         folder=f"cost/{scene.name}",
         names={"nc": "cost.nc"},
     )
 
 
-def bring(scene: Scene, place: Workplace) -> tuple[xr.Dataset, Path]:
+def bring(scene: Scene, place: Workplace, peers: Sequence[Track] = ()) -> tuple[xr.Dataset, Path]:
     """The study's dataset, brought up to date, and the folder with its tables and figures."""
-    task = study(scene, place)
+    task = study(scene, place, peers)
     outcome = place.bring([task])
     check(outcome)
     return place.store.load(outcome.records[id(task)]), place.store.root / task.folder
 
 
-def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path) -> None:
+def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, peer: Path | None = None) -> None:
     """The page on accuracy, with its pictures in a folder of its name beside it.
 
-    studies: what `bring` returned, by scene.
+    studies: what `bring` returned, by scene.  peer: the file of other programs' runs that was given.
     """
     from pipeline.post.cost.page import Studied, markdown
 
@@ -81,7 +88,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path) -> No
                 shown[title] = f"{pictures.name}/{target.name}"
         tables = tuple((folder / f).read_text() for f in PRINTED if (folder / f).is_file())
         found.append(Studied(name, study, tables, shown))
-    page.write_text(markdown(tuple(found), page.as_posix()))
+    page.write_text(markdown(tuple(found), f"{page.as_posix()}{f' --peer {peer.as_posix()}' if peer else ''}"))
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:

@@ -17,7 +17,8 @@ LOCATED = 1e-12
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``cost.nc`` and its tables and figures.
 
-    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`.
+    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, and `peers`, as of
+    `stages.cost_peers`.
     """
     from pipeline.core.quantities import Quantity
     from pipeline.post.cost import causes, price, statistics, work_precision
@@ -30,13 +31,16 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     study = assemble(points, runs, chosen)
     split = split_of(points, runs, chosen, study)
     title = params["title"]
+    said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
     result: dict[str, Any] = {"nc": study}
-    result |= files("price", price.price_list(study, f"What accuracy costs: {title}"))
+    result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
     result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
     marks = tuple(m for m in (_paper(points, runs, chosen),) if m is not None)
-    result |= work_precision.make("work_precision", study, f"Error against cost: {title}", marks)
+    result |= work_precision.make(
+        "work_precision", study, f"Error against cost: {title}", marks, work_precision.peers(study, params["peers"])
+    )
     ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
     ensembles = {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
     if ensembles:

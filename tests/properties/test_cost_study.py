@@ -200,3 +200,13 @@ def test_figures_are_drawn():
     found, *_ = study()
     mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
     assert set(work_precision.make("w", found, "t", (mark,))) == {"w.png", "w.svg"}
+
+
+def test_other_programs_are_drawn_beside_ours_relative_to_the_same_size():
+    found, *_ = study()
+    track = {"name": "peer", "note": "n", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
+    (curve,) = work_precision.peers(found, [track])
+    assert curve.error[:, 0] == pytest.approx([1e-3 / SIZE, 1e-4 / SIZE])
+    assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
+    assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
+    assert price.price_list(found, "t", ("said",)).notes[-1] == "said"

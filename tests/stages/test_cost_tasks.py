@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.task import Task, in_order
-from stages import cost
+from stages import cost, cost_peers
 from stages.run import Workplace
 
 
@@ -44,3 +45,33 @@ def test_a_study_goes_on_where_it_was(study: Task, root: Path):
 def test_a_scene_without_a_quantity_is_refused(root: Path):
     with pytest.raises(InputError, match="did you mean 'position'"):
         load_scene(root / "scenes" / "sps4" / "csj.toml", {"accuracy": {"platform.positon": "1 um"}})
+
+
+TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"platform.position": [1e-6, 1e-7]}}
+
+
+@pytest.mark.parametrize(
+    "text, told",
+    [
+        ("{", "cannot be read"),
+        ("[]", "expected a table of scenes"),
+        ('{"a": 1}', "expected a list of tracks"),
+        ('{"a": [{"name": "x"}]}', "a track needs name, seconds and error"),
+        ('{"a": [{"name": "x", "seconds": ["1"], "error": {}}]}', "lists of numbers"),
+        ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "another number of errors"),
+    ],
+)
+def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: str, told: str):
+    file = tmp_path / "peers.json"
+    file.write_text(text)
+    with pytest.raises(InputError, match=told):
+        cost_peers.read(file)
+
+
+def test_peers_change_the_study_but_none_of_its_points(root: Path, tmp_path: Path, study: Task):
+    file = tmp_path / "peers.json"
+    file.write_text(json.dumps({"sps4/csj": [TRACK]}))
+    scene, place = load_scene(root / "scenes" / "sps4" / "csj.toml"), Workplace(Store(tmp_path), Sources(root))
+    other = cost.study(scene, place, cost_peers.read(file)["sps4/csj"])
+    assert other.params["peers"] == [TRACK]
+    assert {k: v.params for k, v in other.inputs.items()} == {k: v.params for k, v in study.inputs.items()}

@@ -16,8 +16,11 @@ INTEGRATION = {"tolerance": "rtol", "step": "step"}
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
-def price_list(study: xr.Dataset, title: str) -> Table:
-    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting."""
+def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Table:
+    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting.
+
+    notes: what else is to be said.
+    """
     rows = []
     for target in TARGETS:
         found = cheapest(study, target)
@@ -29,7 +32,7 @@ def price_list(study: xr.Dataset, title: str) -> Table:
             rows.append(
                 (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
             )
-    return Table(title, COLUMNS, tuple(rows), tuple(_notes(study)))
+    return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
 
 
 def by_quantity(study: xr.Dataset, title: str) -> Table:

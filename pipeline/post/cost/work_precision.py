@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -26,7 +28,7 @@ LOOKS = {
 COLUMNS = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Curve:
     """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be told."""
 
@@ -34,6 +36,7 @@ class Curve:
     seconds: np.ndarray
     error: np.ndarray
     told: np.ndarray
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +48,10 @@ class Mark:
     error: dict[str, float]
 
 
-def make(name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = ()) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``."""
+def make(
+    name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = (), others: Sequence[Curve] = ()
+) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     found = curves(study)
     rows = -(-len(chosen) // COLUMNS)
@@ -55,10 +60,10 @@ def make(name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = ())
         for k, ax in enumerate(axes.ravel()):
             if k < len(chosen):
                 bound = MARGIN * float(study["reference_uncertainty"].values[k])
-                _panel(ax, chosen[k], k, found, marks, bound)
+                _panel(ax, chosen[k], k, (found, others), marks, bound)
             else:
                 ax.set_visible(False)
-        _legend(figure, found, marks)
+        _legend(figure, found, others, marks)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
 
@@ -88,10 +93,31 @@ def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     return np.array(kept, dtype=int)
 
 
-def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, ...], bound: float) -> None:
-    """One quantity. bound: error below which the reference tells nothing."""
-    for curve in found:
-        color, mark = LOOKS.get(curve.name, (SOFT, "x"))
+def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:
+    """Curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
+    found = []
+    for track in tracks:
+        seconds = np.array(track["seconds"], dtype=float)
+        error = np.full((len(seconds), study.sizes["quantity"]), np.nan)
+        for k, name in enumerate(study["quantity"].values):
+            if str(name) in track["error"]:
+                error[:, k] = np.array(track["error"][str(name)], dtype=float) / float(study["scale"][k])
+        found.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
+    return found
+
+
+def _panel(
+    ax: Axes,
+    name: str,
+    k: int,
+    curves_of: tuple[Sequence[Curve], Sequence[Curve]],
+    marks: tuple[Mark, ...],
+    bound: float,
+) -> None:
+    """One quantity. curves_of: ours, and others'. bound: error below which the reference tells nothing."""
+    found, others = curves_of
+    for curve in (*found, *others):
+        color, mark = look(curve, others)
         pick = np.isfinite(curve.error[:, k]) & curve.told[:, k]
         ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
     seconds = np.concatenate([c.seconds for c in found])
@@ -111,16 +137,23 @@ def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, .
     ax.set_ylabel("relative error")
 
 
-def _legend(figure: object, found: list[Curve], marks: tuple[Mark, ...]) -> None:
-    handles: list[Artist] = [
-        Line2D([], [], color=LOOKS.get(c.name, (SOFT, "x"))[0], marker=LOOKS.get(c.name, (SOFT, "x"))[1], label=c.name)
-        for c in found
-    ]
+def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
+    """Colour and mark of a curve; grey ones for other programs."""
+    if curve.name in LOOKS:
+        return LOOKS[curve.name]
+    return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
+
+
+def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+    handles: list[Artist] = []
+    for curve in (*found, *others):
+        color, mark = look(curve, others)
+        handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
     handles.append(Patch(color=GRID, label="cannot be told"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5), fontsize=8.4)  # type: ignore[attr-defined]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)  # type: ignore[attr-defined]
 
 
 def _subtitle(study: xr.Dataset) -> str:
