@@ -54,15 +54,17 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The contacts' statistics of an ensemble, with its ``cpu_seconds`` per member as an attribute; or `refused`.
+    """The contacts' statistics of an ensemble, ``standard_error(quantity)`` of the means of the series it has, and its
+    ``cpu_seconds`` per member as an attribute; or `refused`.
 
-    params: `simulate`, with the ensemble.  inputs: as of `run`.
+    params: `simulate`, with the ensemble, and `quantities`.  inputs: as of `run`.
     """
     import time
 
     import xarray as xr
 
     from pipeline import dynamics
+    from pipeline.core import quantities
     from pipeline.core.errors import SolverError
 
     scene, reduced = rebuild(params["simulate"]), bundles(inputs)
@@ -74,6 +76,10 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     seconds = (time.process_time() - begun) / done.sizes["member"]
     kept = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
+    chosen = [quantities.parse(name, scene.owners()) for name in params["quantities"]]
+    errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
+    kept = kept.assign_coords(quantity=list(errors))
+    kept["standard_error"] = (("quantity",), list(errors.values()))
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
 
 

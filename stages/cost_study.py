@@ -29,9 +29,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     study = assemble(points, runs, chosen)
-    split = split_of(points, runs, chosen, study)
+    ensembles = _ensembles(inputs)
+    # the last one is that at the tightest tolerance
+    split = split_of(points, runs, chosen, next(reversed(ensembles.values()), None))
     title = params["title"]
     said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
+    study = causes.beside(study, split)
     result: dict[str, Any] = {"nc": study}
     result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
     result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
@@ -41,12 +44,16 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     result |= work_precision.make(
         "work_precision", study, f"Error against cost: {title}", marks, work_precision.peers(study, params["peers"])
     )
-    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
-    ensembles = {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
     if ensembles:
         result |= files("statistics", statistics.table(ensembles, f"Beyond the horizon: {title}"))
         result |= statistics.make("statistics", ensembles, f"Beyond the horizon: {title}")
     return result
+
+
+def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Ensembles that could be made, by what was varied."""
+    found = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    return {name: data for name, data in found.items() if "refused" not in data.attrs}
 
 
 def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:
@@ -63,9 +70,9 @@ def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
 
 
 def split_of(
-    points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], study: xr.Dataset
+    points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
 ) -> dict[str, dict[str, float]]:
     """Relative error of the scene as it stands, by quantity and cause."""
     from pipeline.post.cost.split import causes_of
 
-    return {q.name: causes_of(q, points, runs, LOCATED) for q in chosen}
+    return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.quantities import Quantity
+from pipeline.core.errors import SolverError
+from pipeline.core.quantities import Quantity, standard_error
 from pipeline.post.cost import causes, page, price, split, statistics, work_precision
 from pipeline.post.cost.study import Point, assemble, resolved
 
@@ -126,8 +127,65 @@ def test_an_error_below_the_references_uncertainty_is_not_claimed():
 def test_a_study_of_which_every_run_is_refused_says_so():
     _, points, runs = study()
     refused = {p.key: xr.Dataset(attrs={"refused": "no"}) for p in points if p.group not in ("reference",)}
-    rows = price.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t").rows
-    assert all(row[1] == "cannot be had" and row[-1] == "every run is refused" for row in rows)
+    table = price.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t")
+    assert all(row[1] == "cannot be had" for row in table.rows)
+    assert any("Not confirmed: other was refused" in note for note in table.notes)
+    assert any("every run is refused" in note for note in table.notes)
+
+
+def test_a_study_without_its_reference_is_refused_with_the_reason():
+    _, points, runs = study()
+    runs["best"] = xr.Dataset(attrs={"refused": "it blew up"})
+    with pytest.raises(SolverError, match=r"reference \(best\) is refused: it blew up"):
+        assemble(points, runs, [POSITION])
+
+
+def test_what_cannot_be_had_is_explained():
+    rounded, *_ = study(uncertainty=1e-7)
+    assert any("rounding errors" in note for note in price.price_list(rounded, "t").notes)
+    coarse, *_ = study(uncertainty=1e-12)
+    assert any("best setting that was tried reaches" in note for note in price.price_list(coarse, "t").notes)
+    _, points, runs = study()
+    runs["other"] = run(0.0, impacts=2)
+    other = price.price_list(assemble(points, runs, [POSITION, TIMES]), "t")
+    assert any("do not agree on the number of impacts" in note for note in other.notes)
+
+
+def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
+    _, points, runs = study()
+    points.append(Point("as it stands", "sampling", {"interval": 0.1}))
+    runs["as it stands"] = xr.Dataset(attrs={"refused": "no"})
+    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    assert np.isnan(found["time integration"])
+    assert causes.dominant(found) == "–"
+
+
+def test_the_spread_of_an_ensemble_is_a_cause():
+    _, points, runs = study()
+    random = np.random.default_rng(2)
+    members = 16
+    data = {
+        "peak_force": (("member", "contact"), random.normal(100.0, 5.0, (members, 1))),
+        "standard_error": (("quantity",), [0.01]),
+    }
+    ensemble = xr.Dataset(data, {"contact": ["pin"], "quantity": ["slider.position"]})
+    found = split.causes_of(POSITION, points, runs, 1e-12, ensemble)
+    assert found["ensemble spread"] == pytest.approx(1.96 * 0.01 / SIZE)
+    assert np.isnan(split.causes_of(TIMES, points, runs, 1e-12, ensemble)["ensemble spread"])
+    runs["best"]["event_peak_force"] = (("event",), np.full(3, 100.0))
+    peak = split.causes_of(Quantity("pin", "peak_force"), points, runs, 1e-12, ensemble)["ensemble spread"]
+    assert peak == pytest.approx(1.96 * 0.05 / np.sqrt(members), rel=0.5)
+
+
+def test_the_standard_error_of_a_series_is_that_of_its_members_mean():
+    random = np.random.default_rng(5)
+    values = random.normal(0.0, 1.0, (400, 3, 1, 3)) * np.array([0.0, 1.0, 2.0])[:, None, None]
+    ensemble = xr.Dataset({"position": (("member", "time", "body", "axis"), values)}, {"body": ["slider"]})
+    # the last time: deviation 2 on each of three axes, over the root of 400
+    assert standard_error(ensemble, POSITION) == pytest.approx(2.0 * np.sqrt(3.0) / 20.0, rel=0.1)
+    assert standard_error(ensemble, Quantity("other", "position")) is None
+    assert standard_error(ensemble, Quantity("slider", "orientation")) is None
+    assert standard_error(ensemble, TIMES) is None
 
 
 def test_larger_ensembles_know_their_mean_better():
@@ -194,6 +252,17 @@ def test_the_page_says_what_each_digit_costs():
     assert "0.001 takes rk4, step 0.001 s (50 evaluations)" in text
     assert "1e-09 cannot be had" in text
     assert "![Error of a/scene](x/y.png)" in text
+
+
+def test_the_page_says_how_far_it_holds_and_what_to_refine():
+    found, *_ = study(horizon=0.5)
+    shares = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
+    split_up = causes.beside(found, shares)
+    text = page.markdown((page.Studied("a/scene", split_up, ("**Beyond the horizon: x**",), {}),), "p.md")
+    assert "holds up to t = 0.5 s of 1 s; beyond that nothing but the means of an ensemble, below" in text
+    assert "more elements (mesh limits slider.position)" in text
+    alone = page.markdown((page.Studied("a/scene", split_up, (), {}),), "p.md")
+    assert "an ensemble, which the scene can ask for" in alone
 
 
 def test_figures_are_drawn():

@@ -13,6 +13,8 @@ from pipeline.post.plotting.table import Table
 TARGETS = (1e-3, 1e-6, 1e-9)
 #: groups that say how a run is integrated, and the factor that is a setting
 INTEGRATION = {"tolerance": "rtol", "step": "step"}
+#: a best error of so many times the reference's uncertainty, which it contains, is rounding
+ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
@@ -64,8 +66,8 @@ class Choice:
     worst: str
 
 
-#: where every run of a study is refused
-NOTHING = Choice("–", np.nan, np.nan, np.inf, "every run is refused")
+#: where no run of a study can be compared
+NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
@@ -95,14 +97,15 @@ def _choices(study: xr.Dataset) -> list[Choice]:
 
 
 def _notes(study: xr.Dataset) -> list[str]:
-    uncertain = float(study["reference_uncertainty"].max())
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
         + "; each as a share of its own size, the reference's uncertainty included.",
-        f"Reference: {study.attrs['reference']}. Confirmed by {study.attrs['confirmation']}, "
-        f"which differs by at most {uncertain:.1e}.",
+        _confirmed(study),
     ]
+    missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
+    if missing:
+        notes.append(f"{' and '.join(missing)} cannot be had: {_why_not(study)}.")
     hidden = sum(int((~resolved(study, g) & np.isfinite(study[f"error_by_{g}"])).sum()) for g in _present(study))
     if hidden:
         notes.append(
@@ -114,6 +117,33 @@ def _notes(study: xr.Dataset) -> list[str]:
     if study.attrs["refused"]:
         notes.append(f"Refused: {study.attrs['refused']}.")
     return notes
+
+
+def _confirmed(study: xr.Dataset) -> str:
+    unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
+    said = f"Reference: {study.attrs['reference']}. "
+    if np.isnan(unsure).any():
+        return f"{said}Not confirmed: {by} was refused."
+    if np.isinf(unsure).any():
+        return f"{said}Not confirmed: {by} finds another number of impacts."
+    worst = str(study["quantity"].values[int(np.argmax(unsure))])
+    return f"{said}Confirmed by {by}, which differs by at most {unsure.max():.1e} ({worst})."
+
+
+def _why_not(study: xr.Dataset) -> str:
+    """Whether the settings that were tried end too early, or rounding decides."""
+    unsure = study["reference_uncertainty"].fillna(0.0)
+    best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
+    if np.isinf(unsure).any():
+        return "the reference and its confirmation do not agree on the number of impacts"
+    if best is NOTHING:
+        return "every run is refused, or has another number of impacts than the reference"
+    if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
+        return (
+            f"two independent methods at their tightest tolerances differ as much ({best.worst}); "
+            "rounding errors, which the motion itself magnifies, decide there, and no method helps"
+        )
+    return f"the best setting that was tried reaches {best.error:.1e} ({best.worst})"
 
 
 def _present(study: xr.Dataset) -> list[str]:
