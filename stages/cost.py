@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,14 +30,14 @@ FIGURES = {
 }
 
 
-def study(scene: Scene, place: Workplace, peers: Sequence[Track] = ()) -> Task:
+def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()) -> Task:
     """The task of a scene's study; its points are its inputs, so that an interrupted study goes on where it was.
 
-    peers: runs of other programs, see `stages.cost_peers`.
+    peers: runs of other programs, see `stages.cost_peers`.  integrators: see `cost_design.runs`.
     Raises InputError when the scene has nothing to measure.
     """
     chosen = scene.wanted()
-    designs = cost_design.runs(scene, _highest(scene, place))
+    designs = cost_design.runs(scene, _highest(scene, place), integrators)
     names = [quantity.name for quantity in chosen]
     compiled, more = _kernels(designs), {"quantities": names}
     points = {f"point{k}": _measured(design, "run", more, compiled) for k, design in enumerate(designs)}
@@ -61,18 +61,20 @@ def study(scene: Scene, place: Workplace, peers: Sequence[Track] = ()) -> Task:
     )
 
 
-def bring(scene: Scene, place: Workplace, peers: Sequence[Track] = ()) -> tuple[xr.Dataset, Path]:
-    """The study's dataset, brought up to date, and the folder with its tables and figures."""
-    task = study(scene, place, peers)
+def bring(
+    scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()
+) -> tuple[xr.Dataset, Path]:
+    """The study's dataset, brought up to date, and the folder with its tables and figures; arguments as of `study`."""
+    task = study(scene, place, peers, integrators)
     outcome = place.bring([task])
     check(outcome)
     return place.store.load(outcome.records[id(task)]), place.store.root / task.folder
 
 
-def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, peer: Path | None = None) -> None:
+def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
     """The page on accuracy, with its pictures in a folder of its name beside it.
 
-    studies: what `bring` returned, by scene.  peer: the file of other programs' runs that was given.
+    studies: what `bring` returned, by scene.  options: what else the command was told.
     """
     from pipeline.post.cost.page import Studied, markdown
 
@@ -88,7 +90,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, peer:
                 shown[title] = f"{pictures.name}/{target.name}"
         tables = tuple((folder / f).read_text() for f in PRINTED if (folder / f).is_file())
         found.append(Studied(name, study, tables, shown))
-    page.write_text(markdown(tuple(found), f"{page.as_posix()}{f' --peer {peer.as_posix()}' if peer else ''}"))
+    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"))
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:
@@ -137,7 +139,7 @@ def _ensembles(scene: Scene, names: list[str], compiled: Mapping[tuple[str, ...]
     """Ensembles at several tolerances, of a scene that has one."""
     found = {}
     for rtol in ENSEMBLES if scene.ensemble is not None else ():
-        change = edited(scene, {"solver": {"rtol": rtol}, "accuracy": None})
+        change = edited(scene, {"solver.rtol": rtol, "accuracy": None})
         design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
         found[f"ensemble:rtol {rtol:g}"] = _measured(design, "run_ensemble", {"quantities": names}, compiled)
     return found

@@ -12,7 +12,8 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.task import Task, in_order
-from stages import cost, cost_peers
+from stages import cost, cost_design, cost_peers
+from stages.__main__ import main
 from stages.run import Workplace
 
 
@@ -75,3 +76,23 @@ def test_peers_change_the_study_but_none_of_its_points(root: Path, tmp_path: Pat
     other = cost.study(scene, place, cost_peers.read(file)["sps4/csj"])
     assert other.params["peers"] == [TRACK]
     assert {k: v.params for k, v in other.inputs.items()} == {k: v.params for k, v in study.inputs.items()}
+
+
+def test_a_study_of_some_integrators_keeps_what_all_are_compared_with(root: Path, tmp_path: Path):
+    scene = load_scene(root / "scenes" / "sps4" / "csj.toml")
+    some = cost.study(scene, Workplace(Store(tmp_path), Sources(root)), integrators=("rk4",))
+    groups = {p["group"]: p["key"] for p in some.params["points"]}
+    assert groups.keys() == {"reference", "confirmation", "step", "paper", "sampling"}
+    assert "rk4" in groups["step"]
+    with pytest.raises(InputError, match="did you mean 'radau'"):
+        cost_design.runs(scene, None, ("radua",))
+
+
+def test_points_keep_the_limits_of_the_scene(root: Path):
+    scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": {"rtol": 1e-7, "evaluations": 1234}})
+    assert {design.scene.solver.evaluations for design in cost_design.runs(scene, None)} == {1234}
+
+
+def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["cost", "sps4/csj", "--page", str(tmp_path / "nowhere" / "page.md")]) == 2
+    assert "its folder does not exist" in capsys.readouterr().err
