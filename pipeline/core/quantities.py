@@ -135,6 +135,21 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
     return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
 
 
+def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
+    """Largest standard error over time of the mean of the members' values, in the quantity's unit.
+
+    None where an ensemble does not say: events, orientations, and owners that it does not keep.
+    """
+    kind = KINDS[quantity.kind]
+    if kind.variable not in ensemble or quantity.kind == "orientation" or "time" not in ensemble[kind.variable].dims:
+        return None
+    if quantity.owner not in ensemble[kind.owner].values:
+        return None
+    values = ensemble[kind.variable].sel({kind.owner: quantity.owner}).transpose("member", "time", ...).values
+    spread = np.sqrt(values.var(axis=0, ddof=1).reshape(values.shape[1], -1).sum(axis=1))
+    return float(spread.max() / np.sqrt(len(values)))
+
+
 def scale(run: xr.Dataset, quantity: Quantity) -> float:
     """What a relative error is relative to: the largest change from the start; of forces the largest value.
 
