@@ -67,9 +67,9 @@ def _sweeps(
     finished = [height(r.outcome) for r in rows if r.outcome.verdict == FINISHED and r.case.sweep in RANGES]
     floor = 0.5 * min(finished, default=1.0) if logarithmic else 0.0
     for k, (ax, sweep) in enumerate(zip(axes.ravel(), RANGES, strict=False)):
-        _panel(ax, [row for row in rows if row.case.sweep == sweep], sweep, height, floor)
         if logarithmic:
             ax.set_yscale("log")
+        _panel(ax, [row for row in rows if row.case.sweep == sweep], sweep, height, floor)
         if limit is not None:
             ax.axhline(limit, color=MARKS[WRONG][1], linewidth=0.8, linestyle=":")
         if k % columns == 0:
@@ -80,37 +80,21 @@ def _sweeps(
 
 
 def _panel(ax: Any, rows: Sequence[Row], sweep: str, height: Callable[[Outcome], float], floor: float) -> None:
-    done = [row for row in rows if row.outcome.verdict == FINISHED]
-    ax.plot(
-        [_axis(row, sweep) for row in done],
-        [height(row.outcome) for row in done],
-        "o-",
-        color=BLUE,
-        markersize=4,
-        linewidth=1,
-    )
-    for verdict, (mark, color) in MARKS.items():
-        ax.plot(
-            [_axis(row, sweep) for row in rows if row.outcome.verdict == verdict],
-            [floor for row in rows if row.outcome.verdict == verdict],
-            mark,
-            color=color,
-            markersize=7,
-            clip_on=False,
-        )
-    switched = [row for row in done if row.outcome.switched]
-    ax.plot(
-        [_axis(row, sweep) for row in switched],
-        [height(row.outcome) for row in switched],
-        "o",
-        color="none",
-        markeredgecolor=SOFT,
-        markersize=9,
-    )
     if sweep in LOGARITHMIC:
-        if sweep == "nearness":
-            ax.invert_xaxis()
         ax.set_xscale("log")
+    done = [row for row in rows if row.outcome.verdict == FINISHED]
+    places, heights = [_axis(row, sweep) for row in done], [height(row.outcome) for row in done]
+    ax.plot(places, heights, "o-", color=BLUE, markersize=4, linewidth=1)
+    for verdict, (mark, color) in MARKS.items():
+        lost = [_axis(row, sweep) for row in rows if row.outcome.verdict == verdict]
+        if lost:
+            ax.plot(lost, [floor] * len(lost), mark, color=color, markersize=7, clip_on=False)
+    switched = [k for k, row in enumerate(done) if row.outcome.switched]
+    if switched:
+        ring = {"color": "none", "markeredgecolor": SOFT, "markersize": 9}
+        ax.plot([places[k] for k in switched], [heights[k] for k in switched], "o", **ring)
+    if sweep == "nearness":
+        ax.invert_xaxis()
     ax.set_title(LABELS[sweep], fontsize=8.5)
 
 
@@ -154,10 +138,10 @@ def _name_axes(ax: Any, x: str, y: str) -> None:
     ax.set_title(LABELS[y], fontsize=8.5)
     if x in LOGARITHMIC:
         ax.set_xscale("log")
-    if x == "nearness":
-        ax.invert_xaxis()
     if y in LOGARITHMIC:
         ax.set_yscale("log")
+    if x == "nearness":
+        ax.invert_xaxis()
 
 
 def _legend(figure: Any) -> None:
