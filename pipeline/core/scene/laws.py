@@ -204,15 +204,13 @@ class Repeated(Part):
     period: Annotated[Time, Field(gt=0)]
     times: Annotated[int, Field(ge=1)]
     start: Time = 0.0
-    law: Law
+    law: Bare
 
 
 KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
 Law = Annotated[
     Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
 ]
-for _composed in (Sum, Section, Piecewise, Repeated):
-    _composed.model_rebuild()
 
 
 def _bare(law: Any) -> Any:
@@ -221,6 +219,8 @@ def _bare(law: Any) -> Any:
 
 
 Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
+for _composed in (Sum, Section, Piecewise, Repeated):
+    _composed.model_rebuild()
 
 
 def law_types(node: object) -> Iterator[str]:
