@@ -18,8 +18,9 @@ from pipeline.dynamics.drives.oscillation import oscillate
 from pipeline.dynamics.drives.pieces import Pieces, pieces_of
 from pipeline.dynamics.tables import ACTIVE, HEADER, LAW, N_LAWS, PIECES, place
 from tests.analytic.mechanism_runs import run
+from tests.properties.kernels import from_python
 
-KNOWN_MOTION = known.compose(oscillate)
+KNOWN_MOTION = from_python(known.compose(oscillate))
 #: eq. (35): 60 mm out and back
 STROKE = Step(type="step", start=(0.0, 0.09), end=(0.09, 0.18), change=(0.06, -0.06))
 WAVES = {"type": "harmonic", "amplitude": [0.3, -0.1], "frequency": [2.0, "1.5 Hz"], "phase": [0.4, "90 deg"]}
