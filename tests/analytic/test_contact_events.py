@@ -83,7 +83,7 @@ def test_a_bouncing_ball_comes_to_rest_in_contact() -> None:
 
 
 def test_a_stop_of_the_sliding_within_one_step_is_noted() -> None:
-    """A ball that cannot turn slides to and fro, so smoothly that steps do not see the microsecond in which it stops."""
+    """A ball that cannot turn slides to and fro, so smoothly that steps do not see its stop of a microsecond."""
     angle, slow, resting = 0.5, 1e-6, 8.03e-8  # (m g cos(angle) / K)^(2/3)
     place = ((5e-4 + resting) * math.sin(angle), 0.0, -(5e-4 + resting) * math.cos(angle))
     law = (
