@@ -1,7 +1,8 @@
 r"""The paper's rod, clamped at one end, its free end a pin in a fixed journal: modes of own beam elements, SciPy.
 
 A clamped body frame does not move, so that :math:`\ddot q_i + \omega_i^2 q_i = Q_i` holds without further terms:
-bending in the plane and stretch, shapes scaled to unit modal mass; the pin adds its mass to them. The journal's centre is where the tip's is at rest.
+bending in the plane and stretch, shapes scaled to unit modal mass; the pin adds its mass to them. The
+journal's centre is where the tip's is at rest.
 """
 
 from __future__ import annotations

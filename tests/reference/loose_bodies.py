@@ -32,7 +32,7 @@ ROWS: dict[str, tuple[tuple[int, ...], tuple[tuple[int, int], ...]]] = {
 
 
 def cross(a: Array, b: Array) -> Array:
-    """a x b of single vectors, faster than numpy's."""
+    """Product a x b of single vectors, faster than numpy's."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
@@ -138,7 +138,7 @@ class LooseBodies:
 
 
 def _point_row(a: Place, b: Place, k: int) -> tuple[tuple[Array, Array], float]:
-    """e . (p_b - p_a) = 0, e being axis k of a: parts for (v, omega) of a and b; the right side."""
+    """Together: e . (p_b - p_a) = 0, e being axis k of a: parts for (v, omega) of a and b; the right side."""
     e, d, v = a.axes[:, k], b.origin - a.origin, b.velocity - a.velocity
     e_rate = cross(a.omega, e)
     centripetal = cross(b.omega, cross(b.omega, b.arm)) - cross(a.omega, cross(a.omega, a.arm))
@@ -148,7 +148,7 @@ def _point_row(a: Place, b: Place, k: int) -> tuple[tuple[Array, Array], float]:
 
 
 def _axis_row(a: Place, b: Place, k: int, m: int) -> tuple[tuple[Array, Array], float]:
-    """u . w = 0, axis k of a and axis m of b."""
+    """Perpendicular: u . w = 0, axis k of a and axis m of b."""
     u, w = a.axes[:, k], b.axes[:, m]
     across, zero = cross(u, w), np.zeros(3)
     turning = cross(cross(a.omega, u), w) + cross(u, cross(b.omega, w))

@@ -121,7 +121,7 @@ def coefficient(law: dict[str, Any], speed: float) -> float:
 
 
 def bristles(law: dict[str, Any], z: Array, slip: Array) -> tuple[Array, Array]:
-    """LuGre's force over the normal force, against the sliding, and the rate of z; the damping as far as mu_s allows."""
+    """LuGre's force over the normal force, against the sliding, and the rate of z; damping as far as mu_s allows."""
     static, dynamic, stiffness = law["static"], law["dynamic"], law["bristle_stiffness"]
     speed = math.sqrt(slip @ slip)
     fading = math.exp(-((speed / si(law["v_stribeck"])) ** 2))
@@ -140,7 +140,8 @@ def simulate(path: Path, end: float, count: int, rtol: float = 1e-11) -> list[Im
     """The first `count` contacts of a scene that end before `end` [s], in the order of their begins."""
     scene = read(path)
     mechanism = LooseBodies(scene)
-    first, joints = SIZE * len(mechanism.bodies), [(n, j) for n, j in scene["joint"].items() if "clearance" in j["type"]]
+    first = SIZE * len(mechanism.bodies)
+    joints = [(n, j) for n, j in scene["joint"].items() if "clearance" in j["type"]]
     contacts = [Contact(n, j, mechanism.frames, first + 3 * k) for k, (n, j) in enumerate(joints)]
     y, t = np.concatenate([mechanism.start(), np.zeros(3 * len(contacts))]), 0.0
     closed: dict[str, float] = {}
