@@ -122,6 +122,15 @@ def test_a_number_of_faces_and_of_cells_names_the_faces_to_a_frame(tmp_path: Pat
         build(table, tmp_path)
 
 
+def test_a_number_of_each_cell_is_no_region(tmp_path: Path) -> None:
+    nodes, cells = lattice.cut(*lattice.block(SIZE, (11, 10, 10)), "hex8")
+    data = {"id": [np.arange(len(cells))], "part": [np.arange(len(cells)) // 550]}
+    meshio.Mesh(1e3 * nodes, [("hexahedron", cells)], cell_data=data).write(tmp_path / "box.vtu")
+    frames = {"bottom": {"on": {"region": "id=5"}, "tie": "mean"}}
+    with pytest.raises(InputError, match=r"no region is called 'id=5'\n.*known: part=0, part=1$"):
+        build(recipe("box.vtu", frames=frames, interfaces=["bottom"]), tmp_path)
+
+
 def test_materials_must_cover_every_cell_once(tmp_path: Path) -> None:
     two_halves(tmp_path / "box.msh", binary=True)
     table = recipe("box.msh", materials={"left": STEEL})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import meshio
 import numpy as np
 import pytest
@@ -193,6 +195,28 @@ def test_without_gl_there_are_no_pictures_but_a_line_that_says_why(monkeypatch, 
     monkeypatch.setattr("pipeline.post.render.gl.works", lambda: False)
     assert pictures(xr.Dataset(), {}) == {}
     assert gl.REMEDY in capsys.readouterr().err
+
+
+@needs_gl
+def test_a_film_moves():
+    """Both the rod and the rigid bodies: a second picture of one scene shows what has moved since the first."""
+    from pipeline.post.render import film
+
+    run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
+    drawn = mechanism(run, {"rod1": synthetic.bundle()})
+    scene = film.plotter((200, 160))
+    actors = film._build(scene, drawn)
+    film._look(scene, drawn)
+    last = run.sizes["time"] // 2
+    seen = []
+    for body in (replace(drawn, rigid=(), balls=()), replace(drawn, flexible=(), balls=())):
+        moving = film.Actors(actors.rigid if body.rigid else (), (), actors.flexible if body.flexible else ())
+        for step in (0, last):
+            film._place(body, moving, step, glow=False)
+            seen.append(film.image(scene).astype(int))
+    scene.close()
+    assert np.abs(seen[1] - seen[0]).max() > 20  # the rod
+    assert np.abs(seen[3] - seen[2]).max() > 20  # everything else
 
 
 @needs_gl

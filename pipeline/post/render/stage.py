@@ -41,5 +41,6 @@ def shading(bundle: xr.Dataset) -> dict[str, Any]:
 
 
 def image(scene: pv.Plotter) -> np.ndarray:
-    """The picture as bytes, shape (height, width, 3)."""
+    """The picture as it is now, as bytes, shape (height, width, 3)."""
+    scene.render()  # a second screenshot would show the first one again
     return np.asarray(scene.screenshot(return_img=True))

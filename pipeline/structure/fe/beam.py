@@ -26,7 +26,7 @@ from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
 from pipeline.core.algebra import skew
 from pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
-from pipeline.structure.fe.model import rigid_motions
+from pipeline.structure.fe.model import rigid_motions, symmetric
 from pipeline.structure.fe.quadrature import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
@@ -216,6 +216,4 @@ def _lumped(mesh: xr.Dataset, size: int) -> sp.csr_array:
 
 
 def _in_vector_order(matrix: Any, to_fields: sp.csr_array) -> sp.csr_array:
-    result = to_fields.T @ sp.csr_array(matrix) @ to_fields
-    # quadrature sums in another order above and below the diagonal; exact symmetry is what eigensolvers expect
-    return sp.csr_array(0.5 * (result + result.T))
+    return symmetric(to_fields.T @ sp.csr_array(matrix) @ to_fields)

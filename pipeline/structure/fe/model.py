@@ -113,6 +113,11 @@ def rigid_motions(place: np.ndarray, component: np.ndarray, about: np.ndarray) -
     return motion[np.arange(len(place)), np.minimum(component, 6)]
 
 
+def symmetric(matrix: sp.csr_array) -> sp.csr_array:
+    """The symmetric part: rounding differs above and below the diagonal, and eigensolvers expect exact symmetry."""
+    return sp.csr_array(0.5 * (matrix + matrix.T))
+
+
 def rows(interfaces: tuple[Interface, ...], size: int) -> sp.csr_array:
     """Motions of several frames on top of each other, shape (6 frames, size)."""
     if not interfaces:

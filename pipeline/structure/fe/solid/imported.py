@@ -22,6 +22,8 @@ FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 BESIDES = ("vertex", "line", "line3", *FACES)
 #: what meshio keeps among the sets of cells of a Gmsh 4 file, but numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
+#: an integer array of cell data with more values than this numbers the cells and names no regions
+MOST_REGIONS = 1000
 REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
 
 
@@ -129,7 +131,8 @@ def _cell_groups(mesh: Any) -> list[tuple[str, list[np.ndarray]]]:
         values = [np.asarray(part) for part in data]
         if any(part.dtype.kind not in "iu" or part.ndim != 1 for part in values):
             continue
-        for value in np.unique(np.concatenate(values)):
+        different = np.unique(np.concatenate(values))
+        for value in different if len(different) <= MOST_REGIONS else ():
             chosen = [np.flatnonzero(part == value) for part in values]
             groups.append((f"{key}={value}", chosen))
             if key == "gmsh:physical":

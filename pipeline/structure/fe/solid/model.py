@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions, symmetric
 from pipeline.structure.fe.solid import elasticity, ties
 from pipeline.structure.fe.solid.elasticity import Solid
 from pipeline.structure.fe.solid.elements import ELEMENTS
@@ -43,8 +43,8 @@ def assemble(mesh: xr.Dataset) -> Model:
     recipe = mesh.attrs["interfaces"].split()
     ends = tuple(frame for name in recipe[:2] for frame in interfaces if frame.name == name)
     return Model(
-        stiffness=_symmetric(K),
-        mass=_symmetric(M),
+        stiffness=symmetric(K),
+        mass=symmetric(M),
         rigid=rigid_motions(unknowns.place, unknowns.component, unknowns.place.mean(axis=0)),
         place=unknowns.place,
         interfaces=interfaces,
@@ -159,8 +159,3 @@ def _cut(nodes: int) -> list[list[int]]:
     if nodes == 6:
         return [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
     return [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
-
-
-def _symmetric(matrix: sp.csr_array) -> sp.csr_array:
-    """Rounding differs above and below the diagonal; exact symmetry is what eigensolvers expect."""
-    return sp.csr_array(0.5 * (matrix + matrix.T))
