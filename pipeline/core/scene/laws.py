@@ -197,21 +197,33 @@ class Piecewise(Part):
         return self
 
 
+class Repeated(Part):
+    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one goes on."""
+
+    type: Literal["repeated"]
+    period: Annotated[Time, Field(gt=0)]
+    times: Annotated[int, Field(ge=1)]
+    start: Time = 0.0
+    law: Bare
+
+
 def _bare(law: Any) -> Any:
     """A bare value is a constant."""
     return law if not isinstance(law, (int, float, str)) else {"type": "constant", "value": law}
 
 
-Law = Annotated[Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise, Field(discriminator="type")]
+KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
+Law = Annotated[
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
+]
 Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
-Sum.model_rebuild()
-Section.model_rebuild()
-Piecewise.model_rebuild()
+for _composed in (Sum, Section, Piecewise, Repeated):
+    _composed.model_rebuild()
 
 
 def law_types(node: object) -> Iterator[str]:
     """Types of all laws anywhere in a part, those inside sums and sections included."""
-    if isinstance(node, (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise)):
+    if isinstance(node, KINDS):
         yield node.type
     if isinstance(node, Part):
         for name in type(node).model_fields:
