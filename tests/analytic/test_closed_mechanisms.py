@@ -23,8 +23,9 @@ def test_bennetts_linkage_keeps_its_relation_of_angles() -> None:
     # written without tangents, which pass infinity; loops are closed to 1e-12
     sides = np.sin(0.5 * first) * np.sin(0.5 * second), constant * np.cos(0.5 * first) * np.cos(0.5 * second)
     assert sides[0] == pytest.approx(sides[1], rel=0, abs=1e-10)
-    for one, opposite in ((first, third), (second, last)):
-        assert np.cos(one) == pytest.approx(np.cos(opposite), rel=0, abs=1e-10)
+    assert np.cos(first) == pytest.approx(np.cos(third), rel=0, abs=1e-10)
+    # the last one is counted from its start
+    assert np.cos(second - second[0]) == pytest.approx(np.cos(last), rel=0, abs=1e-10)
     assert np.ptp(first) > 1.0
     assert set(dataset.mobility.values) == {1}
     assert dataset.attrs["redundant_closure_rows"] == 3

@@ -61,6 +61,8 @@ HOSTILE: dict[str, tuple[str, ...]] = {
     BASE + "[joint.B]\nbetween = 5": ("[joint.B.type]",),
     BASE + "[load.f]\ntype = 'point-force'\nframe = 'crank.P'\nforce = 5": ("[load.f.force]", "expected a list"),
     BASE + "[solver]\nrtol = -1e-9": ("[solver.rtol]", "must be greater than"),
+    BASE + "[output]\ninterval = 1e-12": ("output.interval", "1e+12 rows"),
+    BASE + "[solver]\nevaluations = 99999999999999999999999": ("[solver.evaluations]", "less than or equal to"),
     BASE + "[output]\ninterval = 0": ("[output.interval]", "must be greater than 0"),
     "x = " + "[" * 3000 + "]" * 3000: ("too deeply",),
     "title = \n": ("is not TOML", "line 1"),
