@@ -207,15 +207,17 @@ class Repeated(Part):
     law: Bare
 
 
+KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
+Law = Annotated[
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
+]
+
+
 def _bare(law: Any) -> Any:
     """A bare value is a constant."""
     return law if not isinstance(law, (int, float, str)) else {"type": "constant", "value": law}
 
 
-KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
-Law = Annotated[
-    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
-]
 Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
 for _composed in (Sum, Section, Piecewise, Repeated):
     _composed.model_rebuild()
