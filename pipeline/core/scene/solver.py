@@ -25,7 +25,7 @@ class Stepping(Part):
 
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
     ledger_tolerance: Annotated[Number, Field(gt=0.0)] | None = None
-    evaluations: Annotated[int, Field(gt=0)] = 50_000_000
+    evaluations: Annotated[int, Field(gt=0, le=10**15)] = 50_000_000
     step: Annotated[Time, Field(gt=0.0)] | None = None
     events: Literal["located", "at step ends"] = "located"
 

@@ -21,6 +21,8 @@ from pipeline.dynamics.tables import AXES, OMEGA, VELOCITY
 #: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
+#: misses below this share of the speeds asked for are rounding
+RIGID = 1e-9
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
 
@@ -67,6 +69,7 @@ def _world(built: Tables, frame: str) -> Placement:
 def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
+    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
     Raises InputError when joints and drives do not allow the velocities.
     """
     scene, layout = built.system.scene, built.layout
@@ -75,7 +78,10 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
         for n, b in scene.body.items()
         if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
     }
-    if not wanted:
+    elastic = np.zeros(layout.nv, dtype=bool)
+    for link, first in layout.flex_c0.items():
+        elastic[first : first + layout.modes[link]] = True
+    if not wanted and not elastic.any():
         return y
     y = y.copy()
     nq, nv = layout.nq, layout.nv
@@ -95,9 +101,10 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
         columns.append(rates(moved) - base)
     matrix = np.array(columns).T.reshape(len(base), nv)
     target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
-    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
-    miss = float(np.max(np.abs(matrix @ speeds - target)))
-    if miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
+    speeds, miss = _least(matrix * ~elastic, target)
+    if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
+        speeds, miss = _least(matrix, target)
+    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
@@ -106,6 +113,12 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
         )
     y[nq : nq + nv] = speeds
     return y
+
+
+def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
+    """The least speeds that come nearest to the target, and by how much they miss it."""
+    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
+    return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))
 
 
 def _components(given: tuple[float, float, float] | None) -> list[float]:
@@ -122,7 +135,7 @@ def _twists(built: Tables, link_frames: np.ndarray, bodies: dict) -> np.ndarray:
         place = built.system.links[link].places[name]
         arm = R @ (place.p + place.R @ np.array(getattr(bodies[name], "com", (0.0, 0.0, 0.0))))
         found += [omega, v + np.cross(omega, arm)]
-    return np.concatenate(found).copy()
+    return np.concatenate([*found, np.zeros(0)])
 
 
 def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

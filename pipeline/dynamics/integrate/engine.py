@@ -119,7 +119,7 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     engine.select_first_pieces()
     y = initial.start_state(built)
     singular.select_rows(engine, y, engine.start)
-    y = project(engine, y)
+    y = _closed(engine, y)
     links, rows = built.packed.sizes["N_LINKS"], built.packed.sizes["N_CLOSURE_ROWS"]
 
     def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -132,6 +132,17 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, built.system.start_residual
+
+
+def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """`project` of a start that only the engine can close: with paths, or with flexible bodies."""
+    try:
+        return project(engine, y)
+    except SolverError as error:
+        paths = [name for name, drive in engine.built.system.scene.drive.items() if hasattr(drive, "frame")]
+        place = f"[drive.{paths[0]}]" if paths else "[joint]"
+        what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
+        raise InputError(place, f"the mechanism cannot be assembled: {error}", what) from None
 
 
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
