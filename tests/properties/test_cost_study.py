@@ -254,6 +254,16 @@ def test_the_page_says_what_each_digit_costs():
     assert "![Error of a/scene](x/y.png)" in text
 
 
+def test_the_page_says_which_quantities_can_be_had_when_not_all_can():
+    _, points, runs = study(uncertainty=1e-12)
+    finest = run(1e-11)
+    finest["event_time"] = finest["event_time"] + 1e-7
+    points.append(Point("d3", "tolerance", {"adaptive_integrator": "dop853", "rtol": 1e-12}))
+    found = assemble(points, runs | {"d3": finest}, [POSITION, TIMES])
+    text = page.markdown((page.Studied("a/scene", found, (), {}),), "p.md")
+    assert "1e-09 can be had for slider.position, not for pin.impact_times." in text
+
+
 def test_the_page_says_how_far_it_holds_and_what_to_refine():
     found, *_ = study(horizon=0.5)
     shares = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
