@@ -117,6 +117,23 @@ def test_faster_growth_shortens_the_horizon():
     assert len(set(ends)) == 4
 
 
+def test_ensemble_is_told_by_mean_spread_and_quantiles():
+    """Evenly spaced members: the quantile q of them lies at the share q of their range."""
+    run = synthetic.run("sps4/csj", clearance=True)
+    members = synthetic.ensemble(run, members=5, growth=60.0)
+    post, q = derive(run, members), np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    np.testing.assert_array_equal(post["quantile"].values, q)
+    velocity = members.velocity.values
+    known = velocity[0] + q[:, None, None, None] * (velocity[-1] - velocity[0])
+    np.testing.assert_allclose(post.velocity_quantile.values, known, atol=1e-12)  # rounding of interpolation
+    np.testing.assert_allclose(post.velocity_mean.values, velocity[2], atol=1e-12)
+    # counts 21 to 25, shares 0.02 to 4.02
+    assert float(post.impact_count_mean.sel(contact="A1")) == pytest.approx(23.0, rel=1e-14)
+    assert float(post.impact_count_std.sel(contact="A1")) == pytest.approx(np.sqrt(2.5), rel=1e-14)
+    assert post.contact_time_share_quantile.sel(contact="A1").values == pytest.approx(0.02 + 4.0 * q, rel=1e-12)
+    assert post.peak_force_quantile.dims == ("quantile", "contact")
+
+
 def test_ensemble_deviation_of_one_member_is_that_of_its_run():
     run, ideal = synthetic.run("sps4/csj", clearance=True, noise=1e-4), synthetic.run()
     same = synthetic.ensemble(run, members=3, growth=0.0)
