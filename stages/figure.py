@@ -22,7 +22,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``index.json``: for each name what it needs, what it may use, and whether it renders shapes.
+    """``index.json``: for each name what it needs, and whether it renders shapes.
 
     An artifact of its own, because asking the modules themselves takes the import of matplotlib.
     """
@@ -31,7 +31,6 @@ def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress:
         figure = import_module(f"{FIGURES}.{name}")
         found[name] = {
             "needs": list(figure.NEEDS),
-            "optional": list(getattr(figure, "OPTIONAL", ())),
             "gl": bool(getattr(figure, "USES_GL", False)),
         }
     return {"index.json": json.dumps(found, indent=1).encode()}

@@ -123,14 +123,13 @@ def scene_file(name: str) -> Path:
 
 
 def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
-    there = [ref for ref in entry["optional"] if scene_file(ref.partition(":")[0]).is_file()]
     return Task(
         stage="figures",
         scene="report",
         part=name,
         run="stages.figure:run",
         params={"figure": name} | ({"gl": s6_render.gl_state()} if entry["gl"] else {}),
-        inputs={reference: scenes.artifact(reference) for reference in [*entry["needs"], *there]},
+        inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
         modules=(f"{FIGURES}.{name}",),
         folder="tables" if name.startswith("table") else "figures",
     )

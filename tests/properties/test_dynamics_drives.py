@@ -26,6 +26,8 @@ WAVES = {"type": "harmonic", "amplitude": [0.3, -0.1], "frequency": [2.0, "1.5 H
 POINTS: dict[str, Any] = {"time": [0.0, 0.1, 0.3, 0.35, 0.6, 0.8, 1.0], "value": [0.0, 0.2, 0.1, 0.4, -0.3, 0.0, 0.0]}
 TABLE = {"file": "moves.csv", "time": {"column": "t", "unit": "s"}, "value": {"column": "x", "unit": "mm"}}
 RAMP = {"type": "polynomial", "coefficients": [0.1, -0.2, 0.5, 0.0, 0.0, 0.3, 0.0, -0.7], "origin": 0.2}
+PEAK = {"type": "step", "start": [0.0, 0.2], "end": [0.2, 0.4], "change": [0.06, -0.06]}
+CYCLE = {"time": [0.1, 0.2, 0.35, 0.5, 0.6], "value": [0.0, 0.02, 0.05, 0.01, 0.0], "ends": "periodic"}
 #: drive law -> instances; overlapping steps, gaps and a step of no change among them
 TABLES: dict[str, tuple[Any, ...]] = {
     "constant": ({"type": "constant", "value": 0.012}, {"type": "constant"}),
@@ -52,6 +54,10 @@ TABLES: dict[str, tuple[Any, ...]] = {
                 {"start": 0.5, "law": {"type": "polynomial", "coefficients": [0.75, 1.5, 4.0], "origin": 0.5}},
             ],
         },
+    ),
+    "repeated": (
+        {"type": "repeated", "period": 0.5, "times": 3, "law": PEAK},
+        {"type": "repeated", "period": 0.5, "times": 2, "start": 0.1, "law": {"type": "spline", **CYCLE}},
     ),
 }
 LAWS = {name: tuple(TypeAdapter(Law).validate_python(law) for law in tables) for name, tables in TABLES.items()}
@@ -157,6 +163,25 @@ def test_a_sum_is_the_sum_and_sections_follow_each_other() -> None:
     assert value(sections, -0.5) == pytest.approx(0.5 * np.sin(-1.5), abs=1e-15)
     assert value(sections, 0.25) == pytest.approx(0.375, abs=1e-15)
     assert value(sections, 0.7) == pytest.approx(0.75 + 1.5 * 0.2 + 4.0 * 0.04, abs=1e-15)
+
+
+def test_a_repeated_law_starts_over_and_goes_on_after_its_last_period() -> None:
+    peaks, cycles = LAWS["repeated"]
+    for t in (0.01, 0.17, 0.3, 0.49):
+        for order in range(3):
+            first = value(peaks, t, order)
+            # times of 1 s in rounding, times rates of 1e3 in the second derivative
+            assert [value(peaks, t + k * 0.5, order) for k in (1, 2)] == pytest.approx([first] * 2, abs=1e-12)
+    assert value(peaks, 1.8) == value(peaks, -0.1) == 0.0
+    assert value(cycles, 0.3) == pytest.approx(value(cycles, 0.8), abs=1e-15)
+    assert pieces(cycles).span == (0.1, 1.1)
+    assert pieces(peaks).starts.tolist() == pytest.approx([-1.0, 0.0, 0.2, 0.4, 0.5, 0.7, 0.9, 1.0, 1.2, 1.4])
+
+
+def test_a_repeated_law_must_cover_its_period() -> None:
+    short = {"type": "repeated", "period": 0.8, "times": 2, "start": 0.1, "law": {"type": "spline", **CYCLE}}
+    with pytest.raises(ValueError, match=r"known between 0.1 and 0.6 s only, not over its period from 0.1 to 0.9 s"):
+        pieces(TypeAdapter(Law).validate_python(short))
 
 
 def test_a_constant_drive_holds_its_value() -> None:

@@ -177,15 +177,27 @@ class Piecewise(Part):
         return self
 
 
-Law = Annotated[Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise, Field(discriminator="type")]
-Sum.model_rebuild()
-Section.model_rebuild()
-Piecewise.model_rebuild()
+class Repeated(Part):
+    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one goes on."""
+
+    type: Literal["repeated"]
+    period: Annotated[Time, Field(gt=0)]
+    times: Annotated[int, Field(ge=1)]
+    start: Time = 0.0
+    law: Law
+
+
+KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
+Law = Annotated[
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
+]
+for _composed in (Sum, Section, Piecewise, Repeated):
+    _composed.model_rebuild()
 
 
 def law_types(node: object) -> Iterator[str]:
     """Types of all laws anywhere in a part, those inside sums and sections included."""
-    if isinstance(node, (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise)):
+    if isinstance(node, KINDS):
         yield node.type
     if isinstance(node, Part):
         for name in type(node).model_fields:

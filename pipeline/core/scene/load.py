@@ -21,7 +21,7 @@ TYPES = (
     *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"),
     *("clearance-spherical", "clearance-revolute", "modified-coulomb", "ambrosio", "lugre"),
     *("joint-drive", "path-drive"),
-    *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise"),
+    *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise", "repeated"),
     *("gravity", "point-force", "point-torque", "spring-damper", "joint-force", "joint-spring", "joint-friction"),
 )
 SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")

@@ -14,4 +14,5 @@ NAMES = {
     "table": "table:pieces",
     "sum": "sum:pieces",
     "piecewise": "piecewise:pieces",
+    "repeated": "repeated:pieces",
 }

@@ -61,6 +61,10 @@ class Engine:
         first = self.n[ACTIVE]
         self.n[first : first + self.built.packed.sizes["N_LAWS"]] = pieces_at(self.built, inside)
 
+    def select_first_pieces(self) -> None:
+        """Put the pieces in force that hold after the start; an earlier run leaves those of its end."""
+        self.select_pieces(0.5 * (self.breaks[0] + self.breaks[1]))
+
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
         self.kept[:] = rows
@@ -119,7 +123,7 @@ def prepare(built: Tables, progress: Progress) -> Engine:
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     """State at the start with its loops closed, and the joints' largest residual as the scene gives them [m]."""
     built = engine.built
-    engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
+    engine.select_first_pieces()
     y = initial.start_state(built)
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:

@@ -117,6 +117,7 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     built, n = engine.built, engine.n
     scene, contacts = built.system.scene, built.packed.sizes["N_CONTACTS"]
     control = engine.view("CONTROL", state.N_CONTROLS)
+    engine.select_first_pieces()
     control[:] = 0.0
     control[state.TIME], control[state.SPAN] = engine.start, engine.end - engine.start
     control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length

@@ -2,7 +2,6 @@
 
 ``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``; a literal, so that the
 runner can read it without importing the plotting libraries.
-``OPTIONAL``: further ones that it uses when they are there.
 ``USES_GL``: true where the result also depends on the machine's GL libraries.
 ``make(data)``: artifacts by reference -> file contents by file name.
 """
@@ -27,6 +26,7 @@ NAMES = {
     "fig15": "fig15:make",
     "fig16": "fig16:make",
     "fig17": "fig17:make",
+    "sections": "sections:make",
     "table04": "table04:make",
     "table05": "table05:make",
     "table07": "table07:make",
@@ -39,11 +39,6 @@ NAMES = {
 def needs(name: str) -> tuple[str, ...]:
     """References of the artifacts that `name` cannot be made without."""
     return tuple(import_module(_module(name)).NEEDS)
-
-
-def optional(name: str) -> tuple[str, ...]:
-    """References of the artifacts that `name` uses when they are there."""
-    return tuple(getattr(import_module(_module(name)), "OPTIONAL", ()))
 
 
 def title(name: str) -> str:

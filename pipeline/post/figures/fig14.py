@@ -19,7 +19,6 @@ NEEDS = (
     "sps4/far_csj_cb:run",
     "sps4/far_csj_cb:post",
 )
-OPTIONAL = ("sps4/repeated/csj:run", "sps4/repeated/csj:post")
 
 PLANE = Plane(lambda m: m.angle, lambda m: m.velocity, "angle about y0 (rad)", "z velocity (mm/s)")
 

@@ -1,4 +1,4 @@
-"""Figures 14-16: the phase plots that the paper calls Poincare maps, and true sections beside them."""
+"""Figures 14-16: the phase plots that the paper calls Poincare maps, and the states at impacts below them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,6 @@ from matplotlib.ticker import FuncFormatter
 from pipeline.post import poincare
 from pipeline.post.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
 from pipeline.post.plotting import style
-
-#: scenes whose drive repeats the stroke, and their period [s]; used when their artifacts are there
-REPEATED = {"sps4/repeated/csj": 0.18}
 
 Values = Callable[[Motion], np.ndarray]
 
@@ -37,11 +34,7 @@ class Plane:
 
 
 def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
-    """First row: phase plots, one per model; second row: the same states at the impacts only.
-
-    Where `data` holds runs with a repeated stroke, the first panel of the second row shows their
-    states once per period.
-    """
+    """First row: phase plots, one per model; second row: the same states at the impacts only."""
     models = (IDEAL, CSJ, *FAR_CSJ)
     motions = [motion(model, data) for model in models]
     figure, axes = style.grid(2, len(models), (13.2, 5.9), sharex=True, sharey="row")
@@ -50,7 +43,7 @@ def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
         axes[0, column].set_title(_short(model), fontsize=8.4)
         at_impacts(axes[1, column], plane, run, motions[0], data[f"{model.scene}:post"])
         axes[1, column].set_xlabel(plane.x_label)
-    stroboscopic(axes[1, 0], plane, data)
+    _say(axes[1, 0], "no impacts")
     if plane.spikes:
         reach = 1.3 * float(np.abs(plane.y(motions[0])).max())
         for panel in axes.flat:
@@ -80,17 +73,6 @@ def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion, post: xr.Da
     axes.scatter(x[inside], y[inside], s=11, color=run.model.color, zorder=3, lw=0)
     axes.scatter(x[~inside], y[~inside], s=11, facecolors="none", edgecolors=run.model.color, lw=0.7, zorder=3)
     _say(axes, f"at {when.size} impacts")
-
-
-def stroboscopic(axes: Axes, plane: Plane, data: dict[str, xr.Dataset]) -> None:
-    """States once per period of a repeated stroke, or the reason why there are none."""
-    here = {scene: period for scene, period in REPEATED.items() if f"{scene}:post" in data}
-    _say(axes, "once per stroke" if here else "no impacts")
-    for scene, period in here.items():
-        run = motion(Model(scene, f"{scene}, repeated", "#CC79A7"), data)
-        times = poincare.strobe_times(run.time[0], run.time[-1], period, transient=5, phase=0.5 * period)
-        x, y = poincare.at_times(run.time, times, plane.x(run), plane.y(run))
-        axes.scatter(x, y, s=9, color="#CC79A7", lw=0, zorder=4)
 
 
 def _say(axes: Axes, text: str) -> None:

@@ -1,0 +1,35 @@
+"""A law that starts over, period after period: cycles of a cam, strokes of a press."""
+
+from __future__ import annotations
+
+from math import inf
+
+from pipeline.core.scene.laws import Repeated
+from pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
+
+
+def pieces(law: Repeated, dimension: str) -> Pieces:
+    """The inner law's first period, set down `times` times; the last one goes on as the inner law does.
+
+    ValueError when the inner law does not cover its first period.
+    """
+    inner, start, end = pieces_of(law.law, dimension), law.start, law.start + law.period
+    # a table's last time may be a rounding short of the period that is meant
+    if inner.span[0] > start + 1e-9 * law.period or inner.span[1] < end - 1e-9 * law.period:
+        raise ValueError(
+            f"the repeated law is known between {inner.span[0]} and {inner.span[1]} s only, not over its period from "
+            f"{start} to {end} s"
+        )
+    before = [p for p in inner.pieces if p.start < start]
+    after = [p for p in inner.pieces if p.start > start]
+    first = [inner.at(start).moved(start), *(p for p in after if p.start < end - 1e-9 * law.period)]
+    last = [first[0], *after]
+    made = [*before]
+    for k in range(law.times):
+        made += [_later(p, k * law.period) for p in (last if k == law.times - 1 else first)]
+    shift = (law.times - 1) * law.period
+    return Pieces(tuple(made), (inner.span[0], inner.span[1] + shift if inner.span[1] < inf else inf))
+
+
+def _later(p: Piece, delay: float) -> Piece:
+    return Piece(p.start + delay, p.coefficients, p.terms)
