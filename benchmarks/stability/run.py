@@ -1,147 +1,88 @@
-"""Every case once: did it finish, how well do ledger and closures hold, what did it cost, what was said."""
+"""One case, from its parameters to its outcome."""
 
 from __future__ import annotations
 
+import json
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from benchmarks.stability.mechanism import Parameters, scene
+from benchmarks.stability.outcome import REFUSED, WRONG, Outcome, judge
+from pipeline import dynamics
+from pipeline.core import quantities
+from pipeline.core.errors import FlexclearError, SolverError
+from pipeline.dynamics.run import engine_of
+from stages import s1_mesh, s2_modes, s3_bundle
 
-from benchmarks.stability.cases import Case
+if TYPE_CHECKING:
+    import xarray as xr
 
-#: how much tighter the run is that a finished one is compared with, and cases so dear are not run twice
+    from pipeline.core.scene.schema import Scene
+
+#: how much tighter the run is that a finished one is compared with, and runs so dear are not made twice
 TIGHTER, TWICE = 1e-2, 600_000
-#: verdicts
-FINISHED, REFUSED, WRONG = "finished", "refused", "wrong"
-#: a finished run is wrong when its energy is off by more than this share of the energy that passed through it,
-#: a loop is open by more than this [m], or friction feeds energy in
-LEDGER, CLOSURE = 1e-4, 1e-9
+TIGHTEST = 1e-14
 
 
-@dataclass(frozen=True)
-class Result:
-    """What became of a case.
+def run_case(parameters: Parameters, compiled: Callable[[], None] = lambda: None) -> Outcome:
+    """What becomes of a case.
 
-    deviation: of the platform's position from that of a tighter run, up to the horizon, over the clearance.
+    Refusals are outcomes; anything else that goes wrong is a fault of the program and told as such.
+    compiled: called when the kernels are there, so that a limit of time may begin.
     """
-
-    sweep: str
-    verdict: str
-    reason: str
-    method: str
-    ledger: float
-    closure: float
-    deviation: float
-    horizon_share: float
-    impacts: int
-    evaluations: int
-    seconds: float
-
-    @classmethod
-    def none(cls, sweep: str, verdict: str, reason: str, seconds: float) -> Result:
-        """A case without a run."""
-        nothing = float("nan")
-        return cls(sweep, verdict, reason, "", nothing, nothing, nothing, nothing, 0, 0, seconds)
-
-
-def run_all(cases: list[Case], jobs: int) -> Iterator[tuple[Case, Result]]:
-    """Results as they come, in the order of the cases, over `jobs` processes."""
-    with ProcessPoolExecutor(jobs) as pool:
-        yield from zip(cases, pool.map(run_case, cases), strict=True)
-
-
-def run_case(case: Case) -> Result:
-    """One case; refusals are results, anything else that goes wrong is a fault of the program and is told as such."""
-    from benchmarks.stability.mechanism import scene
-    from pipeline.core.errors import SolverError
-
-    begun = time.perf_counter()
+    begun = time.process_time()
     try:
-        run = _simulate(scene(case.parameters))
+        described = scene(parameters)
+        reduced = bundles(described)
+        engine_of(described, reduced, _quiet)
+        compiled()
+        begun = time.process_time()
+        run = dynamics.simulate(described, reduced, _quiet)
+        seconds = time.process_time() - begun
+        return judge(run, _deviation(parameters, described, run), seconds)
     except SolverError as error:
-        return Result.none(case.sweep, REFUSED, str(error), time.perf_counter() - begun)
+        return Outcome(REFUSED, str(error), seconds=time.process_time() - begun)
     except Exception as error:  # the atlas reports faults, it does not stop at them
-        return Result.none(case.sweep, WRONG, f"{type(error).__name__}: {error}", time.perf_counter() - begun)
-    seconds = time.perf_counter() - begun
-    return _result(case, run, seconds)
+        return Outcome(WRONG, f"{type(error).__name__}: {error}", seconds=time.process_time() - begun)
 
 
-def _simulate(scene: Any) -> Any:
-    from pipeline import dynamics
-
-    return dynamics.simulate(scene, _bundles(scene), lambda share, text: None)
-
-
-def _bundles(scene: Any) -> dict[str, Any]:
-    from pipeline.core.scene.load import read_toml
-    from pipeline.structure.fe import mesh
-    from pipeline.structure.modes import bundle, solve
-
-    found = {}
-    for name, body in scene.flexible().items():
-        grid = mesh.build(read_toml(Path(body.mesh)))
-        found[name] = bundle.build(grid, solve(grid, body.modes.reference, body.modes.count, body.modes.interfaces))
-    return found
+def bundles(described: Scene) -> dict[str, xr.Dataset]:
+    """The reduced flexible bodies of a scene, through stages 1 to 3."""
+    return {name: _bundle(body.mesh, *_asked(described, name)) for name, body in described.flexible().items()}
 
 
-def _result(case: Case, run: Any, seconds: float) -> Result:
-    energy = max(
-        float(np.abs(run[name]).max()) for name in ("kinetic", "potential", "elastic", "dissipated", "drive_work")
-    )
-    ledger = float(np.abs(run["energy_error"]).max()) / energy
-    closure = float(run["constraint_error"].max())
-    end, horizon = float(run["time"][-1]), float(run["horizon"])
-    deviation = _deviation(case, run)
-    return Result(
-        sweep=case.sweep,
-        verdict=WRONG if (reason := _fault(run, ledger, closure)) else FINISHED,
-        reason=reason,
-        method=str(run.attrs.get("method", "dop853")),
-        ledger=ledger,
-        closure=closure,
-        deviation=deviation,
-        horizon_share=horizon / end,
-        impacts=int((run["event_kind"] == 1).sum()),
-        evaluations=int(run.attrs["evaluations"]),
-        seconds=seconds,
-    )
+def _asked(described: Scene, body: str) -> tuple[str, str]:
+    """What stages 2 and 3 are told of a body, as text that a cache can compare."""
+    return json.dumps(s2_modes.params(described.flexible()[body])), json.dumps(s3_bundle.params(described, body))
 
 
-def _fault(run: Any, ledger: float, closure: float) -> str:
-    """What is wrong with a finished run, in words; empty when nothing is."""
-    if not all(np.isfinite(run[name]).all() for name in run.data_vars if not str(name).startswith("event_")):
-        return "values that are not finite"
-    if not ledger <= LEDGER:
-        return f"energy off by {ledger:.1e} of the largest energy"
-    if not closure <= CLOSURE:
-        return f"a loop open by {closure:.1e} m"
-    if "contact_friction_power" in run and float(run["contact_friction_power"].max()) > 0.0:
-        return "friction feeds energy in"
-    return ""
+@cache
+def _bundle(recipe: str, modes: str, bundle: str) -> xr.Dataset:
+    mesh = s1_mesh.run(s1_mesh.params(Path(recipe)), {}, _quiet)["nc"]
+    found = {"mesh": mesh, "modes": s2_modes.run(json.loads(modes), {"mesh": mesh}, _quiet)["nc"]}
+    made: Any = s3_bundle.run(json.loads(bundle), found, _quiet)["nc"]
+    return made
 
 
-def _deviation(case: Case, run: Any) -> float:
-    """Distance of the platform from that of a run at tighter tolerance, up to the horizon, over the clearance."""
-    from benchmarks.stability.mechanism import scene
-    from pipeline.core import quantities
-    from pipeline.core.errors import FlexclearError
+def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> float:
+    """Largest difference of the platform's velocity from that of a tighter run, up to the horizon, over its largest.
 
+    Not a number where the run is too dear to be made twice, or the tighter one cannot be had.
+    """
     if int(run.attrs["evaluations"]) > TWICE:
         return float("nan")
-    given = scene(case.parameters)
+    tight_scene = scene(parameters, max(TIGHTEST, described.solver.rtol * TIGHTER))
     try:
-        tight = _simulate(scene(case.parameters, given.solver.rtol * TIGHTER))
+        tight = dynamics.simulate(tight_scene, bundles(tight_scene), _quiet)
     except FlexclearError:
         return float("nan")
-    position = quantities.parse("platform.position", given.owners())
+    velocity = quantities.parse("platform.velocity", described.owners())
     until = min(float(run["horizon"]), float(tight["horizon"]))
-    return quantities.error(run, tight, position, until) / case.parameters.clearance
+    return quantities.error(run, tight, velocity, until) / quantities.scale(run, velocity)
 
 
-def row(case: Case, result: Result) -> dict[str, Any]:
-    """Parameters and result in one flat table row."""
-    return {"sweep": case.sweep, **asdict(case.parameters), **{k: v for k, v in asdict(result).items() if k != "sweep"}}
+def _quiet(share: float | None, text: str) -> None:
+    """Nobody watches."""

@@ -47,11 +47,11 @@ class Monitor:
 
     def begin(self, scene: str, label: str) -> str:
         """A task starts; returns the name to report under, which no other running task has."""
-        name = wanted = f"{scene}: {label}"
+        plain = name = f"{scene}: {label}"
         others = 1
-        while name in self.jobs:  # the same task of one scene in two runs
+        while name in self.jobs:  # an edited copy of a scene has tasks of the same label
             others += 1
-            name = f"{wanted} ({others})"
+            name = f"{plain} ({others})"
         self.jobs[name] = Job(name, self.clock(), said=self.clock())
         self._show(f"{self._count()} {name}")
         return name

@@ -1,0 +1,161 @@
+"""The figures of the atlas."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from benchmarks.stability.cases import RANGES
+from benchmarks.stability.outcome import FINISHED, LEDGER, REFUSED, WRONG, Outcome
+from pipeline.post.plotting.style import SOFT, plt, style
+
+if TYPE_CHECKING:
+    from benchmarks.stability.page import Row
+
+BLUE, MARKS = "#0072B2", {REFUSED: ("D", "#E69F00"), WRONG: ("X", "#D55E00")}
+LOGARITHMIC = {"clearance", "stiffness", "speed", "mass", "strokes", "nearness"}
+LABELS = {
+    "clearance": "clearance [m]",
+    "stiffness": "contact stiffness / the paper's",
+    "restitution": "restitution asked for",
+    "friction": "static friction coefficient",
+    "speed": "speed / the paper's",
+    "mass": "platform mass / the paper's",
+    "modes": "elastic coordinates of rod 1",
+    "damping": "modal damping ratio (13 modes)",
+    "nearness": "distance to the singular geometry",
+    "joints": "clearance joints",
+    "strokes": "strokes",
+}
+#: planes in which the random points are shown
+PLANES = (("clearance", "stiffness"), ("speed", "mass"), ("restitution", "friction"), ("nearness", "joints"))
+#: symbols by the integrator that made the run
+SYMBOLS = {"dop853": ("o", "as asked for"), "radau": ("s", "an implicit method took over")}
+
+
+def write(rows: Sequence[Row], folder: Path) -> None:
+    """All figures, as PNG files in `folder`."""
+    with style():
+        _sweeps(rows, lambda o: o.evaluations, "evaluations", folder / "sweeps.png")
+        _sweeps(rows, lambda o: o.ledger, "energy error", folder / "ledger.png", limit=LEDGER)
+        _sweeps(rows, lambda o: o.horizon_share, "share before the horizon", folder / "horizon.png", logarithmic=False)
+        _random([row for row in rows if row.case.sweep == "random"], folder / "random.png")
+
+
+def _axis(row: Row, name: str) -> float:
+    """Where a row stands on the axis of a parameter."""
+    value = float(getattr(row.case.parameters, name))
+    return 1.0 - value if name == "nearness" else value
+
+
+def _sweeps(
+    rows: Sequence[Row],
+    height: Callable[[Outcome], float],
+    label: str,
+    path: Path,
+    *,
+    logarithmic: bool = True,
+    limit: float | None = None,
+) -> None:
+    """A panel per parameter, all with one vertical axis."""
+    columns = 4
+    lines = -(-len(RANGES) // columns)
+    figure, axes = plt.subplots(lines, columns, figsize=(12.5, 2.5 * lines), sharey=True, squeeze=False)
+    finished = [height(r.outcome) for r in rows if r.outcome.verdict == FINISHED and r.case.sweep in RANGES]
+    floor = 0.5 * min(finished, default=1.0) if logarithmic else 0.0
+    for k, (ax, sweep) in enumerate(zip(axes.ravel(), RANGES, strict=False)):
+        if logarithmic:
+            ax.set_yscale("log")
+        _panel(ax, [row for row in rows if row.case.sweep == sweep], sweep, height, floor)
+        if limit is not None:
+            ax.axhline(limit, color=MARKS[WRONG][1], linewidth=0.8, linestyle=":")
+        if k % columns == 0:
+            ax.set_ylabel(label)
+    for ax in axes.ravel()[len(RANGES) :]:
+        ax.set_visible(False)
+    _save(figure, path)
+
+
+def _panel(ax: Any, rows: Sequence[Row], sweep: str, height: Callable[[Outcome], float], floor: float) -> None:
+    if sweep in LOGARITHMIC:
+        ax.set_xscale("log")
+    done = [row for row in rows if row.outcome.verdict == FINISHED]
+    places, heights = [_axis(row, sweep) for row in done], [height(row.outcome) for row in done]
+    ax.plot(places, heights, "o-", color=BLUE, markersize=4, linewidth=1)
+    for verdict, (mark, color) in MARKS.items():
+        lost = [_axis(row, sweep) for row in rows if row.outcome.verdict == verdict]
+        if lost:
+            ax.plot(lost, [floor] * len(lost), mark, color=color, markersize=7, clip_on=False)
+    switched = [k for k, row in enumerate(done) if row.outcome.switched]
+    if switched:
+        ring = {"color": "none", "markeredgecolor": SOFT, "markersize": 9}
+        ax.plot([places[k] for k in switched], [heights[k] for k in switched], "o", **ring)
+    if sweep == "nearness":
+        ax.invert_xaxis()
+    ax.set_title(LABELS[sweep], fontsize=8.5)
+
+
+def _random(rows: Sequence[Row], path: Path) -> None:
+    """The random points in planes of two parameters each, coloured by their energy errors."""
+    figure, axes = plt.subplots(1, len(PLANES), figsize=(12.5, 3.6))
+    shown: Any = None
+    for ax, (x, y) in zip(axes, PLANES, strict=True):
+        for method, (symbol, _) in SYMBOLS.items():
+            done = [row for row in rows if row.outcome.verdict == FINISHED and row.outcome.method == method]
+            shown = ax.scatter(
+                [_axis(row, x) for row in done],
+                [_shaken(row, y) for row in done],
+                c=[np.log10(max(row.outcome.ledger, 1e-16)) for row in done],
+                marker=symbol,
+                cmap="viridis",
+                vmin=-14,
+                vmax=np.log10(LEDGER),
+                s=22,
+                linewidths=0,
+            )
+        for verdict, (mark, color) in MARKS.items():
+            lost = [row for row in rows if row.outcome.verdict == verdict]
+            ax.scatter([_axis(r, x) for r in lost], [_shaken(r, y) for r in lost], marker=mark, color=color, s=42)
+        _name_axes(ax, x, y)
+    bar = figure.colorbar(shown, ax=axes, shrink=0.9, label="energy error")
+    ticks = [-14.0, -12.0, -10.0, -8.0, -6.0, -4.0]
+    bar.set_ticks(ticks, labels=[f"$10^{{{t:.0f}}}$" for t in ticks])
+    _legend(figure)
+    _save(figure, path)
+
+
+def _shaken(row: Row, name: str) -> float:
+    """Whole numbers spread a little, so that points do not hide each other; the same for the same case."""
+    value = _axis(row, name)
+    return value + 0.6 * (row.case.parameters.restitution - 0.5) if name == "joints" else value
+
+
+def _name_axes(ax: Any, x: str, y: str) -> None:
+    ax.set_xlabel(LABELS[x])
+    ax.set_title(LABELS[y], fontsize=8.5)
+    if x in LOGARITHMIC:
+        ax.set_xscale("log")
+    if y in LOGARITHMIC:
+        ax.set_yscale("log")
+    if x == "nearness":
+        ax.invert_xaxis()
+
+
+def _legend(figure: Any) -> None:
+    """Symbols of methods and verdicts."""
+    entries = [("o", SOFT, text) if s == "o" else (s, SOFT, text) for s, text in SYMBOLS.values()]
+    entries += [(mark, color, verdict) for verdict, (mark, color) in MARKS.items()]
+    handles = [
+        plt.Line2D([], [], marker=mark, color=color, linestyle="", markersize=6, label=text)
+        for mark, color, text in entries
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+def _save(figure: Any, path: Path) -> None:
+    # without the name of the version that drew it, equal rows give equal bytes
+    figure.savefig(path, metadata={"Software": None})
+    plt.close(figure)
