@@ -76,23 +76,6 @@ def test_a_terminal_keeps_one_line_with_everything_that_runs():
     assert screen.getvalue().endswith("\r\033[K")
 
 
-def test_two_tasks_of_one_name_are_told_apart():
-    """The same scene may stand twice in what is asked for, under other settings."""
-    monitor, screen, clock = watched(terminal=False)
-    first, second = monitor.begin("a", "simulate"), monitor.begin("a", "simulate")
-    clock.now = 20.0
-    monitor.update(second, 0.5, "")
-    monitor.finish(first, failed=False)
-    monitor.update(second, 0.75, "")
-    monitor.finish(second, failed=True)
-    assert screen.getvalue().splitlines()[1:] == [
-        "flexclear: [0/2] a: simulate (2)",
-        "flexclear: [0/2] a: simulate (2)  50%",
-        "flexclear: [1/2] a: simulate done after 20.0 s",
-        "flexclear: [2/2] a: simulate (2) failed after 20.0 s",
-    ]
-
-
 @pytest.mark.parametrize(
     "seconds, text", [(4.24, "4.2 s"), (190.0, "3 min 10 s"), (59.97, "1 min 0 s"), (119.8, "2 min 0 s")]
 )
