@@ -21,6 +21,8 @@ from pipeline.core.registry import suggestion
 SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
+#: a run is believed point by point until velocities of neighbouring runs differ by this share of the largest one
+PARTED = 1e-3
 
 
 @dataclass(frozen=True, slots=True)

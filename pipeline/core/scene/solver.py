@@ -62,15 +62,9 @@ class GeneralizedAlpha(Stepping):
 
 
 class Radau(Stepping):
-    """Implicit Runge-Kutta method of order 5 for stiff scenes, with chosen steps."""
+    """Implicit Runge-Kutta method of order 5 for stiff scenes."""
 
     integrator: Literal["radau"]
-
-    @model_validator(mode="after")
-    def _chooses_steps(self) -> Radau:
-        if self.step is not None:
-            raise ValueError("radau chooses its steps by rtol: remove step, or take generalized-alpha")
-        return self
 
 
 #: integrator -> tag of its model; tags stand in angles because error messages leave those out

@@ -87,11 +87,11 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
     nq, nv = layout.nq, layout.nv
     y[nq : nq + nv] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told = ~np.isnan(given)
+    told, arms = ~np.isnan(given), _arms(built, wanted)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
-        return np.concatenate([_twists(built, frames, wanted)[told], opening])
+        return np.concatenate([_twists(frames, *arms)[told], opening])
 
     base = rates(y)
     columns = []
@@ -125,17 +125,21 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
     return [np.nan] * 3 if given is None else list(given)
 
 
-def _twists(built: Tables, link_frames: np.ndarray, bodies: dict) -> np.ndarray:
+def _arms(built: Tables, bodies: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Number of each body's link, (n,), and its centre of mass in the link's frame, (n, 3)."""
+    links = [built.system.link_of[name] for name in bodies]
+    places = [built.system.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
+    coms = [np.array(getattr(body, "com", (0.0, 0.0, 0.0))) for body in bodies.values()]
+    arms = [place.p + place.R @ com for place, com in zip(places, coms, strict=True)]
+    return np.array(links, dtype=int), np.array(arms).reshape(len(links), 3)
+
+
+def _twists(link_frames: np.ndarray, links: np.ndarray, arms: np.ndarray) -> np.ndarray:
     """Angular velocity and velocity of the centre of mass of each body, flattened."""
-    found = []
-    for name in bodies:
-        link = built.system.link_of[name]
-        frame = link_frames[link]
-        R, omega, v = frame[AXES : AXES + 9].reshape(3, 3), frame[OMEGA : OMEGA + 3], frame[VELOCITY : VELOCITY + 3]
-        place = built.system.links[link].places[name]
-        arm = R @ (place.p + place.R @ np.array(getattr(bodies[name], "com", (0.0, 0.0, 0.0))))
-        found += [omega, v + np.cross(omega, arm)]
-    return np.concatenate([*found, np.zeros(0)])
+    frames = link_frames[links]
+    omega, v = frames[:, OMEGA : OMEGA + 3], frames[:, VELOCITY : VELOCITY + 3]
+    turned = np.einsum("nij,nj->ni", frames[:, AXES : AXES + 9].reshape(-1, 3, 3), arms)
+    return np.hstack([omega, v + np.cross(omega, turned)]).ravel()
 
 
 def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

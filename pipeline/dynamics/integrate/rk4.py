@@ -24,4 +24,4 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
     return begin_afresh, attempt, None, hermite.make_extend(STAGES), keep_nothing
 
 
-METHOD = Method(STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate)
+METHOD = Method(STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25)

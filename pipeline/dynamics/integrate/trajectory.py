@@ -10,6 +10,7 @@ import numpy as np
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.assembly.places import PIVOT_SIZE
 from pipeline.dynamics.integrate import singular, state
+from pipeline.dynamics.integrate.depart import depart
 from pipeline.dynamics.integrate.engine import Engine, Progress, overlapping
 from pipeline.dynamics.tables import MODE
 
@@ -23,6 +24,8 @@ STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
 STIFF_SHARE = 0.3
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
+#: integrators with Newton iterations
+IMPLICIT = ("generalized-alpha", "radau")
 
 
 Stop = Callable[[np.ndarray], bool]
@@ -99,6 +102,8 @@ def integrate(engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = ne
     stop: asked now and then with the rows recorded so far, whether they are enough.
     """
     run = _begin(engine, y)
+    if engine.mobility.singular_start:
+        _depart(engine, run)
     control = engine.view("CONTROL", state.N_CONTROLS)
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         engine.select_pieces(0.5 * (a + b))
@@ -133,6 +138,23 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     events = np.full((room + state.ROOM, state.EVENT_SIZE), np.nan)
     _begin_closed(engine, y, rows[0], events)
     return _Run(engine.w, n, outputs, rows, events, [(engine.start, engine.kept.copy())])
+
+
+def _depart(engine: Engine, run: _Run) -> None:
+    """Lay the way out of a singular start, and choose the closure rows at its end."""
+    n, control, first = run.n, engine.view("CONTROL", state.N_CONTROLS), 1
+    way = depart(engine, run.rows[0, first:])
+    passed = run.outputs[(run.outputs > engine.start) & (run.outputs < engine.start + way.span)]
+    times = np.concatenate([[engine.start], passed, [engine.start + way.span]])
+    run.rows[: len(times), 0] = times
+    run.rows[: len(times), first:] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
+    n[state.N_RECORDED], n[state.NEXT_OUTPUT] = len(times), 1 + len(passed)
+    n[state.EVALUATIONS] += way.evaluations
+    control[state.TIME] = times[-1]
+    ratio = singular.select_rows(engine, way.y, float(times[-1]))
+    engine.view("Y", len(way.y))[:] = way.y
+    engine.view("PIVOT", PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    run.selections[:] = [(engine.start, engine.kept.copy())]
 
 
 def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.ndarray) -> None:
@@ -202,6 +224,7 @@ def _refusal(engine: Engine, run: _Run) -> str:
     fixed = f"{control[state.FIXED]:.2g} s"
     too_long = f"; or the fixed step of {fixed} is too long for it" if control[state.FIXED] else ""
     unsolvable = f"the loops cannot be kept closed: a singular pose in which they can go on in several ways ({where})"
+    unsolvable += _other_integrator(engine)
     if not engine.built.system.closures:
         unsolvable = "the equations cannot be solved here: the motion has grown beyond bounds"
     reasons = {
@@ -216,10 +239,16 @@ def _refusal(engine: Engine, run: _Run) -> str:
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
         state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
-        f"({where}); give it another motion",
+        f"({where}): give it another motion{_other_integrator(engine)}",
         state.LOST_CLOSURE: unsolvable + too_long,
     }
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
+
+
+def _other_integrator(engine: Engine) -> str:
+    """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
+    name = engine.built.system.scene.solver.integrator
+    return f"; or it moves on and {name} does not get over the pose: try dop853" if name in IMPLICIT else ""
 
 
 def _why_so_many(n: np.ndarray, control: np.ndarray) -> str:
