@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import xarray as xr
@@ -18,12 +19,13 @@ from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start
-from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
+from pipeline.dynamics.integrate.trajectory import Trajectory, output_times
 from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.record.dataset import attributes
 from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run import engine_of, observed
+from pipeline.dynamics.switching import follow, implicit
 from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
 
 
@@ -40,11 +42,13 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     jacobian = offset_jacobian(engine, start)
     random = np.random.default_rng(wanted.seed)
     members = []
+    other = cache(lambda: engine_of(implicit(scene), bundles, progress))
     for k in range(wanted.members):
         offsets = random.normal(size=(len(scene.contacts()), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
-        members.append(_member(engine, integrate(engine, moved, _quiet), names))
+        last, trajectory, _ = follow(engine, moved, _quiet, other)
+        members.append(_member(last, trajectory, names))
         progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation)
