@@ -48,7 +48,7 @@ def _absent(effect: str, stripped: Mechanism, without: Mechanism) -> dict[str, A
         "kind": "absent",
         "effect": effect,
         "scene": without.name,
-        "same_code": engines["stripped"].entry is engines["without"].entry,
+        "same_code": engines["stripped"].entry == engines["without"].entry,
         "stripped_us": 1e6 * times["stripped"].median,
         "without_us": 1e6 * times["without"].median,
         "ratio": times["stripped"].over(times["without"]),

@@ -55,6 +55,10 @@ def parser() -> argparse.ArgumentParser:
     command = _verb(verbs, "cost", _cost, "what accuracy costs: errors against cost, and where they come from")
     command.add_argument("scenes", nargs="+", metavar="SCENE")
     command.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
+    command.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
+    command.add_argument(
+        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all six)"
+    )
 
     command = _verb(verbs, "render", _render, "pictures, film and interactive page of scenes")
     command.add_argument("scenes", nargs="+", metavar="SCENE")
@@ -108,15 +112,22 @@ def _why(options: argparse.Namespace) -> None:
 
 
 def _cost(options: argparse.Namespace) -> None:
-    from stages import cost, run
+    from stages import cost, cost_peers, run
 
+    if options.page is not None:
+        run.check_target(options.page, "--page")
+    peers = {} if options.peer is None else cost_peers.read(options.peer)
     place, studies = run.workplace(), {}
     for graph in run.graphs(options.scenes):
-        studies[graph.scene.name] = _, folder = cost.bring(graph.scene, place)
+        studies[graph.scene.name] = _, folder = cost.bring(
+            graph.scene, place, peers.get(graph.scene.name, ()), options.integrators
+        )
         print(*((folder / name).read_text() for name in cost.PRINTED if (folder / name).is_file()), sep="\n")
         print(f"figures and data: {folder}\n")
     if options.page is not None:
-        cost.write_page(studies, options.page)
+        said = f" --peer {options.peer.as_posix()}" if options.peer else ""
+        said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        cost.write_page(studies, options.page, said)
 
 
 def _render(options: argparse.Namespace) -> None:

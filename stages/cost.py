@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.core.scene.load import edited
 from pipeline.core.workflow.task import Task
-from stages import cost_design, s4_simulate
+from stages import cost_design, kernels, s4_simulate
+from stages.cost_peers import Track
 from stages.graph import Graph
 from stages.run import Workplace, check
 
@@ -20,18 +21,26 @@ if TYPE_CHECKING:
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: tables of a study, in the order in which they are printed
-PRINTED = ("price.md", "causes.md", "statistics.md")
+PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
+#: figures of a study and their titles
+FIGURES = {
+    "work_precision": "Error against cost",
+    "causes": "Causes of the error",
+    "statistics": "Error of ensemble means against cost",
+}
 
 
-def study(scene: Scene, place: Workplace) -> Task:
+def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()) -> Task:
     """The task of a scene's study; its points are its inputs, so that an interrupted study goes on where it was.
 
+    peers: runs of other programs, see `stages.cost_peers`.  integrators: see `cost_design.runs`.
     Raises InputError when the scene has nothing to measure.
     """
     chosen = scene.wanted()
-    designs = cost_design.runs(scene, _highest(scene, place))
+    designs = cost_design.runs(scene, _highest(scene, place), integrators)
     names = [quantity.name for quantity in chosen]
-    points = {f"point{k}": _point(design, names) for k, design in enumerate(designs)}
+    compiled, more = _kernels(designs), {"quantities": names}
+    points = {f"point{k}": _measured(design, "run", more, compiled) for k, design in enumerate(designs)}
     listed = [
         {"key": d.key, "group": d.group, "factors": dict(d.factors), "input": name}
         for name, d in zip(points, designs, strict=True)
@@ -40,25 +49,32 @@ def study(scene: Scene, place: Workplace) -> Task:
         stage="cost",
         scene=scene.name,
         run="stages.cost_study:run",
-        params={"points": listed, "quantities": [[q.owner, q.kind] for q in chosen], "title": scene.title},
-        inputs=points | _ensembles(scene),
+        params={
+            "points": listed,
+            "quantities": [[q.owner, q.kind] for q in chosen],
+            "title": scene.title,
+            "peers": list(peers),
+        },
+        inputs=points | _ensembles(scene, names, compiled),
         folder=f"cost/{scene.name}",
         names={"nc": "cost.nc"},
     )
 
 
-def bring(scene: Scene, place: Workplace) -> tuple[xr.Dataset, Path]:
-    """The study's dataset, brought up to date, and the folder with its tables and figures."""
-    task = study(scene, place)
+def bring(
+    scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()
+) -> tuple[xr.Dataset, Path]:
+    """The study's dataset, brought up to date, and the folder with its tables and figures; arguments as of `study`."""
+    task = study(scene, place, peers, integrators)
     outcome = place.bring([task])
     check(outcome)
     return place.store.load(outcome.records[id(task)]), place.store.root / task.folder
 
 
-def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path) -> None:
+def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
     """The page on accuracy, with its pictures in a folder of its name beside it.
 
-    studies: what `bring` returned, by scene.
+    studies: what `bring` returned, by scene.  options: what else the command was told.
     """
     from pipeline.post.cost.page import Studied, markdown
 
@@ -67,13 +83,14 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path) -> No
     found = []
     for name, (study, folder) in studies.items():
         shown = {}
-        for title, stem in (("Error against cost", "work_precision"), ("Causes of the error", "causes")):
-            target = pictures / f"{name.replace('/', '_')}_{stem}.png"
-            target.write_bytes((folder / f"{stem}.png").read_bytes())
-            shown[title] = f"{pictures.name}/{target.name}"
+        for stem, title in FIGURES.items():
+            if (folder / f"{stem}.png").is_file():
+                target = pictures / f"{name.replace('/', '_')}_{stem}.png"
+                target.write_bytes((folder / f"{stem}.png").read_bytes())
+                shown[title] = f"{pictures.name}/{target.name}"
         tables = tuple((folder / f).read_text() for f in PRINTED if (folder / f).is_file())
         found.append(Studied(name, study, tables, shown))
-    page.write_text(markdown(tuple(found), page.as_posix()))
+    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"))
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:
@@ -86,27 +103,43 @@ def _highest(scene: Scene, place: Workplace) -> float | None:
     return max(float(place.store.load(outcome.records[id(task)])["frequency"].max()) for task in bundles)
 
 
-def _point(design: cost_design.Design, names: list[str]) -> Task:
+def _kernels(designs: list[cost_design.Design]) -> dict[tuple[str, ...], Task]:
+    """One task for each set of kernels that the points need; compiled side by side."""
+    found: dict[tuple[str, ...], Task] = {}
+    for design in designs:
+        if kernels.shared(design.scene) not in found:
+            found[kernels.shared(design.scene)] = kernels.task(design.scene, _bundles(design))
+    return found
+
+
+def _bundles(design: cost_design.Design) -> dict[str, Task]:
     graph = Graph(design.scene, shown=False, recipe=design.recipe)
+    return {f"bundle/{body}": task for body, task in graph.bundle.items()}
+
+
+def _measured(
+    design: cost_design.Design, function: str, more: Mapping[str, object], compiled: Mapping[tuple[str, ...], Task]
+) -> Task:
+    """A task of `stages.cost_point` on a design's scene."""
+    ensemble = design.scene.ensemble is not None
     return Task(
-        stage="cost-point",
+        stage="cost-ensemble" if ensemble else "cost-point",
         scene=design.scene.name,
         part=design.key,
-        run="stages.cost_point:run",
-        params={"simulate": s4_simulate.params(design.scene), "quantities": names},
-        inputs={f"bundle/{body}": task for body, task in graph.bundle.items()},
+        run=f"stages.cost_point:{function}",
+        params={"simulate": s4_simulate.params(design.scene, ensemble=ensemble), **more},
+        inputs={**_bundles(design), "kernels": compiled[kernels.shared(design.scene)]},
         modules=s4_simulate.modules(design.scene),
         folder="",
         exclusive=True,
     )
 
 
-def _ensembles(scene: Scene) -> dict[str, Task]:
+def _ensembles(scene: Scene, names: list[str], compiled: Mapping[tuple[str, ...], Task]) -> dict[str, Task]:
     """Ensembles at several tolerances, of a scene that has one."""
     found = {}
     for rtol in ENSEMBLES if scene.ensemble is not None else ():
-        change = edited(scene, {"solver": {"rtol": rtol}, "accuracy": None})
-        task = Graph(change, shown=False).ensemble
-        assert task is not None
-        found[f"ensemble:rtol {rtol:g}"] = task
+        change = edited(scene, {"solver.rtol": rtol, "accuracy": None})
+        design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
+        found[f"ensemble:rtol {rtol:g}"] = _measured(design, "run_ensemble", {"quantities": names}, compiled)
     return found

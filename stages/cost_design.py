@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pipeline.core.errors import InputError
+from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited, read_toml
 from pipeline.core.scene.schema import Scene
 
 #: tolerances of the methods that choose their steps, and steps [s] of those that do not
 TOLERANCES: Mapping[str, tuple[int, int]] = {"dop853": (-3, -13), "dopri5": (-3, -13), "radau": (-3, -9)}
 STEPS: Mapping[str, tuple[float, ...]] = {
-    "rk4": (1e-4, 3e-5, 1e-5, 3e-6, 1e-6),
-    "adams-bashforth-moulton": (1e-4, 3e-5, 1e-5, 3e-6, 1e-6),
+    "rk4": (1e-4, 3e-5, 1e-5, 3e-6),
+    "adams-bashforth-moulton": (1e-4, 3e-5, 1e-5, 3e-6),
     "generalized-alpha": (1e-4, 3e-5, 1e-5, 3e-6),
 }
 REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
@@ -24,9 +26,11 @@ CONFIRMATION: Mapping[str, Any] = {"integrator": "radau", "rtol": 1e-12}
 PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5, "events": "at step ends"}
 #: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
 MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
-LIMITS = (0.5, 1.0, 2.0, 4.0)
+LIMITS = (0.25, 0.5, 1.0, 2.0)
 REFINEMENTS = (1, 2, 4)
 FINER_OUTPUT = 10.0
+#: what no point of a study has
+PLAIN: Mapping[str, None] = {"accuracy": None, "ensemble": None}
 
 
 @dataclass(frozen=True)
@@ -40,10 +44,30 @@ class Design:
     recipe: Mapping[str, Any] = field(default_factory=dict)
 
 
-def runs(scene: Scene, highest: float | None) -> list[Design]:
-    """All runs of a study; highest: the highest frequency that the scene's bundles hold [Hz], None if all is rigid."""
-    found = [*_integration(scene), *_sampling(scene)]
+def runs(scene: Scene, highest: float | None, integrators: Collection[str] = ()) -> list[Design]:
+    """All runs of a study.
+
+    highest: the highest frequency that the scene's bundles hold [Hz], None if all is rigid.  integrators: those that
+    are compared, all when empty; reference, confirmation and the paper's choice are always there.
+    Raises InputError for a method that is not compared.
+    """
+    known = [*TOLERANCES, *STEPS]
+    for name in integrators:
+        if name not in known:
+            raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
+    found = [d for d in _integration(scene) if _chosen(d, integrators)] + list(_sampling(scene))
     return found + (list(_models(scene, highest)) if highest is not None else [])
+
+
+def _chosen(design: Design, integrators: Collection[str]) -> bool:
+    method = design.factors.get("adaptive_integrator") or design.factors.get("fixed_integrator")
+    return not integrators or method is None or method in integrators
+
+
+def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
+    """The scene's solver with another method; its limits stay."""
+    own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={"integrator", "rtol", "step", "events"})
+    return own | changes
 
 
 def _integration(scene: Scene) -> Iterator[Design]:
@@ -51,7 +75,7 @@ def _integration(scene: Scene) -> Iterator[Design]:
         setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
         located = ", unlocated contacts" if "events" in solver else ""
         key = f"{solver['integrator']}, {setting}{located}" + (", as the paper" if group == "paper" else "")
-        return Design(key, group, factors, edited(scene, {"solver": dict(solver), "accuracy": None, "ensemble": None}))
+        return Design(key, group, factors, edited(scene, {"solver": _solver(scene, **solver), **PLAIN}))
 
     yield design("reference", REFERENCE)
     yield design("confirmation", CONFIRMATION)
@@ -70,9 +94,8 @@ def _integration(scene: Scene) -> Iterator[Design]:
 def _sampling(scene: Scene) -> Iterator[Design]:
     """The scene as it stands, and with denser output."""
     interval = scene.output.interval
-    plain = {"accuracy": None, "ensemble": None}
-    yield Design("as it stands", "sampling", {"interval": interval}, edited(scene, plain))
-    finer = edited(scene, {**plain, "output": {"interval": interval / FINER_OUTPUT}})
+    yield Design("as it stands", "sampling", {"interval": interval}, edited(scene, PLAIN))
+    finer = edited(scene, {**PLAIN, "output": {"interval": interval / FINER_OUTPUT}})
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
 
 
@@ -85,8 +108,8 @@ def _models(scene: Scene, highest: float) -> Iterator[Design]:
     def design(reference: str, limit: float, refinement: int, theory: str) -> Design:
         modes = {"reference": reference, "up_to": limit * highest}
         bodies = {f"body.{name}.modes": modes for name in scene.flexible()}
-        solver = {"integrator": "dop853", "rtol": 1e-12}
-        change = edited(scene, {**bodies, "solver": solver, "accuracy": None, "ensemble": None})
+        solver = _solver(scene, integrator="dop853", rtol=1e-12)
+        change = edited(scene, {**bodies, "solver": solver, **PLAIN})
         elements = refinement * int(recipes[0].get("elements", 1))
         key = f"{reference} up to {limit * highest:.4g} Hz, {elements} elements, {theory}"
         own_one = (reference, limit, refinement, theory) == (own, 1.0, 1, own_theory)

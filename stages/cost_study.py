@@ -17,7 +17,8 @@ LOCATED = 1e-12
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``cost.nc`` and its tables and figures.
 
-    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`.
+    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, and `peers`, as of
+    `stages.cost_peers`.
     """
     from pipeline.core.quantities import Quantity
     from pipeline.post.cost import causes, price, statistics, work_precision
@@ -28,18 +29,31 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     study = assemble(points, runs, chosen)
-    split = split_of(points, runs, chosen, study)
+    ensembles = _ensembles(inputs)
+    # the last one is that at the tightest tolerance
+    split = split_of(points, runs, chosen, next(reversed(ensembles.values()), None))
     title = params["title"]
+    said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
+    study = causes.beside(study, split)
     result: dict[str, Any] = {"nc": study}
-    result |= files("price", price.price_list(study, f"What accuracy costs: {title}"))
+    result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
+    result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
     marks = tuple(m for m in (_paper(points, runs, chosen),) if m is not None)
-    result |= work_precision.make("work_precision", study, f"Error against cost: {title}", marks)
-    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    result |= work_precision.make(
+        "work_precision", study, f"Error against cost: {title}", marks, work_precision.peers(study, params["peers"])
+    )
     if ensembles:
         result |= files("statistics", statistics.table(ensembles, f"Beyond the horizon: {title}"))
+        result |= statistics.make("statistics", ensembles, f"Beyond the horizon: {title}")
     return result
+
+
+def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+    """Ensembles that could be made, by what was varied."""
+    found = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    return {name: data for name, data in found.items() if "refused" not in data.attrs}
 
 
 def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:
@@ -56,9 +70,9 @@ def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
 
 
 def split_of(
-    points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], study: xr.Dataset
+    points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
 ) -> dict[str, dict[str, float]]:
     """Relative error of the scene as it stands, by quantity and cause."""
     from pipeline.post.cost.split import causes_of
 
-    return {q.name: causes_of(q, points, runs, LOCATED) for q in chosen}
+    return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

@@ -12,7 +12,7 @@ from pipeline.core.artifacts.store import Record
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.task import Task
-from stages import s4_simulate, s6_render
+from stages import kernels, s4_simulate, s6_render, timing
 from stages.families import TREE, constants
 from stages.figure import FIGURES
 from stages.graph import Graph
@@ -50,12 +50,23 @@ class Scenes:
             scene=family,
             run="stages.timing:run",
             params={g.scene.name: s4_simulate.params(g.scene) for g in graphs},
-            inputs={f"{g.scene.name}:bundle/{body}": task for g in graphs for body, task in g.bundle.items()},
+            inputs={f"{g.scene.name}:bundle/{body}": task for g in graphs for body, task in g.bundle.items()}
+            | _paper_kernels(graphs),
             modules=tuple(sorted({name for g in graphs for name in s4_simulate.modules(g.scene)})),
             folder=f"runs/{family}",
             names={"nc": "timing.nc"},
             exclusive=True,
         )
+
+
+def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
+    """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
+    found: dict[tuple[str, ...], Task] = {}
+    for graph in graphs:
+        scene = timing.paper_scene(graph.scene)
+        bundles = {f"bundle/{body}": task for body, task in graph.bundle.items()}
+        found.setdefault(kernels.shared(scene), kernels.task(scene, bundles))
+    return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 
 def make(place: Workplace) -> Path:

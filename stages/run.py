@@ -151,9 +151,9 @@ def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
         write_dataset(target, dataset)
 
 
-def check_target(target: Path) -> None:
+def check_target(target: Path, option: str = "--out") -> None:
     """InputError when a file cannot be put there; asked before the work, not after it."""
     if not target.parent.is_dir():
-        raise InputError(f"--out {target}", "its folder does not exist", f"mkdir -p {target.parent}")
+        raise InputError(f"{option} {target}", "its folder does not exist", f"mkdir -p {target.parent}")
     if target.is_dir():
-        raise InputError(f"--out {target}", "is a folder", "name a file in it")
+        raise InputError(f"{option} {target}", "is a folder", "name a file in it")

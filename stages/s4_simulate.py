@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 DYNAMICS = "pipeline.dynamics"
 #: methods that may be given up for an implicit one on the way (pipeline.dynamics.run)
 EXPLICIT, IMPLICIT = ("dop853", "dopri5"), "radau"
-#: what the generated kernel entry composes (pipeline.dynamics.assembly.fuse): for every scene, and
+#: what the generated files compose (pipeline.dynamics.assembly.sources): for every scene, and
 #: for scenes with flexible bodies and with contacts
 KERNELS = (
+    "assembly.calls",
     "assembly.closures",
     "assembly.dispatch",
     "assembly.equations",

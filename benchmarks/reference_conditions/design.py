@@ -25,10 +25,14 @@ CONDITIONS = ("free-free", "fixed-fixed", "pinned-pinned", "cantilever", "craig-
 #: coordinates that the sets are compared with, and at which convergence is looked at; a count that would cut a pair of
 #: equal frequencies is raised to the next whole one
 COUNT, COUNTS = 13, (7, 13, 25, 49)
-#: of these, in the scene with clearance, where each costs an ensemble
+#: of these, with ideal joints, where the full rod is there as well: a run costs with the third power of the count
+FAR_COUNTS = (7, 13, 25)
+#: in the scene with clearance, where each costs an ensemble
 CLEARANCE_COUNTS = (7, 13, 25)
 #: there, the most complete sets; the last is the reference, and by the one before it is told how far it is settled
 MOST_COMPLETE = (25, 37)
+#: ensembles of sets beyond COUNT have this share of the members: a run with 37 coordinates costs ten of those with 13
+LARGE_SETS = 0.5
 #: factors of the recipe's elements
 FINER = (1, 2, 4)
 #: times at which the assembled mechanism's frequencies are taken: the start and the full stroke [s]
@@ -123,7 +127,7 @@ def far(places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
         found += [Case(place, RIGID), Case(place, FULL)]
         found += [Case(place, c, whole(place, c, COUNT)) for c in CONDITIONS]
         found += [Case(place, c, whole(place, c, 7)) for c in ("free-free", "fixed-fixed")]
-    found += [Case(places[0], c, whole(places[0], c, n)) for c in CONDITIONS for n in COUNTS]
+    found += [Case(places[0], c, whole(places[0], c, n)) for c in CONDITIONS for n in FAR_COUNTS]
     found += [Case(places[0], "craig-bampton", COUNT, finer=n) for n in FINER]
     return list(dict.fromkeys(found))
 
@@ -132,12 +136,19 @@ def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Cas
     """Clearance at A1: likewise, as ensembles."""
     found = []
     for place in places:
-        found.append(Case(place, RIGID, clearance=True))
+        found.append((place, RIGID, COUNT))
         sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in ("free-free", "fixed-fixed")]
         sets += [("craig-bampton", n) for n in MOST_COMPLETE]
-        found += [Case(place, c, whole(place, c, n), clearance=True, members=members) for c, n in sets]
+        found += [(place, c, whole(place, c, n)) for c, n in sets]
     first = places[0]
     for condition in ("free-free", "craig-bampton"):
-        counts = [whole(first, condition, n) for n in CLEARANCE_COUNTS]
-        found += [Case(first, condition, n, clearance=True, members=members) for n in counts]
-    return list(dict.fromkeys(found))
+        found += [(first, condition, whole(first, condition, n)) for n in CLEARANCE_COUNTS]
+    return [Case(*key, clearance=True, members=_share(members, *key[1:])) for key in dict.fromkeys(found)]
+
+
+def _share(members: int, condition: str, count: int) -> int:
+    """Members of an ensemble: fewer where a run is dear; a rigid rod has one run."""
+    if condition == RIGID:
+        return 0
+    # whole counts may lie a little above COUNT
+    return members if count < MOST_COMPLETE[0] else max(2, round(LARGE_SETS * members))

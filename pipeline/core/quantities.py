@@ -15,9 +15,10 @@ import xarray as xr
 from pipeline.core.algebra import rotation_between
 from pipeline.core.registry import suggestion
 
-#: two output times are the same when they agree after rounding to this many decimals [s]; outputs are
-#: 1e-4 s apart and event times fall anywhere, so a nanosecond separates what is equal from what is not
-DECIMALS = 9
+#: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
+#: only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure would take
+#: them for one, and the motion in between for an error
+SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
 
@@ -109,7 +110,8 @@ def is_series(quantity: Quantity) -> bool:
 
 def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Indices into a and into b of the times that both have, ascending, each time once."""
-    _, first, second = np.intersect1d(np.round(a, DECIMALS), np.round(b, DECIMALS), return_indices=True)
+    unit = SAME_TIME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)) or 1.0
+    _, first, second = np.intersect1d(np.round(a / unit), np.round(b / unit), return_indices=True)
     return first, second
 
 
@@ -133,6 +135,21 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
     if quantity.kind == "impact_times":
         a, b = a[a <= until], b[b <= until]
     return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
+
+
+def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
+    """Largest standard error over time of the mean of the members' values, in the quantity's unit.
+
+    None where an ensemble does not say: events, orientations, and owners that it does not keep.
+    """
+    kind = KINDS[quantity.kind]
+    if kind.variable not in ensemble or quantity.kind == "orientation" or "time" not in ensemble[kind.variable].dims:
+        return None
+    if quantity.owner not in ensemble[kind.owner].values:
+        return None
+    values = ensemble[kind.variable].sel({kind.owner: quantity.owner}).transpose("member", "time", ...).values
+    spread = np.sqrt(values.var(axis=0, ddof=1).reshape(values.shape[1], -1).sum(axis=1))
+    return float(spread.max() / np.sqrt(len(values)))
 
 
 def scale(run: xr.Dataset, quantity: Quantity) -> float:

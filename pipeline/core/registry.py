@@ -9,6 +9,9 @@ from typing import Any
 
 from pipeline.core.errors import InputError
 
+#: most names that a hint lists
+LISTED = 40
+
 
 def lookup(package: str, name: str, *, where: str) -> Any:
     """The object that `package` lists under `name` in its NAMES, its module imported now.
@@ -30,6 +33,10 @@ def module_of(package: str, name: str, table: str = "NAMES") -> str:
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
-    """'did you mean ...?' for the nearest known name, or the list of all."""
+    """'did you mean ...?' for the nearest known name, or a list of those there are."""
     near = difflib.get_close_matches(name, list(known), n=1)
-    return f"did you mean '{near[0]}'?" if near else "known: " + ", ".join(sorted(known))
+    if near:
+        return f"did you mean '{near[0]}'?"
+    names = sorted(known)
+    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+    return "known: " + ", ".join(names[:LISTED]) + more if names else "there are none"

@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import math
 import re
+from functools import cache
+
+import numpy as np
+
+Exponents = tuple[float, float, float, float]
 
 #: factor to SI and physical dimension of every unit that a scene or recipe may use
 UNITS: dict[str, tuple[float, str]] = {
@@ -12,19 +17,25 @@ UNITS: dict[str, tuple[float, str]] = {
     "um": (1e-6, "length"),
     "nm": (1e-9, "length"),
     "cm": (1e-2, "length"),
+    "km": (1e3, "length"),
     "in": (0.0254, "length"),
+    "ft": (0.3048, "length"),
     "s": (1.0, "time"),
     "ms": (1e-3, "time"),
     "us": (1e-6, "time"),
+    "min": (60.0, "time"),
     "kg": (1.0, "mass"),
     "g": (1e-3, "mass"),
     "t": (1e3, "mass"),
+    "lb": (0.45359237, "mass"),
     "rad": (1.0, "angle"),
     "mrad": (1e-3, "angle"),
     "urad": (1e-6, "angle"),
     "deg": (math.pi / 180.0, "angle"),
+    "rev": (2.0 * math.pi, "angle"),
     "N": (1.0, "force"),
     "kN": (1e3, "force"),
+    "mN": (1e-3, "force"),
     "N m": (1.0, "torque"),
     "N mm": (1e-3, "torque"),
     "N s": (1.0, "impulse"),
@@ -60,7 +71,89 @@ UNITS: dict[str, tuple[float, str]] = {
     "%": (1e-2, "number"),
 }
 
+#: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
+LARGEST = 1e40
+#: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are told apart by them
+_EXPONENTS: dict[str, Exponents] = {
+    "number": (0, 0, 0, 0),
+    "length": (0, 1, 0, 0),
+    "time": (0, 0, 1, 0),
+    "mass": (1, 0, 0, 0),
+    "angle": (0, 0, 0, 1),
+    "force": (1, 1, -2, 0),
+    "torque": (1, 2, -2, 0),
+    "impulse": (1, 1, -1, 0),
+    "pressure": (1, -1, -2, 0),
+    "angular velocity": (0, 0, -1, 1),
+    "velocity": (0, 1, -1, 0),
+    "acceleration": (0, 1, -2, 0),
+    "density": (1, -3, 0, 0),
+    "inertia": (1, 2, 0, 0),
+    "area": (0, 2, 0, 0),
+    "second moment of area": (0, 4, 0, 0),
+    "stiffness": (1, 0, -2, 0),
+    "Hertz stiffness": (1, -0.5, -2, 0),
+    "damping": (1, 0, -1, 0),
+    "torsional stiffness": (1, 2, -2, -1),
+    "torsional damping": (1, 2, -1, -1),
+}
+_FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d+(?:\.\d+)?))?")
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
+
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
+
+
+@cache
+def unit(text: str) -> tuple[float, str] | None:
+    """Factor to SI and dimension of a unit, or of a product of units such as ``"N mm/deg"``; None when it is none.
+
+    What follows a stroke divides; powers are written ``^2``, factors parted by spaces, dots or stars.
+    """
+    text = _plain(text)
+    if text in UNITS:
+        return UNITS[text]
+    found = _product(text)
+    dimension = found and next((name for name, known in _EXPONENTS.items() if known == found[1]), None)
+    return (found[0], dimension) if found and dimension else None
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.translate(_SPELLINGS).split())
+
+
+def _product(text: str) -> tuple[float, Exponents] | None:
+    """Factor to SI and exponents of kg, m, s and rad; None when a part of it is no unit."""
+    if text in UNITS:
+        return UNITS[text][0], _EXPONENTS[UNITS[text][1]]
+    factor, total = 1.0, np.zeros(4)
+    for k, side in enumerate(text.split("/")):
+        for part in side.split() or [""]:
+            found = _FACTOR.fullmatch(part)
+            if found is None or found[1] not in UNITS:
+                return None
+            power = float(found[2] or 1.0) * (-1.0 if k else 1.0)
+            factor *= UNITS[found[1]][0] ** power
+            total += power * np.array(_EXPONENTS[UNITS[found[1]][1]])
+    kg, m, s, rad = total.tolist()
+    return factor, (kg, m, s, rad)
+
+
+def coefficient(value: object, dimension: str, order: int) -> float:
+    """SI value of the coefficient of t^order in a law whose values have a dimension; ValueError in words.
+
+    A bare number is in SI; text must have the unit of the value over seconds to that power.
+    """
+    match = _QUANTITY.match(value) if isinstance(value, str) else None
+    if match is None or match[2] is None:
+        return quantity(value, "number")
+    kg, m, s, rad = _EXPONENTS[dimension]
+    found = _product(_plain(match[2]))
+    if found is None or found[1] != (kg, m, s - order, rad):
+        example = f"{_example(dimension)}/s^{order}" if order else _example(dimension)
+        raise ValueError(
+            f"'{value}' is the coefficient of t^{order} of {a(dimension)}: it has a unit such as {example}"
+        )
+    return quantity(float(match[1]) * found[0], "number")
 
 
 def quantity(value: object, dimension: str) -> float:
@@ -70,25 +163,22 @@ def quantity(value: object, dimension: str) -> float:
     belongs to another dimension, or the number is not finite.
     """
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise ValueError(f"expected {_a(dimension)}, a number or text like '1 {_example(dimension)}'")
+        raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
     if isinstance(value, str):
         match = _QUANTITY.match(value)
         if match is None:
             raise ValueError(f"'{value}' is not a number with a unit")
-        number, unit = float(match[1]), match[2]
-        if unit is None:
-            factor = 1.0
-        elif unit not in UNITS:
-            raise ValueError(f"unknown unit '{unit}'; {_a(dimension)} is written in {_known(dimension)}")
-        else:
-            factor, found = UNITS[unit]
-            if found != dimension:
-                raise ValueError(f"'{value}' is {_a(found)}, but {_a(dimension)} belongs here, in {_known(dimension)}")
+        number, written = float(match[1]), match[2]
+        factor, found = (1.0, dimension) if written is None else _known_unit(written, dimension)
+        if found != dimension:
+            raise ValueError(f"'{value}' is {a(found)}, but {a(dimension)} belongs here, in {_known(dimension)}")
         result = number * factor
     else:
         result = float(value)
     if not math.isfinite(result):
         raise ValueError(f"{value!r} is not a finite number")
+    if result != 0.0 and not 1.0 / LARGEST <= abs(result) <= LARGEST:
+        raise ValueError(f"{value!r} is beyond what can be computed with: {1.0 / LARGEST:g} to {LARGEST:g} in SI units")
     return result
 
 
@@ -99,16 +189,25 @@ def any_quantity(value: object) -> float | str:
     Raises ValueError as `quantity` does.
     """
     match = _QUANTITY.match(value) if isinstance(value, str) else None
-    unit = match[2] if match is not None else None
-    if unit is None or unit == "%":
+    written = match[2] if match is not None else None
+    if written is None or written == "%":
         return quantity(value, "number")
-    if unit not in UNITS:
-        raise ValueError(f"unknown unit '{unit}'; known: {', '.join(UNITS)}")
-    dimension = UNITS[unit][1]
+    found = unit(written)
+    if found is None:
+        raise ValueError(f"unknown unit '{written}'; known: {', '.join(UNITS)}, and products of them")
+    dimension = found[1]
     return f"{quantity(value, dimension)!r} {_example(dimension, factor=1.0)}"
 
 
-def _a(dimension: str) -> str:
+def _known_unit(written: str, dimension: str) -> tuple[float, str]:
+    found = unit(written)
+    if found is None:
+        raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known(dimension)}")
+    return found
+
+
+def a(dimension: str) -> str:
+    """The dimension with its article."""
     return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
 
 

@@ -7,6 +7,8 @@ are, what is joined to what, every number, stands in three flat arrays that ever
 - ``f`` (floats): the numbers of the scene;
 - ``w`` (floats): the work space, the integrator's state and stages included.
 
+The header also holds where this process has put the functions that other ones call (`assembly.calls`).
+
 Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
 
 Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
@@ -17,6 +19,8 @@ coordinate has one, and every port one more per mode.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from pipeline.dynamics.vectors import index, kernel
 
@@ -82,7 +86,9 @@ WORK = (
     "LAW LOAD TURN DRIVE_FORCE LEDGER_RATE POSITION_RATE Y Y_NEW Y_STAGE SLOPES DENSE MEMORY MAGNITUDE CORRECTION "
     "LATCHED WATCH CONTROL"
 ).split()
-_PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK])}
+#: header of h: addresses of compiled functions, zero until the engine writes them
+ADDRESSES = "EVALUATE PROJECT DISPLACE".split()
+_PLACE = {name: place for place, name in enumerate([*SIZES, *WIRING, *NUMBERS, *WORK, *ADDRESSES])}
 HEADER = len(_PLACE)
 #: places that only the kernels of some effects need, which name them themselves
 ELSEWHERE = "LAWS PIECE_HARMONICS HARMONICS LOADS LOAD_KINDS LOAD_NUMBERS LOAD_SLOT ROW_SCALE PIVOT".split()
@@ -135,12 +141,13 @@ N_PAIRS, N_KNOWN_PAIRS, N_GROUPS, MASS_SIZE, MOST_MODES, N_LAWS, N_LOADS, N_TURN
 ) = (place(name) for name in WORK if name not in ELSEWHERE)
 # fmt: on
 
-# fields of a link, a flexible body, a port, a closure, a contact
-PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = range(8)
-FLEX_LINK, N_MODES, FLEX_Q0, FLEX_C0, DATA0, MOMENT0, N_MOMENTS, FLEX_INBOARD = range(8)
-PORT_FLEX, PORT_COLUMN, PORT_SHAPES = range(3)
-SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES, KEPT0, N_KEPT = range(11)
-OUTER, INNER, NORMAL_KIND, FRICTION_KIND, SURFACES, BRISTLE = range(6)
+# fields of a link, a flexible body, a port, a closure, a contact; numbers of numpy, because a kernel that is given
+# an integer of Python as a constant is compiled anew for each value
+PARENT, JOINT_KIND, Q0, C0, N_SPEEDS, FLEX, INBOARD_PORT, CARRIED_BY = np.arange(8)
+FLEX_LINK, N_MODES, FLEX_Q0, FLEX_C0, DATA0, MOMENT0, N_MOMENTS, FLEX_INBOARD = np.arange(8)
+PORT_FLEX, PORT_COLUMN, PORT_SHAPES = np.arange(3)
+SITE_A, SITE_B, ROW0, N_ROWS, SUPPORT0, N_SUPPORT, JACOBIAN0, ENTRY0, N_ENTRIES, KEPT0, N_KEPT = np.arange(11)
+OUTER, INNER, NORMAL_KIND, FRICTION_KIND, SURFACES, BRISTLE = np.arange(6)
 CLEARANCE, RADIUS, FLOOR, STICK_SPEED, NORMAL_LAW, FRICTION_LAW = 0, 1, 2, 3, 4, 8
 # a frame: origin (3), rotation (9), angular velocity, velocity, angular acceleration, acceleration; world axes
 ORIGIN, AXES, OMEGA, VELOCITY, ALPHA, ACCELERATION, FRAME_SIZE = 0, 3, 12, 15, 18, 21, 24

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.algebra import rotation_between
-from pipeline.core.quantities import DECIMALS, common_times
+from pipeline.core.quantities import SAME_TIME, common_times
 from pipeline.post.rotations import angle_about_y
 
 
@@ -29,7 +29,7 @@ def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: floa
     Raises ValueError when the runs have no common time in that span.
     """
     i, j = common_times(run.time.values, reference.time.values)
-    inside = run.time.values[i] <= until + 0.5 * 10.0**-DECIMALS
+    inside = run.time.values[i] <= until + SAME_TIME * abs(until)
     i, j = i[inside], j[inside]
     if i.size == 0:
         raise ValueError("the two runs have no output time in common")

@@ -10,6 +10,9 @@ from pipeline.post.rotations import angle_about_y
 #: the horizon ends where members differ in velocity by this share of the largest velocity
 SHARE = 1e-3
 
+#: shares of the members below the quantiles that are kept: of so few, the middle and the bulk
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
@@ -33,17 +36,24 @@ def horizon(time: np.ndarray, velocity: np.ndarray, share: float = SHARE) -> flo
 
 
 def ensemble_statistics(ensemble: xr.Dataset) -> Variables:
-    """Mean and standard deviation over the members (``ddof = 1``), on the ensemble's own times."""
-    position = ensemble.position.values
+    """Mean, standard deviation (``ddof = 1``) and QUANTILES over the members, on the ensemble's own times.
+
+    Quantiles are interpolated between members (numpy's default); of an angle, a vector's components, a contact.
+    """
+    position, per_contact = ensemble.position.values, ("contact",)
     members = {
         "rotation_y": (("ensemble_time", "kept"), angle_about_y(ensemble.quaternion.values)),
         "displacement": (("ensemble_time", "kept", "axis"), position - position[:, :1]),
         "velocity": (("ensemble_time", "kept", "axis"), ensemble.velocity.values),
         "acceleration": (("ensemble_time", "kept", "axis"), ensemble.acceleration.values),
         "normal_force": (("ensemble_time", "contact"), ensemble.contact_normal_force.values),
+        "impact_count": (per_contact, ensemble.impact_count.values.astype(float)),
+        "peak_force": (per_contact, ensemble.peak_force.values),
+        "contact_time_share": (per_contact, ensemble.contact_time_share.values),
     }
     result: Variables = {"spread": (("ensemble_time",), spread(ensemble.velocity.values))}
     for name, (dims, values) in members.items():
         result[f"{name}_mean"] = (dims, values.mean(axis=0))
         result[f"{name}_std"] = (dims, values.std(axis=0, ddof=1))
+        result[f"{name}_quantile"] = (("quantile", *dims), np.quantile(values, QUANTILES, axis=0))
     return result

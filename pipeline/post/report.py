@@ -107,7 +107,8 @@ def paper_markdown(content: Content) -> str:
         _pipe(("value", "assumption", "scenes"), assumption_rows(content)),
         "## Discrepancies\n",
         "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
-        "table.\n",
+        "table. Which of its statements on mode sets hold, and at which place of the prismatic joint: "
+        "[reference-conditions.md](reference-conditions.md).\n",
         _pipe(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
     ]
     return "\n".join(parts)

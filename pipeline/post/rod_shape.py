@@ -38,12 +38,11 @@ def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.n
     side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     side /= np.linalg.norm(side)
     phi = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    spokes = float(np.median(bundle.radius.values)) * (
-        np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
-    )
+    spokes = np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
+    radius = np.append(np.repeat(bundle.radius.values, PER_CELL), bundle.radius.values[-1])[:, None, None]
     turned = spokes[None] + np.cross(turn[:, None, :], spokes[None])
     # a large drawn rotation stretches linearised spokes: keep the section round
-    turned *= (np.linalg.norm(spokes, axis=-1) / np.linalg.norm(turned, axis=-1))[..., None]
+    turned *= radius / np.linalg.norm(turned, axis=-1, keepdims=True)
     centres = (points + displacement)[:, None, :]
     rings = centres + turned
     # flat caps: the first and last rings, shrunk to their centres

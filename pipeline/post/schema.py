@@ -6,6 +6,29 @@ from pipeline.core.artifacts.schema import Schema, Variable
 
 _V = Variable
 
+_KEPT, _PER_AXIS = ("ensemble_time", "kept"), ("ensemble_time", "kept", "axis")
+#: what is told of an ensemble by mean, standard deviation and quantiles: dimensions, units
+_OF_MEMBERS = {
+    "rotation_y": (_KEPT, "rad"),
+    "displacement": (_PER_AXIS, "m"),
+    "velocity": (_PER_AXIS, "m s-1"),
+    "acceleration": (_PER_AXIS, "m s-2"),
+    "normal_force": (("ensemble_time", "contact"), "N"),
+    "impact_count": (("contact",), "1"),
+    "peak_force": (("contact",), "N"),
+    "contact_time_share": (("contact",), "1"),
+}
+
+
+def _of_members(name: str, dims: tuple[str, ...], units: str) -> Schema:
+    words = name.replace("_", " ")
+    return {
+        f"{name}_mean": _V(dims, units, f"ensemble mean of the {words}", optional=True),
+        f"{name}_std": _V(dims, units, f"ensemble standard deviation of the {words}", optional=True),
+        f"{name}_quantile": _V(("quantile", *dims), units, f"quantiles of the {words} over the members", optional=True),
+    }
+
+
 #: stage 5: series and tables of one run, and of its ensemble where the scene has one
 POST: Schema = {
     "rotation_y": _V(("time", "body"), "rad", "angle about the world's y axis, asin(R_WB[0, 2])"),
@@ -29,22 +52,6 @@ POST: Schema = {
     "contact_time_share": _V(("contact",), "1", "share of the run spent in contact", optional=True),
     "horizon": _V((), "s", "time up to which pointwise values mean something"),
     "spread": _V(("ensemble_time",), "m s-1", "largest distance of a member's velocity from the mean", optional=True),
-    "rotation_y_mean": _V(("ensemble_time", "kept"), "rad", "ensemble mean of rotation_y", optional=True),
-    "rotation_y_std": _V(("ensemble_time", "kept"), "rad", "ensemble standard deviation of rotation_y", optional=True),
-    "displacement_mean": _V(("ensemble_time", "kept", "axis"), "m", "ensemble mean of displacement", optional=True),
-    "displacement_std": _V(
-        ("ensemble_time", "kept", "axis"), "m", "ensemble standard deviation of displacement", optional=True
-    ),
-    "velocity_mean": _V(("ensemble_time", "kept", "axis"), "m s-1", "ensemble mean of velocity", optional=True),
-    "velocity_std": _V(
-        ("ensemble_time", "kept", "axis"), "m s-1", "ensemble standard deviation of velocity", optional=True
-    ),
-    "acceleration_mean": _V(("ensemble_time", "kept", "axis"), "m s-2", "ensemble mean of acceleration", optional=True),
-    "acceleration_std": _V(
-        ("ensemble_time", "kept", "axis"), "m s-2", "ensemble standard deviation of acceleration", optional=True
-    ),
-    "normal_force_mean": _V(
-        ("ensemble_time", "contact"), "N", "ensemble mean of the normal contact force", optional=True
-    ),
-    "normal_force_std": _V(("ensemble_time", "contact"), "N", "ensemble standard deviation of it", optional=True),
 }
+for _name, (_dims, _units) in _OF_MEMBERS.items():
+    POST |= _of_members(_name, _dims, _units)

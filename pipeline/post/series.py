@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.schema import conform
 from pipeline.core.quantities import IMPACT
-from pipeline.post.horizon import SHARE, Variables, ensemble_statistics, horizon
+from pipeline.post.horizon import QUANTILES, SHARE, Variables, ensemble_statistics, horizon
 from pipeline.post.impacts import impacts
 from pipeline.post.rotations import angle_about_y
 from pipeline.post.schema import POST
@@ -33,6 +33,7 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
         data |= ensemble_statistics(ensemble)
         end = horizon(ensemble.time.values, ensemble.velocity.values)
         coords |= {"ensemble_time": ensemble.time.values, "kept": ensemble.body.values}
+        coords["quantile"] = np.array(QUANTILES)
     data["horizon"] = ((), np.array(end))
     attributes = {
         "scene": str(run.attrs.get("scene", "")),
@@ -42,6 +43,7 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     result = conform(xr.Dataset(data, coords=coords), POST, **attributes)
     if ensemble is not None:
         result["ensemble_time"].attrs = {"units": "s", "long_name": "time of the ensemble's output"}
+        result["quantile"].attrs = {"units": "1", "long_name": "share of the members below"}
     return result
 
 

@@ -46,6 +46,9 @@ def test_the_bundle_is_the_same_in_the_rods_own_frames(reference: str, count: in
     for name in ("frame_translation_shape", "frame_rotation_shape"):
         a, b = (_in_frames(data, name) for data in (here, there))
         np.testing.assert_allclose(b * signs, a, rtol=0.0, atol=1e-11 * np.abs(a).max())
+    for name in ("compliance_full", "compliance_share"):
+        # lengths between nodes a kilometre away have 1e-13 m of rounding on 0.02 m
+        np.testing.assert_allclose(there[name], here[name], rtol=1e-9, atol=1e-9 * float(abs(here[name]).max()))
 
 
 @pytest.mark.parametrize("pose", ["turned", "upright"])
@@ -145,6 +148,8 @@ def test_nafems_fv2_double_cross_of_eight_turned_rods() -> None:
     # (beta h)^4 / 1440 is 6.5e-4 and 4.2e-4 there
     np.testing.assert_allclose(double_cross(4, centre_held=True)[:8], expected[:8], rtol=1e-3)
     np.testing.assert_allclose(double_cross(8, centre_held=True), expected, rtol=1e-3)
+    # 0.01 % takes 12: 8e-5 is left
+    np.testing.assert_allclose(double_cross(12, centre_held=True), expected, rtol=1e-4)
     # real arms stretch: in each cluster of seven the two modes in which the centre moves are lower
     free = double_cross(8, centre_held=False) / double_cross(8, centre_held=True)
     assert np.flatnonzero(np.abs(free - 1.0) > 1e-3).tolist() == [1, 2, 9, 10]

@@ -72,6 +72,7 @@ def test_nothing_is_handed_over_where_the_motion_is_not_stiff() -> None:
 def test_members_of_an_ensemble_hand_over_too() -> None:
     scene = load_scene(TREE / "scenes" / ROLLING, override={"time.end": END, "ensemble": {"members": 2}})
     found = dynamics.ensemble(scene, {}, lambda share, text: None)
+    assert found.attrs["switched"].startswith("2 of 2 members")
     assert np.isfinite(found.position.values).all()
     # they start 1e-8 m apart, which at 19 Hz does not grow in 3 ms
     assert float(found.position.std("member").max()) < 1e-8

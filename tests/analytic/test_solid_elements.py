@@ -12,6 +12,8 @@ from pipeline.structure.fe.solid import elasticity, lattice
 from pipeline.structure.fe.solid.elasticity import Solid
 from pipeline.structure.fe.solid.elements import ELEMENTS, shape_functions
 from pipeline.structure.fe.solid.geometry import Geometry, check
+from pipeline.structure.kinds.kind import of_mesh
+from tests.analytic.solid_models import block, build
 
 LAME, SHEAR = lame_parameters(7.17e10, 0.33)
 
@@ -105,3 +107,17 @@ def test_a_body_in_two_pieces_is_refused() -> None:
     both = np.vstack([nodes, nodes + np.array([2.0, 0.0, 0.0])])
     with pytest.raises(InputError, match=r"in 2 pieces that share no node \(of 1, 1 cells\)\n.*merge"):
         check(Geometry("hex20", both, np.vstack([cells, cells + len(nodes)]), {}, {}), "recipe")
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_the_drawn_boundary_is_closed_and_has_the_area_of_the_body(element: str) -> None:
+    """Its pieces neither overlap nor leave a gap: each edge belongs to two, and their areas add up."""
+    size = np.array([0.1, 0.02, 0.03])
+    mesh = build(block(element, (3, 2, 2), tuple(size), "mean"))
+    drawn = of_mesh(mesh).assemble(mesh).drawn
+    edges = np.sort(np.stack([drawn.cell, np.roll(drawn.cell, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
+    corner = drawn.position[drawn.cell]
+    spokes = corner[:, 1:] - corner[:, :1]
+    area = 0.5 * np.linalg.norm(np.cross(spokes[:, :-1], spokes[:, 1:]), axis=2).sum()
+    assert area == pytest.approx(2.0 * (size * np.roll(size, 1)).sum(), rel=1e-12)

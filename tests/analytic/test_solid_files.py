@@ -86,6 +86,51 @@ def test_materials_and_frames_by_physical_names(tmp_path: Path) -> None:
     np.testing.assert_array_equal(density, np.where(x < 0.05, 7800.0, 2740.0))
 
 
+def test_gmsh_4_names_curves_and_points_beside_its_regions(tmp_path: Path) -> None:
+    """A file as Gmsh 4.15 writes it, whose volume is bounded by surfaces with higher numbers than it has cells."""
+    nodes, cells = lattice.cut(*lattice.block(SIZE, (1, 1, 1)), "hex8")
+    foot = np.flatnonzero(nodes[:, 0] < 1e-9)[[0, 1, 3, 2]]
+    entities = ["0 0 1 1", "5 0 -10 -15 0 10 15 1 1 0", "1 0 -10 -15 100 10 15 1 2 2 5 -26"]
+    places = [f"{k + 1}" for k in range(8)] + [" ".join(map(repr, (1e3 * x).tolist())) for x in nodes]
+    lines = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", "2", '2 1 "foot"', '3 2 "body"']
+    lines += ["$EndPhysicalNames", "$Entities", *entities, "$EndEntities"]
+    lines += ["$Nodes", "1 8 1 8", "3 1 0 8", *places, "$EndNodes", "$Elements", "2 2 1 2"]
+    for entity, tag, cell in (("2 5 3 1", 1, foot), ("3 1 5 1", 2, cells[0])):
+        lines += [entity, " ".join(map(str, [tag, *(cell + 1)]))]
+    (tmp_path / "box.msh").write_text("\n".join([*lines, "$EndElements", ""]))
+    frames = {"bottom": {"on": {"region": "foot"}, "tie": "mean"}}
+    mesh = build(recipe("box.msh", frames=frames, interfaces=["bottom"]), tmp_path)
+    np.testing.assert_allclose(mesh["node_position"].values[mesh["tie_node"].values], nodes[np.sort(foot)], atol=1e-15)
+
+
+def test_a_number_of_faces_and_of_cells_names_the_faces_to_a_frame(tmp_path: Path) -> None:
+    """Nastran files without names: shells and solids may have the same property number."""
+    nodes, cells = box("hex8")
+    foot = cells[np.argmin(nodes[cells].mean(axis=1)[:, 0])][[0, 4, 7, 3]]
+    ref = {"nastran:ref": [np.ones(4, dtype=int), np.ones(1, dtype=int)]}
+    meshio.Mesh(1e3 * nodes, [("hexahedron", cells), ("quad", foot[None])], cell_data=ref).write(tmp_path / "box.bdf")
+    frames = {"bottom": {"on": {"region": "nastran:ref=1"}, "tie": "rigid"}}
+    table = recipe("box.bdf", frames=frames, interfaces=["bottom"], materials={"nastran:ref=1": STEEL})
+    del table["material"]
+    mesh = build(table, tmp_path)
+    assert sorted(mesh["tie_node"].values) == sorted(foot)
+    # the four cells alone: every node belongs to the region, and none is left to deform
+    meshio.Mesh(1e3 * nodes, [("hexahedron", cells)], cell_data={"nastran:ref": ref["nastran:ref"][:1]}).write(
+        tmp_path / "box.bdf"
+    )
+    with pytest.raises(InputError, match="rigid ties take every node"):
+        build(table, tmp_path)
+
+
+def test_a_number_of_each_cell_is_no_region(tmp_path: Path) -> None:
+    nodes, cells = lattice.cut(*lattice.block(SIZE, (11, 10, 10)), "hex8")
+    data = {"id": [np.arange(len(cells))], "part": [np.arange(len(cells)) // 550]}
+    meshio.Mesh(1e3 * nodes, [("hexahedron", cells)], cell_data=data).write(tmp_path / "box.vtu")
+    frames = {"bottom": {"on": {"region": "id=5"}, "tie": "mean"}}
+    with pytest.raises(InputError, match=r"no region is called 'id=5'\n.*known: part=0, part=1$"):
+        build(recipe("box.vtu", frames=frames, interfaces=["bottom"]), tmp_path)
+
+
 def test_materials_must_cover_every_cell_once(tmp_path: Path) -> None:
     two_halves(tmp_path / "box.msh", binary=True)
     table = recipe("box.msh", materials={"left": STEEL})
@@ -119,6 +164,23 @@ def test_units_are_those_declared(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.ptp(mesh["node_position"].values, axis=0), SIZE, rtol=1e-14)
 
 
+#: a cube, as VTK's text format has it
+ONE_CELL = "\n".join(
+    [
+        "# vtk DataFile Version 3.0",
+        "cube",
+        "ASCII",
+        "DATASET UNSTRUCTURED_GRID",
+        "POINTS 8 double",
+        "0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1",
+        "CELLS 1 9",
+        "8 0 1 2 3 4 5 6 7",
+        "CELL_TYPES 1",
+        "12\n",
+    ]
+)
+
+
 def write(path: Path, cells: list[tuple[str, np.ndarray]], nodes: np.ndarray) -> None:
     meshio.Mesh(1e3 * nodes, cells).write(path)
 
@@ -129,12 +191,20 @@ def test_files_that_hold_no_body_are_refused(tmp_path: Path) -> None:
     write(tmp_path / "mixed.vtu", [("hexahedron", cells), ("tetra", tets[1])], np.vstack([nodes, tets[0]]))
     write(tmp_path / "shell.vtu", [("quad", cells[:, :4])], nodes)
     write(tmp_path / "wedge.vtu", [("wedge", cells[:, :6])], nodes)
+    write(tmp_path / "twice.vtu", [("hexahedron", np.vstack([cells, cells[:1]]))], nodes)
+    write(tmp_path / "hole.vtu", [("hexahedron", cells)], np.where(nodes == nodes.max(), np.nan, nodes))
+    (tmp_path / "beyond.vtk").write_text(ONE_CELL.replace("8 0 1", "8 9 1"))
+    (tmp_path / "membrane.inp").write_text("*NODE\n1, 0, 0, 0\n*ELEMENT, TYPE=M3D9\n1, 1\n")
     (tmp_path / "torn.vtu").write_text("<VTKFile")
     (tmp_path / "what.ever").write_text("")
     for name, message in (
         ("mixed.vtu", r"mixes solid cells: 4 hexahedron, 24 tetra"),
         ("shell.vtu", r"no solid cells but 4 quad"),
         ("wedge.vtu", r"cells of type wedge are not supported"),
+        ("twice.vtu", r"cells overlap: 1 cells are there twice"),
+        ("hole.vtu", r"not three finite numbers"),
+        ("beyond.vtk", r"name nodes beyond the 8 that"),
+        ("membrane.inp", r"cannot read 'membrane.inp': .*M3D9"),
         ("torn.vtu", r"meshio cannot read 'torn.vtu'"),
         ("what.ever", r"meshio cannot read 'what.ever'"),
         ("nowhere.vtu", r"there is no file .*nowhere.vtu"),

@@ -122,7 +122,7 @@ def test_frames_that_cannot_be_meant_are_refused(change: dict[str, object], mess
         ({"material": None}, "either `material`"),
         ({"materials": {"body": ALUMINIUM}}, "either `material`"),
         ({"material": None, "materials": {"steel": ALUMINIUM}}, r"\[materials.steel\].*\n.*known: body"),
-        ({"interfaces": ["tpo"]}, r"no frame called 'tpo'.*'top'"),
+        ({"interfaces": ["tpo"]}, r"'tpo' is no frame of the recipe; .*'top'"),
         ({"elements": 12}, r"\[elements\]: unknown key"),
     ],
 )

@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 
+from pipeline.core.registry import module_of
 from pipeline.core.scene.load import compose, load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import loads
 from pipeline.dynamics.assembly import fuse
 from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds, tabulate
+from pipeline.dynamics.assembly.sources import PACKAGES, sources
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.integrate.method import Scheme, scheme_of
 from tests.analytic.mechanism_runs import bundles
@@ -83,9 +85,9 @@ def kinds(path: Path) -> Kinds:
     return kinds_of(load_scene(path))
 
 
-def reached(source: str) -> set[str]:
-    """Modules of this tower that an entry's machine code depends on."""
-    return set(fuse._reached(fuse.imported(source.encode(), "entry", package=False)[0]))
+def reached(texts: dict[str, str]) -> set[str]:
+    """Modules of this tower that the machine code depends on."""
+    return {name for text in texts.values() for name in fuse.reached(text)}
 
 
 #: effect -> word that its generated source must have, modules it must reach
@@ -94,7 +96,7 @@ EFFECTS = {
     "normal law": ("import force as form_force", "pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
-    "closures": ("import closures", "pipeline.dynamics.assembly.closures"),
+    "closures": ("assembly.closures", "pipeline.dynamics.assembly.closures"),
     "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
     "loads": ("import composing", "pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),
@@ -124,8 +126,8 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str) -> None:
     found, present = CASES[case]
-    source = fuse._source(found, SCHEME)
-    modules = reached(source)
+    texts = sources(found, SCHEME)
+    modules, source = reached(texts), "".join(texts.values())
     for effect, (word, module) in EFFECTS.items():
         assert (word in source) == (effect in present), effect
         assert (module in modules) == (effect in present), effect
@@ -135,8 +137,8 @@ def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str)
 def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     """An edit of a part that a scene does not use leaves its machine code alone."""
     found, present = CASES[case]
-    modules = reached(fuse._source(found, SCHEME))
-    wanted = {fuse.module_of(fuse.PACKAGES["joint"], n) for n in found.joints}
+    modules = reached(sources(found, SCHEME))
+    wanted = {module_of(PACKAGES["joint"], n) for n in found.joints}
     wanted.add("pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
         wanted.add("pipeline.dynamics.joints.clearance_spherical")
@@ -145,21 +147,25 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
         assert below(modules, FLEXIBLE) == set()
-    acting = {fuse.module_of(fuse.PACKAGES["load"], n) for n in found.loads}
-    kinds_of_loads = {fuse.module_of(fuse.PACKAGES["load"], n) for n in loads.NAMES}
+    acting = {module_of(PACKAGES["load"], n) for n in found.loads}
+    kinds_of_loads = {module_of(PACKAGES["load"], n) for n in loads.NAMES}
     assert modules & kinds_of_loads == acting
 
 
 def test_frictionless_clearance_reaches_no_friction_law() -> None:
-    modules = reached(fuse._source(CASES["smooth clearance"][0], SCHEME))
+    modules = reached(sources(CASES["smooth clearance"][0], SCHEME))
     assert below(modules, ("pipeline.dynamics.contact.friction",)) == set()
 
 
 # What the machine code is keyed by ----------------------------------------------------------------------------------
 
 
+def digests(found: Kinds, scheme: Scheme) -> dict[str, str]:
+    return {name: fuse.digest(text) for name, text in sources(found, scheme).items()}
+
+
 def digest(scene: Scene) -> str:
-    return fuse._digest(fuse._source(kinds_of(scene), scheme_of(scene.solver)))
+    return " ".join(digests(kinds_of(scene), scheme_of(scene.solver)).values())
 
 
 #: one number of every kind that a scene has
@@ -252,6 +258,17 @@ def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(roo
     free, clamped = (kinds(path_of(root, f"sps4/far_csj_{name}")) for name in ("free", "cb"))
     # the same joints in the tree and the same laws, so the same code
     assert free == clamped
+
+
+def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
+    """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
+    one, other = CASES["clearance"][0], CASES["everything"][0]
+    mine, theirs = digests(one, SCHEME), digests(other, SCHEME)
+    assert [name for name in mine if mine[name] == theirs[name]] == ["advance"]
+    radau = digests(one, Scheme("radau"))
+    assert [name for name in mine if mine[name] != radau[name]] == ["advance"]
+    assert digests(CASES["ideal"][0], SCHEME)["advance"] != mine["advance"]  # it has no contacts to watch
+    assert "project" not in digests(CASES["tree"][0], SCHEME)
 
 
 #: runs scenes one after the other in one process

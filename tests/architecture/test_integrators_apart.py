@@ -11,6 +11,7 @@ from pipeline.core.scene.solver import OWNERS
 from pipeline.dynamics.assembly import fuse
 from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds
+from pipeline.dynamics.assembly.sources import sources
 from pipeline.dynamics.integrate import NAMES
 from pipeline.dynamics.integrate.method import Scheme, scheme_of
 from stages import s4_simulate
@@ -23,7 +24,7 @@ PRIVATE = {
     "dopri5": {"dopri5", "stages"},
     "rk4": {"rk4", "stages", "hermite"},
     "adams-bashforth-moulton": {"adams", "rk4", "stages", "hermite"},
-    "generalized-alpha": {"generalized_alpha", "alpha_newton", "alpha_system", "newton", "lu", "hermite"},
+    "generalized-alpha": {"generalized_alpha", "alpha_newton", "alpha_system", "newton", "lu", "hermite", "displace"},
     "radau": {"radau", "radau_systems", "newton", "lu", "hermite"},
 }
 STEPPING = {"adaptive", "fixed"}
@@ -31,8 +32,7 @@ STEPPING = {"adaptive", "fixed"}
 
 def reached(scheme: Scheme) -> set[str]:
     """Modules of the family that the machine code of a scheme depends on."""
-    source = fuse._source(KINDS, scheme)
-    modules = fuse._reached(fuse.imported(source.encode(), "entry", package=False)[0])
+    modules = {name for text in sources(KINDS, scheme).values() for name in fuse.reached(text)}
     return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.quantities import Quantity
+from pipeline.core.errors import SolverError
+from pipeline.core.quantities import Quantity, standard_error
 from pipeline.post.cost import causes, page, price, split, statistics, work_precision
 from pipeline.post.cost.study import Point, assemble, resolved
 
@@ -105,7 +106,102 @@ def test_the_cheapest_way_to_each_accuracy():
     assert price.cheapest(found, 1e-12) is None
     rows = price.price_list(found, "t").rows
     assert rows[2][1] == "cannot be had"
-    assert "1.7e-07 at best" in rows[2][4]  # 1e-7 s of 0.6 s
+    # 1e-7 s of 0.6 s, and the 1e-8 s by which the reference and its confirmation differ
+    assert "1.8e-07 at best" in rows[2][4]
+
+
+def test_each_quantity_has_a_price_of_its_own():
+    found, *_ = study()
+    rows = {row[0]: row for row in price.by_quantity(found, "t").rows}
+    # 1e-7 m of 2 m and 1e-7 s of 0.6 s, each with the reference's uncertainty of a tenth of it
+    assert [rows[name][-1] for name in ("slider.position", "pin.impact_times")] == ["5.5e-08", "1.8e-07"]
+    assert rows["slider.position"][2] == "dop853, rtol 1e-09 (0.2 s)"  # 5e-6 at 1e-6 is not enough
+    assert rows["pin.impact_times"][3] == "cannot be had"
+
+
+def test_an_error_below_the_references_uncertainty_is_not_claimed():
+    found, *_ = study(uncertainty=1e-5)
+    assert price.cheapest(found, 1e-6) is None
+
+
+def test_a_study_of_which_every_run_is_refused_says_so():
+    _, points, runs = study()
+    refused = {p.key: xr.Dataset(attrs={"refused": "no"}) for p in points if p.group not in ("reference",)}
+    table = price.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t")
+    assert all(row[1] == "cannot be had" for row in table.rows)
+    assert any("Not confirmed: other was refused" in note for note in table.notes)
+    assert any("every run is refused" in note for note in table.notes)
+
+
+def test_a_study_without_its_reference_is_refused_with_the_reason():
+    _, points, runs = study()
+    runs["best"] = xr.Dataset(attrs={"refused": "it blew up"})
+    with pytest.raises(SolverError, match=r"reference \(best\) is refused: it blew up"):
+        assemble(points, runs, [POSITION])
+
+
+def test_what_cannot_be_had_is_explained():
+    rounded, *_ = study(uncertainty=1e-7)
+    assert any("rounding errors" in note for note in price.price_list(rounded, "t").notes)
+    coarse, *_ = study(uncertainty=1e-12)
+    assert any("best setting that was tried reaches" in note for note in price.price_list(coarse, "t").notes)
+    _, points, runs = study()
+    runs["other"] = run(0.0, impacts=2)
+    other = price.price_list(assemble(points, runs, [POSITION, TIMES]), "t")
+    assert any("do not agree on the number of impacts" in note for note in other.notes)
+
+
+def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
+    _, points, runs = study()
+    points.append(Point("as it stands", "sampling", {"interval": 0.1}))
+    runs["as it stands"] = xr.Dataset(attrs={"refused": "no"})
+    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    assert np.isnan(found["time integration"])
+    assert causes.dominant(found) == "–"
+
+
+def test_the_spread_of_an_ensemble_is_a_cause():
+    _, points, runs = study()
+    random = np.random.default_rng(2)
+    members = 16
+    data = {
+        "peak_force": (("member", "contact"), random.normal(100.0, 5.0, (members, 1))),
+        "standard_error": (("quantity",), [0.01]),
+    }
+    ensemble = xr.Dataset(data, {"contact": ["pin"], "quantity": ["slider.position"]})
+    found = split.causes_of(POSITION, points, runs, 1e-12, ensemble)
+    assert found["ensemble spread"] == pytest.approx(1.96 * 0.01 / SIZE)
+    assert np.isnan(split.causes_of(TIMES, points, runs, 1e-12, ensemble)["ensemble spread"])
+    runs["best"]["event_peak_force"] = (("event",), np.full(3, 100.0))
+    peak = split.causes_of(Quantity("pin", "peak_force"), points, runs, 1e-12, ensemble)["ensemble spread"]
+    assert peak == pytest.approx(1.96 * 0.05 / np.sqrt(members), rel=0.5)
+
+
+def test_the_standard_error_of_a_series_is_that_of_its_members_mean():
+    random = np.random.default_rng(5)
+    values = random.normal(0.0, 1.0, (400, 3, 1, 3)) * np.array([0.0, 1.0, 2.0])[:, None, None]
+    ensemble = xr.Dataset({"position": (("member", "time", "body", "axis"), values)}, {"body": ["slider"]})
+    # the last time: deviation 2 on each of three axes, over the root of 400
+    assert standard_error(ensemble, POSITION) == pytest.approx(2.0 * np.sqrt(3.0) / 20.0, rel=0.1)
+    assert standard_error(ensemble, Quantity("other", "position")) is None
+    assert standard_error(ensemble, Quantity("slider", "orientation")) is None
+    assert standard_error(ensemble, TIMES) is None
+
+
+def test_larger_ensembles_know_their_mean_better():
+    values = np.random.default_rng(3).normal(10.0, 1.0, size=64)
+    errors = [statistics.relative_error(values[:size]) for size in statistics.growing(64)]
+    assert statistics.growing(64) == [4, 8, 16, 32, 64]
+    # 1.96 standard deviations of 0.1 over the root of 64, from one draw of them
+    assert errors[-1] == pytest.approx(1.96 * 0.1 / 8.0, rel=0.2)
+    assert errors[-1] < errors[1]
+
+
+def test_the_figure_of_ensembles_is_drawn():
+    random = np.random.default_rng(1)
+    data = {name: (("member", "contact"), random.uniform(1, 2, (16, 1))) for name in statistics.STATISTICS}
+    one = xr.Dataset(data, {"contact": ["pin"]}, {"cpu_seconds": 0.5})
+    assert set(statistics.make("s", {"rtol 1e-06": one, "rtol 1e-08": one}, "t")) == {"s.png", "s.svg"}
 
 
 def test_the_pareto_front_holds_what_nothing_beats():
@@ -158,7 +254,28 @@ def test_the_page_says_what_each_digit_costs():
     assert "![Error of a/scene](x/y.png)" in text
 
 
+def test_the_page_says_how_far_it_holds_and_what_to_refine():
+    found, *_ = study(horizon=0.5)
+    shares = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
+    split_up = causes.beside(found, shares)
+    text = page.markdown((page.Studied("a/scene", split_up, ("**Beyond the horizon: x**",), {}),), "p.md")
+    assert "holds up to t = 0.5 s of 1 s; beyond that nothing but the means of an ensemble, below" in text
+    assert "more elements (mesh limits slider.position)" in text
+    alone = page.markdown((page.Studied("a/scene", split_up, (), {}),), "p.md")
+    assert "an ensemble, which the scene can ask for" in alone
+
+
 def test_figures_are_drawn():
     found, *_ = study()
     mark = work_precision.Mark("paper's choice", 0.5, {"slider.position": 1e-3})
     assert set(work_precision.make("w", found, "t", (mark,))) == {"w.png", "w.svg"}
+
+
+def test_other_programs_are_drawn_beside_ours_relative_to_the_same_size():
+    found, *_ = study()
+    track = {"name": "peer", "note": "n", "seconds": [1.0, 2.0], "error": {"slider.position": [1e-3, 1e-4]}}
+    (curve,) = work_precision.peers(found, [track])
+    assert curve.error[:, 0] == pytest.approx([1e-3 / SIZE, 1e-4 / SIZE])
+    assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
+    assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
+    assert price.price_list(found, "t", ("said",)).notes[-1] == "said"

@@ -20,6 +20,7 @@ from pipeline.dynamics.assembly.numbers import Tables, tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.contact import forces, friction
 from pipeline.dynamics.contact import form as forms
+from tests.properties.kernels import from_python
 
 FRICTION: dict[str, dict[str, Any]] = {
     "modified-coulomb": {"static": 0.15, "dynamic": 0.1, "v_static": 2e-4, "v_dynamic": 1e-2},
@@ -69,7 +70,7 @@ def kernel(laws: Laws) -> Any:
     if laws[1] is not None:
         rub = forces.rubbing(dispatch.choose((lookup(friction.__name__, laws[1], where="test").traction,)))
     chosen = (dispatch.choose((k,)) for k in (surfaces.separation, form.force, form.stored))
-    return forces.compose(*chosen, rub)
+    return from_python(forces.compose(*chosen, rub))
 
 
 class Touch:
@@ -194,7 +195,7 @@ def test_the_ledger_books_what_the_forces_do(laws: Laws, seed: int, depth: float
     touch = Touch(laws, seed, depth, slip)
     law = tables_of(laws).laws[0]
     form = import_module(module_of(forms.__name__, law.form))
-    elastic = float(form.force(-touch.touch[tables.GAP], 0.0, 1.0, law.numbers)[0])
+    elastic = float(from_python(form.force)(-touch.touch[tables.GAP], 0.0, 1.0, law.numbers)[0])
     stored = elastic * touch.touch[tables.RATE]
     size = np.abs(touch.wrench["ball"]).max() * slip * 20.0
     # rounding of moments about a point some 1 m away

@@ -21,6 +21,7 @@ from pipeline.dynamics.tables import (
     J_VELOCITY,
     JOINT_SIZE,
 )
+from tests.properties.kernels import from_python
 
 #: places in a work space of the tests' own
 AT_X, AT_U, AT_DU, AT_RATE, AT_JOINT = 0, 7, 13, 19, 26
@@ -39,7 +40,7 @@ def move(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray) -> tuple[np.nd
     """The joint's motion record and position rates."""
     w = np.full(SIZE, np.nan)  # what the kernel does not write must not be read
     w[AT_X : AT_X + len(x)], w[AT_U : AT_U + len(u)], w[AT_DU : AT_DU + len(du)] = x, u, du
-    declared(name).motion(w, AT_X, AT_U, AT_DU, AT_JOINT, AT_RATE)
+    from_python(declared(name).motion)(w, AT_X, AT_U, AT_DU, AT_JOINT, AT_RATE)
     return w[AT_JOINT:], w[AT_RATE : AT_RATE + len(x)]
 
 

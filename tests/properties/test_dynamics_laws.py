@@ -17,6 +17,7 @@ from pipeline.core.scene.clearance import NormalLaw
 from pipeline.dynamics.contact import form as forms
 from pipeline.dynamics.contact import normal
 from pipeline.dynamics.contact.law import Resolved
+from tests.properties.kernels import from_python
 
 Parameters = tuple[float, float, float, float]
 
@@ -63,7 +64,7 @@ class Law:
 
     def parts(self, depth: float, rate: float, impact_rate: float) -> tuple[float, float]:
         form = import_module(module_of(forms.__name__, self.resolved.form))
-        elastic, damping = form.force(depth, rate, impact_rate, self.resolved.numbers)
+        elastic, damping = from_python(form.force)(depth, rate, impact_rate, self.resolved.numbers)
         return float(elastic), float(damping)
 
     def force(self, depth: float, rate: float, impact_rate: float) -> float:
@@ -71,7 +72,7 @@ class Law:
 
     def stored(self, depth: float) -> float:
         form = import_module(module_of(forms.__name__, self.resolved.form))
-        return float(form.stored(depth, self.resolved.numbers))
+        return float(from_python(form.stored)(depth, self.resolved.numbers))
 
 
 def laws(stiffness: float = 1.3631e11, exponent: float = 1.5) -> list[Law]:

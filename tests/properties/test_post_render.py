@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import meshio
 import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.post import derive
+from pipeline.post import body_shape, derive
 from pipeline.post.render import gl
-from pipeline.post.render.mechanism import mechanism, rod_surface
+from pipeline.post.render.mechanism import mechanism, placed
 from pipeline.post.render.panel import panel
 from pipeline.post.render.pictures import pictures
 from pipeline.post.render.solids import equivalent, mesh
-from pipeline.post.rod_shape import centre_line, scale_to, surface
+from pipeline.post.rod_shape import AROUND, PER_CELL, centre_line, scale_to, surface
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
@@ -107,9 +110,81 @@ def test_drawn_rod_lies_at_its_body_in_the_world():
     mass = float(bundle.mass)
     middle = xr.DataArray(mass * np.array([0.12, 0.0, 0.0]), dims="axis")
     drawn = mechanism(run, {"rod1": bundle.assign(first_moment=middle)})
-    points, _ = rod_surface(run, drawn.flexible[0], 0)
+    points = placed(run, drawn.flexible[0], 0)[0].reshape(-1, AROUND + 1, 3)
     rod = run.position.sel(body="rod1").values[0]
     np.testing.assert_allclose(points[1:-1, :-1].mean(axis=(0, 1)), rod, atol=1e-9)  # rings are even: mean = centre
+
+
+def solid(corners: int) -> xr.Dataset:
+    """A plate of 4 x 2 squares, 0.2 by 0.1 m, drawn by nodes, triangles or squares; it bends and it twists."""
+    x, y = (part.ravel() for part in np.meshgrid(np.linspace(0.0, 0.2, 5), np.linspace(-0.05, 0.05, 3), indexing="ij"))
+    shape = np.zeros((15, 3, 2))
+    shape[:, 2] = np.stack([x**2, x * y], axis=1)
+    index = np.arange(15).reshape(5, 3)
+    square = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
+    cell = {1: np.arange(15)[:, None], 3: np.vstack([square[:, [0, 1, 2]], square[:, [0, 2, 3]]]), 4: square}[corners]
+    return xr.Dataset(
+        {
+            "node_position": (("node", "axis"), np.stack([x, y, 0.0 * x], axis=1)),
+            "cell": (("cell", "corner"), cell),
+            "radius": (("cell",), np.zeros(len(cell))),
+            "shape_translation": (("node", "axis", "mode"), shape),
+            "shape_rotation": (("node", "axis", "mode"), 0.0 * shape),
+            "frequency": (("mode",), [100.0, 200.0]),
+        }
+    )
+
+
+@pytest.mark.parametrize("corners", [1, 3, 4])
+def test_solids_are_drawn_by_their_nodes_and_faces(corners):
+    plate = solid(corners)
+    q = np.array([0.0, 3.0])
+    scale = body_shape.scale_to(plate, q, 0.1)
+    points, size = body_shape.surface(plate, q, scale)
+    assert size.max() == pytest.approx(0.1 * 0.2, rel=1e-12)
+    np.testing.assert_allclose(points[:, :2], plate.node_position.values[:, :2], rtol=1e-12)
+    np.testing.assert_allclose(points[:, 2], scale * 3.0 * points[:, 0] * points[:, 1], rtol=0.0, atol=1e-15)
+    assert body_shape.faces(plate).shape == (plate.sizes["cell"], corners)
+    axes, extent = body_shape.box(plate)
+    np.testing.assert_allclose(extent, [0.2, 0.1, 0.0], atol=1e-15)
+    np.testing.assert_allclose(np.abs(axes), np.eye(3), atol=1e-12)
+
+
+def test_a_rods_skin_is_closed_but_for_its_seam():
+    bundle = synthetic.bundle()
+    points, size = body_shape.surface(bundle, np.eye(7)[2])
+    assert len(points) == len(size)
+    _, same = np.unique(np.round(points, 12), axis=0, return_inverse=True)
+    faces = same.ravel()[body_shape.faces(bundle)]
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = edges[edges[:, 0] != edges[:, 1]]  # the caps' faces have two corners at the centre
+    assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
+
+
+def test_a_stepped_rod_is_drawn_with_each_cells_radius():
+    bundle = synthetic.bundle()
+    radius = np.where(np.arange(bundle.sizes["cell"]) < 4, 0.01, 0.004)
+    rings = surface(bundle.assign(radius=("cell", radius)), np.zeros(7))[0][1:-1]
+    drawn = np.hypot(rings[:, 0, 1], rings[:, 0, 2])
+    np.testing.assert_allclose(drawn, np.append(np.repeat(radius, PER_CELL), radius[-1]), rtol=1e-12)
+
+
+@needs_gl
+@pytest.mark.parametrize("corners", [1, 3, 4])
+def test_shapes_of_solids_become_pictures_pages_and_files(corners, tmp_path):
+    from pipeline.post.render import shapes
+
+    plate = solid(corners)
+    picture = shapes.picture(plate, 1)
+    content = shapes.page(plate, 1)
+    assert content == shapes.page(plate, 1)
+    # viridis is on it: pixels that are far from grey; 15 dots of nine pixels cover less than the plate does
+    assert np.count_nonzero(np.ptp(picture.astype(int), axis=-1) > 60) > (200 if corners == 1 else 5000)
+    assert b"vtk" in content
+    (tmp_path / "plate.vtu").write_bytes(shapes.vtu(plate))
+    read = meshio.read(tmp_path / "plate.vtu")
+    np.testing.assert_array_equal(read.cells[0].data, plate.cell.values)
+    np.testing.assert_allclose(read.point_data["mode_2_200.0Hz"], plate.shape_translation.values[:, :, 1])
 
 
 def test_state_of_gl_is_said_without_drawing():
@@ -120,6 +195,28 @@ def test_without_gl_there_are_no_pictures_but_a_line_that_says_why(monkeypatch, 
     monkeypatch.setattr("pipeline.post.render.gl.works", lambda: False)
     assert pictures(xr.Dataset(), {}) == {}
     assert gl.REMEDY in capsys.readouterr().err
+
+
+@needs_gl
+def test_a_film_moves():
+    """Both the rod and the rigid bodies: a second picture of one scene shows what has moved since the first."""
+    from pipeline.post.render import film
+
+    run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
+    drawn = mechanism(run, {"rod1": synthetic.bundle()})
+    scene = film.plotter((200, 160))
+    actors = film._build(scene, drawn)
+    film._look(scene, drawn)
+    last = run.sizes["time"] // 2
+    seen = []
+    for body in (replace(drawn, rigid=(), balls=()), replace(drawn, flexible=(), balls=())):
+        moving = film.Actors(actors.rigid if body.rigid else (), (), actors.flexible if body.flexible else ())
+        for step in (0, last):
+            film._place(body, moving, step, glow=False)
+            seen.append(film.image(scene).astype(int))
+    scene.close()
+    assert np.abs(seen[1] - seen[0]).max() > 20  # the rod
+    assert np.abs(seen[3] - seen[2]).max() > 20  # everything else
 
 
 @needs_gl

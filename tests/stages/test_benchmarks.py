@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks import __main__ as command
-from benchmarks import accuracy, evaluation, growth, log, maximal, measure, page, peer
+from benchmarks import accuracy, evaluation, growth, log, maximal, measure, page, peer, peer_points
 from benchmarks.accuracy import Error
 from benchmarks.engines import (
     Mechanism,
@@ -29,6 +29,7 @@ from pipeline import dynamics
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_SIZE
+from stages import cost_peers
 from tests.reference.ideal_motion import ideal
 
 UNKNOWNS = {"ideal": 116, "csj": 113, "far_cb": 129, "far_csj_cb": 126}
@@ -202,6 +203,18 @@ def test_the_peer_s_model_refuses_what_it_would_leave_out():
     pytest.importorskip("exudyn")
     with pytest.raises(ValueError, match="no loads"):
         solve(Mechanism("chain", growth.four_bars(1), {}), "bar0", next(iter(METHODS)), 1e-3)
+
+
+def test_the_logged_runs_of_the_peer_are_points_of_cost_studies(tmp_path: Path):
+    found = peer_points.points(log.latest()["exudyn"])
+    assert {"sps4/csj", "sps4/variants/far_csj_cb_damped"} <= found.keys()
+    for track in found["sps4/csj"]:
+        # in SI: some 10 um and some mm/s at the longest step
+        assert 1e-8 < track["error"]["platform.position"][0] < 1e-4
+        assert 1e-4 < track["error"]["platform.velocity"][0] < 1e-1
+    file = tmp_path / "peers.json"
+    file.write_text(json.dumps(found))
+    assert cost_peers.read(file) == found
 
 
 def test_without_the_peer_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):

@@ -44,7 +44,7 @@ WRONG = {
         SCENE.replace('"1 kg"', '"1 mm"') + JOINT,
         ["body.ball", "mass", "'1 mm' is a length"],
     ),
-    "unknown unit": (SCENE.replace('"1 kg"', '"1 lb"') + JOINT, ["unknown unit 'lb'", "kg"]),
+    "unknown unit": (SCENE.replace('"1 kg"', '"1 stone"') + JOINT, ["unknown unit 'stone'", "kg"]),
     "negative mass": (SCENE.replace('"1 kg"', "-1") + JOINT, ["body.ball", "mass", "greater than 0"]),
     "not TOML": ("title = \n", ["is not TOML", "line 1"]),
     "no body": ('title = "a"\n[time]\nend = 1\n', ["body", "is missing"]),

@@ -81,3 +81,13 @@ def test_a_terminal_keeps_one_line_with_everything_that_runs():
 )
 def test_durations_read_well(seconds: float, text: str):
     assert duration(seconds) == text
+
+
+def test_tasks_of_one_label_are_told_apart():
+    """Two copies of a scene that differ in its mesh have a task 'mesh rod1' each."""
+    monitor, _, _ = watched(terminal=False)
+    first, second = monitor.begin("a", "mesh rod1"), monitor.begin("a", "mesh rod1")
+    assert (first, second) == ("a: mesh rod1", "a: mesh rod1 (2)")
+    monitor.finish(first, failed=False)
+    monitor.finish(second, failed=False)
+    assert monitor.done == 2

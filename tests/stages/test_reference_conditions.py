@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from benchmarks.reference_conditions import claims, design, page
-from benchmarks.reference_conditions.design import CONDITIONS, FULL, PLACES, RIGID, Case
+from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 
 Row = dict[str, Any]
 EFFECT = {"angle": 3e-6, "displacement": 3e-7, "velocity": 7e-4}
@@ -102,3 +102,15 @@ def test_cases_take_the_scene_of_their_place() -> None:
         assert scene.ensemble.members == 3
         assert scene.flexible()["rod1"].modes.interfaces == (frame, "top")
     assert design.scene(Case(0, RIGID)).flexible() == {}
+
+
+def test_ensembles_of_dear_sets_have_half_the_members(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(design, "whole", lambda place, condition, count: count)
+    cases = design.clearance(8)
+    assert len(set(cases)) == len(cases)
+    assert {case.members for case in cases if case.condition == RIGID} == {0}
+    assert {case.members for case in cases if case.condition != RIGID and case.count <= COUNT} == {8}
+    assert {case.members for case in cases if case.count > COUNT} == {4}
+    for place in PLACES:
+        sets = {case.count for case in cases if (case.place, case.condition) == (place, "craig-bampton")}
+        assert sets >= {COUNT, *MOST_COMPLETE}

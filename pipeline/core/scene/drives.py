@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from pipeline.core.scene.fields import FrameName, Part
-from pipeline.core.scene.laws import Law
+from pipeline.core.scene.laws import Bare
 
 
 class JointDrive(Part):
@@ -16,15 +16,15 @@ class JointDrive(Part):
 
     joint: str
     coordinate: str | None = None
-    law: Law
+    law: Bare
 
 
 class Components(Part):
     """Laws along, or about, the axes; a component without a law stays free."""
 
-    x: Law | None = None
-    y: Law | None = None
-    z: Law | None = None
+    x: Bare | None = None
+    y: Bare | None = None
+    z: Bare | None = None
 
     def laws(self) -> dict[str, Any]:
         """The laws that there are, by axis."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from pipeline.core.algebra import axes_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
-from pipeline.core.units import quantity
+from pipeline.core.units import a, quantity
 
 
 def _scalar(dimension: str) -> Any:
@@ -25,7 +26,7 @@ def _vector(dimension: str) -> Any:
 
     def read(value: Any) -> tuple[float, ...]:
         if not isinstance(value, (list, tuple)) or len(value) != 3:
-            raise ValueError(f"expected three components [x, y, z] of a {dimension}")
+            raise ValueError(f"expected three components [x, y, z], each {a(dimension)}")
         return tuple(quantity(component, dimension) for component in value)
 
     item = {"type": ["number", "string"]}
@@ -80,10 +81,12 @@ else:
 
 def _inertia(value: Any) -> list[list[float]]:
     """``[Ixx, Iyy, Izz]`` or a full 3x3 matrix, as three rows [kg m^2]."""
-    rows = np.array([_components(row) for row in value] if isinstance(value, (list, tuple)) else [])
-    if rows.shape == (3, 1):
-        rows = np.diag(rows[:, 0])
-    if rows.shape != (3, 3):
+    given = [_components(row) for row in value] if isinstance(value, (list, tuple)) else []
+    if [len(row) for row in given] == [1, 1, 1]:
+        rows = np.diag([row[0] for row in given])
+    elif [len(row) for row in given] == [3, 3, 3]:
+        rows = np.array(given)
+    else:
         raise ValueError("an inertia is [Ixx, Iyy, Izz] or a 3x3 matrix, about the centre of mass")
     if not np.allclose(rows, rows.T, rtol=1e-12, atol=0.0):
         raise ValueError("an inertia matrix is symmetric")
@@ -106,7 +109,25 @@ Inertia = Annotated[
     WithJsonSchema({"type": "array", "description": "[Ixx, Iyy, Izz] or 3x3, about the centre of mass, body axes"}),
 ]
 
-FrameName = Annotated[str, Field(pattern=r"^[A-Za-z_]\w*\.[A-Za-z_]\w*$", description="body.FRAME")]
+#: names of bodies and frames: letters of any script, digits, underscores and hyphens
+_NAME = r"\w[\w-]*"
+
+
+def part_name(name: str) -> str:
+    """A part's name that may stand in places such as ``body.FRAME`` and in names of files; ValueError otherwise."""
+    if not re.fullmatch(_NAME, name):
+        raise ValueError(f"'{name}' is no name: it is made of letters, digits, _ and -")
+    return name
+
+
+def _frame(value: Any) -> Any:
+    if isinstance(value, str) and not re.fullmatch(rf"{_NAME}\.{_NAME}", value):
+        raise ValueError("a frame is named with its body, as in 'body.FRAME'")
+    return value
+
+
+PartName = Annotated[str, AfterValidator(part_name)]
+FrameName = Annotated[str, BeforeValidator(_frame), Field(description="body.FRAME")]
 
 #: where values come from: one text for the whole part, or one per key; "assumed: why" for assumptions
 Source = str | dict[str, str]

@@ -15,10 +15,20 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
 from pipeline.core.scene.fields import Angle, Part, Rate, Time
-from pipeline.core.units import UNITS, any_quantity, quantity
+from pipeline.core.units import UNITS, any_quantity, quantity, unit
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law stands"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
+
+
+def _listed(value: Any) -> Any:
+    """One entry may stand without its list."""
+    return [value] if isinstance(value, (int, float, str)) else value
+
+
+_LIST = BeforeValidator(_listed, json_schema_input_type=float | str | tuple[float | str, ...])
+Values: TypeAlias = Annotated[tuple[Value, ...], _LIST]
+Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 
 #: most coefficients of a polynomial law
 COEFFICIENTS = 8
@@ -36,9 +46,9 @@ class Step(Part):
     """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35)."""
 
     type: Literal["step"]
-    start: tuple[Time, ...]
-    end: tuple[Time, ...]
-    change: tuple[Value, ...]
+    start: Times
+    end: Times
+    change: Values
 
     @field_validator("change")
     @classmethod
@@ -56,11 +66,21 @@ class Step(Part):
         return self
 
 
+def _coefficient(value: Any) -> Any:
+    """A number, or text with a unit; which one belongs there is known where the law stands."""
+    if isinstance(value, str) and not any(character.isalpha() for character in value):
+        return quantity(value, "number")
+    return value if isinstance(value, str) else quantity(value, "number")
+
+
 class Polynomial(Part):
-    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; coefficients in SI units, the constant first."""
+    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; in SI units, or as ``["30 deg", "10 deg/s"]``."""
 
     type: Literal["polynomial"]
-    coefficients: Annotated[tuple[float, ...], Field(min_length=1, max_length=COEFFICIENTS)]
+    coefficients: Annotated[
+        tuple[Annotated[float | str, BeforeValidator(_coefficient)], ...],
+        Field(min_length=1, max_length=COEFFICIENTS),
+    ]
     origin: Time = 0.0
 
 
@@ -68,9 +88,9 @@ class Harmonic(Part):
     """Offset plus the sum of amplitude sin(frequency t + phase); phase 90 deg is a cosine."""
 
     type: Literal["harmonic"]
-    amplitude: Annotated[tuple[Value, ...], Field(min_length=1)]
-    frequency: tuple[Rate, ...]
-    phase: tuple[Angle, ...] | None = None
+    amplitude: Annotated[Values, Field(min_length=1)]
+    frequency: Annotated[tuple[Rate, ...], _LIST]
+    phase: Annotated[tuple[Angle, ...], _LIST] | None = None
     offset: Value = 0.0
 
     @model_validator(mode="after")
@@ -110,10 +130,10 @@ class Column(Part):
 
     @field_validator("unit")
     @classmethod
-    def _known(cls, unit: str) -> str:
-        if unit not in (*UNITS, "1"):
-            raise ValueError(f"unknown unit '{unit}'; known: {', '.join(UNITS)}, and 1 for a pure number")
-        return unit
+    def _known(cls, text: str) -> str:
+        if text != "1" and unit(text) is None:
+            raise ValueError(f"unknown unit '{text}'; known: {', '.join(UNITS)}, products of them, and 1 for a number")
+        return text
 
 
 class Table(Part):
@@ -153,14 +173,14 @@ class Sum(Part):
     """Sum of laws."""
 
     type: Literal["sum"]
-    laws: Annotated[tuple[Law, ...], Field(min_length=1)]
+    laws: Annotated[tuple[Bare, ...], Field(min_length=1)]
 
 
 class Section(Part):
     """From this time on the law holds, until the next section starts."""
 
     start: Time
-    law: Law
+    law: Bare
 
 
 class Piecewise(Part):
@@ -184,13 +204,21 @@ class Repeated(Part):
     period: Annotated[Time, Field(gt=0)]
     times: Annotated[int, Field(ge=1)]
     start: Time = 0.0
-    law: Law
+    law: Bare
 
 
 KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
 Law = Annotated[
     Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
 ]
+
+
+def _bare(law: Any) -> Any:
+    """A bare value is a constant."""
+    return law if not isinstance(law, (int, float, str)) else {"type": "constant", "value": law}
+
+
+Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
 for _composed in (Sum, Section, Piecewise, Repeated):
     _composed.model_rebuild()
 

@@ -10,21 +10,15 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from pipeline.core.errors import InputError, InputErrors
+from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
+from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
-#: types of parts, by which their models are chosen
-TYPES = (
-    *("ground", "rigid", "flexible"),
-    *("spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"),
-    *("clearance-spherical", "clearance-revolute", "modified-coulomb", "ambrosio", "lugre"),
-    *("joint-drive", "path-drive"),
-    *("constant", "step", "polynomial", "harmonic", "spline", "table", "sum", "piecewise", "repeated"),
-    *("gravity", "point-force", "point-torque", "spring-damper", "joint-force", "joint-spring", "joint-friction"),
-)
 SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
+#: bytes that no scene or recipe needs
+LARGEST = 16 << 20
 EDITS = ("extends", "replace", "set", "remove")
 
 
@@ -41,7 +35,7 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:
-        raise InputErrors([_input_error(path, e) for e in error.errors()]) from None
+        raise input_errors(path, error, Scene) from None
     scene._name = scene_name(path)
     scene._path = path
     return scene
@@ -58,7 +52,7 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
     try:
         result = Scene.model_validate(table)
     except ValidationError as error:
-        raise InputErrors([_input_error(Path(scene.name), e) for e in error.errors()]) from None
+        raise input_errors(Path(scene.name), error, Scene) from None
     result._name, result._path = scene._name, scene._path
     return result
 
@@ -79,27 +73,67 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
         chain = " -> ".join(p.name for p in (*above, path))
         raise InputError(str(path), f"extends itself: {chain}", "break the circle")
     table = read_toml(path)
+    _require_tables(table, path)
     if "extends" not in table:
         extra = [key for key in EDITS if key in table]
         if extra:
             raise InputError(f"{path} [{extra[0]}]", "edits another scene, but none is extended", 'add extends = "..."')
         _absolute_files(table, path)
         return table
-    base = compose(path.parent / str(table["extends"]), (*above, path))
+    if not isinstance(table["extends"], str):
+        raise InputError(
+            f"{path} [extends]", f"is the name of one file, not {table['extends']!r}", 'write "other.toml"'
+        )
+    base = compose(path.parent / table["extends"], (*above, path))
     return _edited(base, table, path)
+
+
+def _require_tables(table: dict[str, Any], path: Path) -> None:
+    """What is edited before the scene is checked as a whole must be there as tables of tables."""
+    wholes = [("", table), *((f"{edit}.", table[edit]) for edit in ("replace", "set") if edit in table)]
+    for prefix, whole in wholes:
+        if not isinstance(whole, dict):
+            raise InputError(f"{path} [{prefix[:-1]}]", f"expected a table, not {whole!r}", "write [set.body.NAME]")
+        for family in FAMILIES:
+            parts = whole.get(family, {})
+            wrong = (
+                parts
+                if not isinstance(parts, dict)
+                else next((p for p in parts.values() if not isinstance(p, dict)), {})
+            )
+            if not isinstance(wrong, dict):
+                raise InputError(
+                    f"{path} [{prefix}{family}]",
+                    f"expected a table of named parts, not {wrong!r}",
+                    f"write [{prefix}{family}.NAME]",
+                )
+    removed = table.get("remove", [])
+    if not isinstance(removed, list) or not all(isinstance(place, str) for place in removed):
+        raise InputError(f"{path} [remove]", f"is a list of places, not {removed!r}", 'write remove = ["joint.A1"]')
 
 
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a table; InputError when it cannot be read or parsed."""
     try:
-        with path.open("rb") as file:
-            return tomllib.load(file)
+        if path.stat().st_size > LARGEST:
+            raise InputError(str(path), f"is larger than {LARGEST >> 20} MB", "name a TOML file")
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
-    except (IsADirectoryError, PermissionError, UnicodeDecodeError) as error:
-        raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(str(path), f"is not text in UTF-8: {error.reason}", "name a TOML file") from None
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read: {error.strerror}", "name a TOML file") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(str(path), f"is not TOML: {error}") from None
+        raise InputError(str(path), f"is not TOML: {error}", _toml_hint(str(error))) from None
+    except RecursionError:
+        raise InputError(str(path), "nests tables or lists too deeply to be read") from None
+
+
+def _toml_hint(message: str) -> str | None:
+    if "at the end of a table declaration" in message or "after a key" in message:
+        return "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
+    return None
 
 
 def _neighbours(path: Path) -> str | None:
@@ -214,17 +248,3 @@ def _tables(node: object) -> Iterator[dict[str, Any]]:
     if isinstance(node, list):
         for item in node:
             yield from _tables(item)
-
-
-def _input_error(path: Path, error: Any) -> InputError:
-    # pydantic puts the type by which it chose a part's model into the place; the file has no such key
-    keys = [key for key in error["loc"] if not str(key).startswith("<")]
-    place = ".".join(str(key) for k, key in enumerate(keys) if k < 2 or key not in TYPES)
-    message = error["msg"].removeprefix("Value error, ")
-    if error["type"] == "extra_forbidden":
-        message = "unknown key"
-    if error["type"] == "missing":
-        message = "is missing"
-    value = error.get("input")
-    shown = f" (got {value!r})" if isinstance(value, (str, int, float)) and error["type"] != "missing" else ""
-    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}")

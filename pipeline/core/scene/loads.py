@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import Field, model_validator
 
 from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness
-from pipeline.core.scene.laws import Law, Value
+from pipeline.core.scene.laws import Bare, Value
 
-
-def _law(component: Any) -> Any:
-    """A bare value is a constant."""
-    return component if isinstance(component, (dict, Part)) else {"type": "constant", "value": component}
-
-
-Component = Annotated[Law, BeforeValidator(_law)]
-Components = tuple[Component, Component, Component]
+Components = tuple[Bare, Bare, Bare]
 
 
 class Gravity(Part):
@@ -74,7 +67,7 @@ class JointForce(Part):
     type: Literal["joint-force"]
     joint: str
     coordinate: str | None = None
-    force: Component
+    force: Bare
 
 
 class JointSpring(Part):

@@ -15,6 +15,7 @@ from pipeline.core.scene.fields import (
     Mass,
     Number,
     Part,
+    PartName,
     Pose,
     Position,
     Time,
@@ -29,7 +30,7 @@ class Ground(Part):
     """The fixed world; listed only to give it frames."""
 
     type: Literal["ground"]
-    frames: dict[str, Pose] = Field(default_factory=dict)
+    frames: dict[PartName, Pose] = Field(default_factory=dict)
 
 
 class RigidBody(Part):
@@ -44,7 +45,7 @@ class RigidBody(Part):
     )
     velocity: Velocity | None = Field(default=None, description="start velocity of the centre of mass, world axes")
     angular_velocity: AngularVelocity | None = Field(default=None, description="start angular velocity, world axes")
-    frames: dict[str, Pose] = Field(default_factory=dict)
+    frames: dict[PartName, Pose] = Field(default_factory=dict)
 
 
 def _hertz(value: Any) -> float:

@@ -10,7 +10,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from pipeline.core import quantities
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
-from pipeline.core.scene.fields import Length, Number, Part, Time
+from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
 from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.parts import (
     Body,
@@ -117,10 +117,10 @@ class Scene(Part):
 
     title: str
     description: str = ""
-    body: dict[str, Body]
-    joint: dict[str, Joint] = Field(default_factory=dict)
-    drive: dict[str, Drive] = Field(default_factory=dict)
-    load: dict[str, Load] = Field(default_factory=dict)
+    body: dict[PartName, Body]
+    joint: dict[PartName, Joint] = Field(default_factory=dict)
+    drive: dict[PartName, Drive] = Field(default_factory=dict)
+    load: dict[PartName, Load] = Field(default_factory=dict)
     time: TimeSpan
     solver: Solver = ExplicitPair()
     output: Output = Output()

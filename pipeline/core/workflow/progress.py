@@ -46,8 +46,12 @@ class Monitor:
         self.total, self.done = total, 0
 
     def begin(self, scene: str, label: str) -> str:
-        """A task starts; returns the name to report under."""
-        name = f"{scene}: {label}"
+        """A task starts; returns the name to report under, which no other running task has."""
+        plain = name = f"{scene}: {label}"
+        others = 1
+        while name in self.jobs:  # an edited copy of a scene has tasks of the same label
+            others += 1
+            name = f"{plain} ({others})"
         self.jobs[name] = Job(name, self.clock(), said=self.clock())
         self._show(f"{self._count()} {name}")
         return name

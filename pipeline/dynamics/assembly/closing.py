@@ -58,6 +58,7 @@ def assembled(system: System, given: Mapping[str, Pieces] = NONE) -> System:
         return settled(system, poses)
     closed = close(system, joints, poses)
     if closed is None:
+        _refuse_drives(system, joints, poses)
         raise _impossible(system, joints, poses)
     return settled(system, closed)
 
@@ -231,6 +232,21 @@ def _refuse_opposite(joints: list[Constraint], poses: Sequence[Placement]) -> No
                     f"{joint.edge.kind} joint keeps parallel, do not point the same way",
                     "turn one of the frames",
                 )
+
+
+def _refuse_drives(system: System, joints: list[Constraint], poses: list[Placement]) -> None:
+    """InputError when the mechanism could be assembled, but for where its drives start."""
+    driven = [joint for joint in joints if joint.values]
+    if not driven or close(system, [replace(joint, values={}) for joint in joints], poses) is None:
+        return
+    scene = system.scene
+    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in {joint.name for joint in driven}]
+    raise InputError(
+        f"[drive.{names[0]}.law]",
+        f"the joints fit together, but not where the drives ({', '.join(names)}) are at t = {scene.time.start:.6g} s: "
+        "the mechanism is over-driven, or a drive starts out of reach",
+        "correct the start of a drive, or remove one",
+    )
 
 
 def _impossible(system: System, joints: list[Constraint], poses: list[Placement]) -> InputError:

@@ -1,9 +1,9 @@
-"""One compiled entry per set of part kinds, cached on disk across processes.
+"""The compiled functions of a mechanism, cached on disk across processes.
 
-The entry is a generated file that composes exactly the kernels of the kinds present: what a scene
-does not call for is neither imported nor compiled. Its name is a digest of the sources of all
-kernels it can reach and of the versions of the compiler, because Numba's own cache looks at the
-entry's file alone and would keep stale callees.
+Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
+reach and of the versions of the compiler, because Numba's own cache looks at that file alone and
+would keep stale callees. The functions call each other by address (`calls`), so that mechanisms
+share those which are alike.
 """
 
 from __future__ import annotations
@@ -14,72 +14,136 @@ import importlib.util
 import itertools
 import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from types import ModuleType
 
 import llvmlite
 import numba
+import numpy as np
 from numba.core.bytecode import FunctionIdentity
 
 from pipeline.core.artifacts.paths import kernel_root
-from pipeline.core.registry import module_of
 from pipeline.core.workflow.fingerprint import Sources, imported
-from pipeline.dynamics.assembly.contact_numbers import ContactKinds
 from pipeline.dynamics.assembly.numbers import Kinds
+from pipeline.dynamics.assembly.sources import sources
 from pipeline.dynamics.integrate.method import Scheme
+from pipeline.dynamics.tables import ADDRESSES, place
 
-#: how compiled functions are named (see `compiling`); part of the digest
-NAMING = "counters by entry"
 SOURCES = Sources(Path(__file__).resolve().parents[3])
-PACKAGES = {
-    "joint": "pipeline.dynamics.joints",
-    "form": "pipeline.dynamics.contact.form",
-    "friction": "pipeline.dynamics.contact.friction",
-    "load": "pipeline.dynamics.loads",
-    "integrator": "pipeline.dynamics.integrate",
+#: what the functions are to who waits for them
+WORDS = {
+    "evaluate": "equations of motion",
+    "project": "closing of the loops",
+    "displace": "displacements",
+    "observe": "recorded quantities",
+    "advance": "integrator",
 }
+_FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 
 
-def entry(kinds: Kinds, scheme: Scheme) -> ModuleType:
-    """The module with the compiled functions `advance`, `observe` and `evaluate` for these kinds."""
-    source = _source(kinds, scheme)
-    name = f"flexclear_kernels_{_digest(source)}"
-    if name in sys.modules:
-        return sys.modules[name]
+@dataclass(frozen=True)
+class Entry:
+    """The compiled functions of a mechanism; h must have been given their addresses."""
+
+    modules: dict[str, ModuleType]
+
+    def connect(self, h: np.ndarray) -> None:
+        """Write into the header where this process has put the functions that others call."""
+        for name in ADDRESSES:
+            module = self.modules.get(name.lower())
+            h[place(name)] = getattr(module, name.lower()).address if module else 0
+
+    def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
+        """Slope of the state in Y at time t, into the first row of SLOPES."""
+        self.modules["advance"].advance(h, f, w, n, t, repeat, _FLOATS, _TABLE, _TABLE)
+
+    def advance(
+        self,
+        h: np.ndarray,
+        f: np.ndarray,
+        w: np.ndarray,
+        n: np.ndarray,
+        outputs: np.ndarray,
+        rows: np.ndarray,
+        events: np.ndarray,
+    ) -> None:
+        """Step to the end of the segment or of the budget."""
+        self.modules["advance"].advance(h, f, w, n, 0.0, -1, outputs, rows, events)
+
+    def observe(
+        self,
+        h: np.ndarray,
+        f: np.ndarray,
+        w: np.ndarray,
+        n: np.ndarray,
+        rows: np.ndarray,
+        pieces: np.ndarray,
+        tolerance: float,
+        out: np.ndarray,
+    ) -> None:
+        """Evaluate what is recorded of every row."""
+        self.modules["observe"].observe(h, f, w, n, rows, pieces, tolerance, out)
+
+
+def entry(kinds: Kinds, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
+    """The compiled functions for these kinds; `tell` hears of what has to be compiled."""
+    began, modules = time.monotonic(), {}
+    for name, source in sources(kinds, scheme).items():
+        full = f"flexclear_{name}_{digest(source)}"
+        if full not in sys.modules:
+            _fetch(full, source, partial(_announce, tell, WORDS[name], began))
+        modules[name] = sys.modules[full]
+    return Entry(modules)
+
+
+def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
+    seconds = time.monotonic() - began
+    so_far = f", {seconds:.0f} s so far" if seconds >= 1.0 else ""
+    tell(f"compiling for this kind of mechanism (once; later runs fetch it from disk): {what}{so_far}")
+
+
+def _fetch(name: str, source: str, tell: Callable[[], None]) -> None:
+    """Import a generated file; its function is compiled as that is done, or fetched from disk."""
     path = _folder() / f"{name}.py"
     if not path.exists():
         _write(path, source)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    sys.modules[name] = module = importlib.util.module_from_spec(spec)  # what is on disk refers to it
+    compiled = any((path.parent / "__pycache__").glob(f"{name}.*.nbc"))
+    if not compiled:
+        tell()
+    _number_apart()
+    try:
+        with nullcontext() if compiled else _alone(path):
+            spec.loader.exec_module(module)
+    except BaseException:  # interrupted, or no room on the disk: not to be taken for whole later
+        del sys.modules[name]
+        raise
 
 
 @contextmanager
-def compiling(kinds: Kinds, scheme: Scheme) -> Iterator[None]:
-    """Held while an entry may be compiled: of two processes the second waits for the first's code.
-
-    Numba names the code of a function by its qualified name and a counter of the process. Entries
-    that two processes compiled would share names for different code, and a third process that
-    loads both would mix them up (numba issue 10486); so each entry counts from its own number.
-    """
-    digest = _digest(_source(kinds, scheme))
-    with (_folder() / f"{digest}.lock").open("w") as file:
+def _alone(path: Path) -> Iterator[None]:
+    """Held while a file may be compiled: of two processes the second waits for the first's code."""
+    with path.with_suffix(".lock").open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
-        FunctionIdentity._unique_ids = itertools.count(int(digest[:12], 16) << 16)
         yield
 
 
-def is_compiled(kinds: Kinds, scheme: Scheme) -> bool:
-    """Whether the machine code of this entry is on disk already."""
-    name = f"flexclear_kernels_{_digest(_source(kinds, scheme))}"
-    return any((_folder() / "__pycache__").glob(f"{name}.enter*.nbc"))
+def _number_apart() -> None:
+    """Let Numba's names be those of no other process.
+
+    It names the code of a function by its qualified name and a counter of the process. Files that
+    two processes compiled would share names for different code, and a third process that loads
+    both would mix them up (numba issue 10486); so the counter starts anywhere.
+    """
+    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big") << 16)
 
 
 def _folder() -> Path:
@@ -95,23 +159,22 @@ def _write(path: Path, source: str) -> None:
 
 
 @cache
-def _digest(source: str) -> str:
-    """Digest of the entry, of the kernel sources that it reaches, and of the compiler."""
-    digest = hashlib.sha256(source.encode())
-    digest.update(f"{NAMING} {numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
-    roots = imported(source.encode(), "entry", package=False)[0]
-    for name, source_digest in sorted(_reached(roots).items()):
-        digest.update(f"{name} {source_digest}".encode())
-    return digest.hexdigest()[:20]
+def digest(source: str) -> str:
+    """Digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
+    total = hashlib.sha256(source.encode())
+    total.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
+    for name, source_digest in sorted(reached(source).items()):
+        total.update(f"{name} {source_digest}".encode())
+    return total.hexdigest()[:20]
 
 
-def _reached(roots: set[str]) -> dict[str, str]:
-    """Digests of this tower's modules that the entry imports, directly or not.
+def reached(source: str) -> dict[str, str]:
+    """Digests of this tower's modules that a generated source imports, directly or not.
 
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
     found: dict[str, str] = {}
-    waiting = sorted(roots)
+    waiting = sorted(imported(source.encode(), "entry", package=False)[0])
     while waiting:
         name = waiting.pop()
         module = SOURCES.module(name)
@@ -122,166 +185,3 @@ def _reached(roots: set[str]) -> dict[str, str]:
             found[name] = module.digest
             waiting.extend(module.own)
     return found
-
-
-def _source(kinds: Kinds, scheme: Scheme) -> str:
-    lines = [
-        f'"""Generated: joints {kinds.joints}, {kinds.contacts}."""',
-        *([f"# loads {kinds.loads}"] if kinds.loads else []),
-        "import numpy as np",
-        "from numba import njit",
-        "from pipeline.dynamics.tables import SLOPES, Y",
-        "from pipeline.dynamics.assembly import dispatch, equations, known, kinematics as motion",
-        "from pipeline.dynamics.bodies import rigid",
-        "from pipeline.dynamics.integrate import displace as displacing, observe as observing, project as projecting",
-        f"from pipeline.dynamics.integrate import stepper, {_stepping(scheme)} as stepping",
-        f"from {module_of(PACKAGES['integrator'], scheme.integrator)} import METHOD",
-    ]
-    lines += _imports("joint", kinds.joints, ("motion",))
-    lines.append(f"joint_motion = dispatch.choose({_names('joint', 'motion', kinds.joints)})")
-    lines += _flexible_lines(kinds.flexible, kinds.stiffening)
-    lines += _contact_lines(kinds.contacts, scheme)
-    lines += _law_lines(kinds.harmonics)
-    lines += _load_lines(kinds)
-    lines += _closure_lines(kinds.closures)
-    lines += [_BODY, _ENTRIES]
-    return "\n".join(lines) + "\n"
-
-
-def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...], table: str = "NAMES") -> list[str]:
-    return [
-        f"from {module_of(PACKAGES[family], name, table)} import "
-        + ", ".join(f"{function} as {family}_{function}_{k}" for function in functions)
-        for k, name in enumerate(names)
-    ]
-
-
-def _names(family: str, function: str, names: tuple[str, ...]) -> str:
-    return "(" + "".join(f"{family}_{function}_{k}, " for k in range(len(names))) + ")"
-
-
-def _flexible_lines(present: bool, stiffening: bool) -> list[str]:
-    if not present:
-        return [
-            "port, inboard = motion.no_port, motion.no_inboard",
-            "flexible_inertia, port_load, modal = equations.no_flexible, equations.no_port_load, equations.no_modal",
-            "flexible_observed, flexible_energy = observing.no_modal, observing.no_energy",
-        ]
-    plain = ["shorten, shorten_port = (flexible.straight, flexible.straight), flexible.straight"]
-    forms = [
-        "from pipeline.dynamics.bodies import shortening",
-        "shorten, shorten_port = (shortening.first_moment, shortening.second_moment), shortening.at_port",
-    ]
-    return [
-        "from pipeline.dynamics.bodies import flexible, ports",
-        *(forms if stiffening else plain),
-        "body = flexible.compose(*shorten)",
-        "port, inboard = ports.compose(shorten_port)",
-        "flexible_inertia = equations.flexible_inertia(body.inertia, body.mass_matrix)",
-        "port_load, modal = equations.gather_port, equations.modal_forces",
-        "flexible_observed = observing.modal_inertias(body.inertia, body.modal_inertia)",
-        "flexible_energy = observing.flexible_energies(body.energies)",
-    ]
-
-
-def _stepping(scheme: Scheme) -> str:
-    return "fixed" if scheme.fixed else "adaptive"
-
-
-def _contact_lines(kinds: ContactKinds, scheme: Scheme) -> list[str]:
-    if not kinds.surfaces:
-        return ["contacts = equations.no_contacts", "events = (stepper.watch_nothing, stepper.settle_nothing)"]
-    rub, regimes = "frictionless()", "no_regimes"
-    if kinds.frictions:
-        rub, regimes = f"rubbing(dispatch.choose({_names('friction', 'traction', kinds.frictions)}))", "regimes"
-    events = [
-        "from pipeline.dynamics.integrate import events as contact_events, trace",
-        f"events = contact_events.watching(trace.{regimes})",
-    ]
-    if not scheme.located:
-        events = ["from pipeline.dynamics.integrate.step_ends import EVENTS_OF_CONTACTS as events"]
-    return [
-        "from pipeline.dynamics.contact import forces as contact_forces",
-        *_imports("joint", kinds.surfaces, ("separation",), "CONTACTS"),
-        *_imports("friction", kinds.frictions, ("traction",)),
-        *_imports("form", kinds.forms, ("force", "stored")),
-        f"separation = dispatch.choose({_names('joint', 'separation', kinds.surfaces)})",
-        f"normal = dispatch.choose({_names('form', 'force', kinds.forms)})",
-        f"stored = dispatch.choose({_names('form', 'stored', kinds.forms)})",
-        f"contacts = contact_forces.compose(separation, normal, stored, contact_forces.{rub})",
-        *events,
-    ]
-
-
-def _law_lines(harmonics: bool) -> list[str]:
-    if not harmonics:
-        return ["known_motion = known.compose(known.no_harmonics)"]
-    return [
-        "from pipeline.dynamics.drives.oscillation import oscillate",
-        "known_motion = known.compose(oscillate)",
-    ]
-
-
-def _load_lines(kinds: Kinds) -> list[str]:
-    if not kinds.loads:
-        return []
-    return [
-        "from pipeline.dynamics.loads import composing",
-        *_imports("load", kinds.loads, ("apply",)),
-        f"loads = composing.compose({_names('load', 'apply', kinds.loads)})",
-        "contacts = equations.both(contacts, loads)",
-    ]
-
-
-def _closure_lines(present: bool) -> list[str]:
-    if not present:
-        return ["close, known_forces, correction = equations.no_closures, equations.no_known_forces, None"]
-    return [
-        "from pipeline.dynamics.assembly import closures",
-        "close, known_forces, correction = closures.close, closures.known_forces, closures.correction",
-    ]
-
-
-_BODY = """kinematics = motion.compose(joint_motion, port, inboard)
-rhs = equations.compose(
-    known_motion, kinematics, rigid.inertia, flexible_inertia, port_load, modal, contacts, close, known_forces
-)
-project = projecting.compose(rhs, joint_motion, correction) if correction else projecting.none
-displace = displacing.compose(joint_motion)
-step = stepper.compose(rhs, project, displace, METHOD, stepping.compose, events)
-observer = observing.compose(
-    rhs, project, kinematics, (rigid.inertia, rigid.kinetic_energy), (flexible_observed, flexible_energy), contacts
-)
-"""
-
-# One function for all three tasks: the right-hand side is then compiled once, not once for each.
-_ENTRIES = '''
-@njit(cache=True, nogil=True)
-def enter(task, h, f, w, n, t, number, outputs, rows, events, pieces, out):
-    """0: evaluate `number` times; 1: advance; 2: observe."""
-    if task == 0:
-        for _ in range(int(number)):
-            rhs(h, f, w, n, t, h[Y], h[SLOPES])
-    elif task == 1:
-        step(h, f, w, n, outputs, rows, events)
-    else:
-        observer(h, f, w, n, rows, pieces, number, out)
-
-
-_FLOATS, _TABLE, _INTEGERS = np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0), dtype=np.int64)
-
-
-def evaluate(h, f, w, n, t, repeat=1):
-    """Slope of the state in Y at time t, into the first row of SLOPES."""
-    enter(0, h, f, w, n, t, float(repeat), _FLOATS, _TABLE, _TABLE, _INTEGERS, _TABLE)
-
-
-def advance(h, f, w, n, outputs, rows, events):
-    """Step to the end of the segment or of the budget."""
-    enter(1, h, f, w, n, 0.0, 0.0, outputs, rows, events, _INTEGERS, _TABLE)
-
-
-def observe(h, f, w, n, rows, pieces, tolerance, out):
-    """Evaluate what is recorded of every row."""
-    enter(2, h, f, w, n, 0.0, tolerance, _FLOATS, rows, _TABLE, pieces, out)
-'''

@@ -102,7 +102,28 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
     if not grounds:
         groups.insert(0, Group(GROUND, {}, False))
         group_of = {n: i + 1 for n, i in group_of.items()}
+    _refuse_bent(scene, frames, groups, group_of)
     return groups, group_of
+
+
+def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group], group_of: Mapping[str, int]) -> None:
+    """InputError for fixed joints around a loop of rigid bodies that do not fit together."""
+    for name, joint in scene.joint.items():
+        if joint.type != "fixed":
+            continue
+        a, b = (frames[f] for f in joint.between)
+        if group_of[a.body] != group_of[b.body]:
+            continue
+        places = groups[group_of[a.body]].places
+        A, B = places[a.body].of(a.place), places[b.body].of(b.place)
+        if not _close(A, B):
+            angle = np.degrees(np.arccos(np.clip((np.trace(A.R.T @ B.R) - 1.0) / 2.0, -1.0, 1.0)))
+            raise InputError(
+                f"[joint.{name}.between]",
+                f"other fixed joints hold '{joint.between[0]}' and '{joint.between[1]}' "
+                f"{np.linalg.norm(A.p - B.p):.3g} m and {angle:.3g} deg apart",
+                "remove a fixed joint, or correct the frames",
+            )
 
 
 def _flood(root: str, neighbours: Mapping[str, list[tuple[str, Placement]]], places: dict[str, Placement]) -> None:

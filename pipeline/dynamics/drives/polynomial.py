@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pipeline.core.scene.laws import Polynomial
+from pipeline.core.units import coefficient
 from pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Polynomial, dimension: str) -> Pieces:
-    """One piece; its coefficients are in SI units of whatever dimension."""
-    return Pieces((Piece(law.origin, tuple(law.coefficients)),))
+    """One piece."""
+    found = (coefficient(c, dimension, order) for order, c in enumerate(law.coefficients))
+    return Pieces((Piece(law.origin, tuple(found)),))

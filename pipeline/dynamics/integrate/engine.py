@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 
@@ -33,7 +32,7 @@ class Engine:
     """
 
     built: Tables
-    entry: ModuleType
+    entry: fuse.Entry
     h: np.ndarray
     kept: np.ndarray
     mobility: Mobility
@@ -109,14 +108,10 @@ def prepare(built: Tables, progress: Progress) -> Engine:
     progress(None, mobility.text())
     scheme = scheme_of(scene.solver)
     w, n = built.packed.work_space()
-    entry = fuse.entry(built.kinds, scheme)
+    entry = fuse.entry(built.kinds, scheme, lambda text: progress(None, text))
     h, kept = built.packed.h.copy(), np.ones(built.packed.sizes["N_CLOSURE_ROWS"], dtype=bool)
-    engine = Engine(built, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
-    if not fuse.is_compiled(built.kinds, scheme):
-        progress(None, "compiling the kernels of this topology (once; later runs fetch them from disk)")
-        with fuse.compiling(built.kinds, scheme):
-            entry.evaluate(h, built.packed.f, w, n, engine.start, 0)
-    return engine
+    entry.connect(h)
+    return Engine(built, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:

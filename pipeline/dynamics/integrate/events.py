@@ -31,6 +31,7 @@ from pipeline.dynamics.integrate.state import (
     RATE1,
     RTOL,
     SLIP0,
+    SLIP_RATE0,
     SPEED,
     STATUS,
     STUCK_EVENT,
@@ -87,7 +88,7 @@ def start_watch(h, w):
     for c in range(h[N_CONTACTS]):
         o, now = watch(h, c), touch(h, c)
         w[o + GAP0], w[o + RATE0] = w[now + GAP], w[now + RATE]
-        w[o + FORCE0], w[o + SLIP0] = w[now + NORMAL_FORCE], w[now + SLIP]
+        w[o + FORCE0], w[o + SLIP0], w[o + SLIP_RATE0] = w[now + NORMAL_FORCE], w[now + SLIP], 0.0
 
 
 @kernel

@@ -135,5 +135,14 @@ def parameter(solver: Any) -> float:
 
 
 METHOD = Method(
-    ROWS, LAST, hermite.ROWS, 2, compose, hermite.interpolate, steady=1.2, memory=memory, parameter=parameter
+    ROWS,
+    LAST,
+    hermite.ROWS,
+    2,
+    compose,
+    hermite.interpolate,
+    displaces=True,
+    steady=1.2,
+    memory=memory,
+    parameter=parameter,
 )

@@ -43,6 +43,7 @@ class Method:
         extend(h, f, w, n, step) prepares the dense output once the slope at the end is known;
         keep(h, f, w, n, step) remembers an accepted step.
     interpolate: (h, w, share of the step, out) the dense output.
+    displaces: whether `compose` uses displace.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
     gap: middle of the widest gap between the stages, as share of the step.
@@ -58,6 +59,7 @@ class Method:
     error_order: int
     compose: Callable
     interpolate: Callable
+    displaces: bool = False
     ends: bool = False
     steady: float = 1.0
     gap: float = 0.5

@@ -28,6 +28,8 @@ from pipeline.dynamics.integrate.state import (
     RATE1,
     SLIP0,
     SLIP1,
+    SLIP_RATE0,
+    SLIP_RATE1,
     SLIPPING,
     SPEED,
     STICKING,
@@ -81,16 +83,37 @@ def remember_end(h, w):
 
 
 @kernel
-def no_regimes(h, f, w, c):
+def no_regimes(h, f, c):
     """No friction: neither sticking nor slipping."""
     return False
 
 
 @kernel
-def regimes(h, f, w, c):
-    """Whether the sliding speed passes that below which the law sticks."""
-    o, level = watch(h, c), f[contact_numbers(h, c) + STICK_SPEED]
-    return level > 0.0 and (w[o + SLIP0] - level) * (w[o + SLIP1] - level) < 0.0
+def regimes(h, f, c):
+    """Whether contact c has a sliding speed below which its law sticks."""
+    return f[contact_numbers(h, c) + STICK_SPEED] > 0.0
+
+
+@kernel
+def passes_level(w, o, level):
+    """Whether the sliding speed passes a level between the ends of a step."""
+    return (w[o + SLIP0] - level) * (w[o + SLIP1] - level) < 0.0
+
+
+@kernel
+def may_touch_level(w, o, level, step):
+    """Whether a sliding speed that ends a step on the same side of a level may have been on the other meanwhile.
+
+    It must approach the level at the start and leave it at the end; where it turns, the tangents at both ends meet
+    beyond it, since a speed is convex where it passes its least value and concave at its largest.
+    """
+    first, second = w[o + SLIP0] - level, w[o + SLIP1] - level
+    side = 1.0 if first > 0.0 else -1.0
+    falls, rises = side * w[o + SLIP_RATE0] * step, side * w[o + SLIP_RATE1] * step
+    if side * second <= 0.0 or falls > 0.0 or rises <= 0.0:
+        return False
+    meet = 0.0 if falls == 0.0 else (side * (second - first) - rises) / (falls - rises)
+    return side * second - rises * (1.0 - min(max(meet, 0.0), 1.0)) < 0.0
 
 
 @kernel
@@ -103,7 +126,7 @@ def note(events, n, c, kind, t):
     return row
 
 
-def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, changes_regime: Callable) -> Callable:
+def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, has_regimes: Callable) -> Callable:
     """The kernel trace(h, f, w, n, step, ready, events) -> dense output ready?
 
     peek(h, f, w, n, step, theta): evaluates the state at a share of the step.
@@ -112,7 +135,7 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
 
     @kernel
     def feel_trends(h, f, w, n, step):
-        """Whether each force grows (> 0) at the end of the step."""
+        """Whether each force grows (> 0) at the end of the step, and at what rate each sliding speed does."""
         slope = h[SLOPES] + h[NY] * last
         for k in range(h[NY]):
             w[h[Y_STAGE] + k] = w[h[Y_NEW] + k] - BACK * step * w[slope + k]
@@ -120,12 +143,14 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
         evaluate(h, f, w, n, t, h[Y_STAGE], h[SLOPES] + h[NY] * spare)
         n[EVALUATIONS] += 1
         for c in range(h[N_CONTACTS]):
-            w[watch(h, c) + TREND1] = w[watch(h, c) + FORCE1] - w[touch(h, c) + NORMAL_FORCE]
+            o, before = watch(h, c), touch(h, c)
+            w[o + TREND1] = w[o + FORCE1] - w[before + NORMAL_FORCE]
+            w[o + SLIP_RATE1] = (w[o + SLIP1] - w[before + SLIP]) / (BACK * step)
 
     @kernel
-    def locate(h, f, w, n, step, place, level, first, second):
-        """Share of the step where w[place] = level, given its distance from it at both ends (Illinois rule)."""
-        a, b, fa, fb, side, theta = 0.0, 1.0, first, second, 0, 1.0
+    def locate(h, f, w, n, step, place, level, a, b, fa, fb):
+        """Share of the step in (a, b) where w[place] = level, fa and fb from it at the ends (Illinois rule)."""
+        side, theta = 0, b
         for _ in range(MOST_LOOKS):
             before = theta
             theta = (a * fb - b * fa) / (fb - fa)
@@ -144,15 +169,15 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
         return theta
 
     @kernel
-    def top(h, f, w, n, step, c):
-        """Largest normal force within the step: parabolas through the best three, golden sections otherwise.
+    def top(h, f, w, n, step, place, sign):
+        """Largest sign * w[place] within the step, and where: parabolas through the best three, or golden sections.
 
         Source: Brent (1973), Algorithms for Minimization without Derivatives, ch. 5.
         """
-        place, a, b, d, e = touch(h, c) + NORMAL_FORCE, 0.0, 1.0, 0.0, 0.0
+        a, b, d, e = 0.0, 1.0, 0.0, 0.0
         x = second = third = GOLDEN
         peek(h, f, w, n, step, x)
-        fx = f_second = f_third = w[place]
+        fx = f_second = f_third = sign * w[place]
         for _ in range(MOST_LOOKS):
             middle = 0.5 * (a + b)
             if abs(x - middle) <= 2.0 * NEAR_TOP - 0.5 * (b - a):
@@ -168,7 +193,7 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
                 e, d = d, p / q
             u = x + (d if abs(d) >= NEAR_TOP else (NEAR_TOP if d > 0.0 else -NEAR_TOP))
             peek(h, f, w, n, step, u)
-            fu = w[place]
+            fu = sign * w[place]
             if fu >= fx:
                 a, b = (x, b) if u >= x else (a, x)
                 third, f_third, second, f_second, x, fx = second, f_second, x, fx, u, fu
@@ -178,13 +203,13 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
                     third, f_third, second, f_second = second, f_second, u, fu
                 elif fu >= f_third or third in (x, second):
                     third, f_third = u, fu
-        return fx
+        return fx, x
 
     @kernel
     def compression(h, f, w, n, step, c, events):
         """The deepest point of this compression, as an event."""
         o, now = watch(h, c), touch(h, c)
-        theta = locate(h, f, w, n, step, now + RATE, 0.0, w[o + RATE0], w[o + RATE1])
+        theta = locate(h, f, w, n, step, now + RATE, 0.0, 0.0, 1.0, w[o + RATE0], w[o + RATE1])
         event = events[note(events, n, c, COMPRESSION, w[h[CONTROL] + TIME] + theta * step)]
         event[SPEED], event[PEAK_DEPTH], event[PEAK_FORCE] = 0.0, -w[now + GAP], w[now + NORMAL_FORCE]
         begun = events[int(w[o + EVENT_ROW])]
@@ -192,12 +217,26 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
         begun[PEAK_FORCE] = max(begun[PEAK_FORCE], w[now + NORMAL_FORCE])
 
     @kernel
+    def passage(h, f, w, n, step, c, a, b, fa, fb, events):
+        """Sticking begins or ends between the shares a and b of the step, as an event."""
+        level = f[contact_numbers(h, c) + STICK_SPEED]
+        theta = locate(h, f, w, n, step, touch(h, c) + SLIP, level, a, b, fa, fb)
+        note(events, n, c, STICKING if fb < 0.0 else SLIPPING, w[h[CONTROL] + TIME] + theta * step)
+
+    @kernel
     def regime(h, f, w, n, step, c, events):
-        """Sticking begins or ends, as an event."""
+        """One passage between the regimes, or there and back, as events."""
         o, level = watch(h, c), f[contact_numbers(h, c) + STICK_SPEED]
-        theta = locate(h, f, w, n, step, touch(h, c) + SLIP, level, w[o + SLIP0] - level, w[o + SLIP1] - level)
-        kind = STICKING if w[o + SLIP1] < level else SLIPPING
-        note(events, n, c, kind, w[h[CONTROL] + TIME] + theta * step)
+        first, second = w[o + SLIP0] - level, w[o + SLIP1] - level
+        if first * second < 0.0:
+            passage(h, f, w, n, step, c, 0.0, 1.0, first, second, events)
+            return
+        sign = -1.0 if first > 0.0 else 1.0
+        found, where = top(h, f, w, n, step, touch(h, c) + SLIP, sign)
+        beyond = sign * found - level
+        if first * beyond < 0.0:
+            passage(h, f, w, n, step, c, 0.0, where, first, beyond, events)
+            passage(h, f, w, n, step, c, where, 1.0, beyond, second, events)
 
     @kernel
     def peaking(h, f, w, c):
@@ -207,13 +246,26 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
         return damped and w[o + RATE0] > 0.0 and w[o + TREND0] > 0.0 and w[o + TREND1] <= 0.0
 
     @kernel
-    def trace(h, f, w, n, step, ready, events):
-        compressing = False
+    def trends_matter(h, f, w, n):
+        """Whether some closed contact is compressing, or has regimes that a step may visit."""
+        matter = False
         for c in range(h[N_CONTACTS]):
             o = watch(h, c)
-            if n[n[MODE] + c] == 1 and (w[o + RATE0] > 0.0 or w[o + RATE1] > 0.0):
-                compressing = True
-        if compressing:
+            compressing = w[o + RATE0] > 0.0 or w[o + RATE1] > 0.0
+            matter |= n[n[MODE] + c] == 1 and (compressing or has_regimes(h, f, c))
+        return matter
+
+    @kernel
+    def changes_regime(h, f, w, c, step):
+        """Whether contact c passes, or may pass and return, the speed below which it sticks."""
+        if not has_regimes(h, f, c):
+            return False
+        o, level = watch(h, c), f[contact_numbers(h, c) + STICK_SPEED]
+        return passes_level(w, o, level) or may_touch_level(w, o, level, step)
+
+    @kernel
+    def trace(h, f, w, n, step, ready, events):
+        if trends_matter(h, f, w, n):
             feel_trends(h, f, w, n, step)
         for c in range(h[N_CONTACTS]):
             if n[n[MODE] + c] != 1:
@@ -223,12 +275,12 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
             event[PEAK_FORCE] = max(event[PEAK_FORCE], max(w[o + FORCE0], w[o + FORCE1]))
             event[PEAK_DEPTH] = max(event[PEAK_DEPTH], -w[o + GAP1])
             turns, peaks = w[o + RATE0] > 0.0 and w[o + RATE1] <= 0.0, peaking(h, f, w, c)
-            passes = changes_regime(h, f, w, c)
+            passes = changes_regime(h, f, w, c, step)
             if (turns or peaks or passes) and not ready:
                 extend(h, f, w, n, step)
                 ready = True
             if peaks:
-                event[PEAK_FORCE] = max(event[PEAK_FORCE], top(h, f, w, n, step, c))
+                event[PEAK_FORCE] = max(event[PEAK_FORCE], top(h, f, w, n, step, touch(h, c) + NORMAL_FORCE, 1.0)[0])
             if turns:
                 compression(h, f, w, n, step, c, events)
             if passes:
@@ -236,7 +288,7 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, c
         for c in range(h[N_CONTACTS]):
             o = watch(h, c)
             w[o + GAP0], w[o + RATE0], w[o + FORCE0] = w[o + GAP1], w[o + RATE1], w[o + FORCE1]
-            w[o + SLIP0], w[o + TREND0] = w[o + SLIP1], w[o + TREND1]
+            w[o + SLIP0], w[o + TREND0], w[o + SLIP_RATE0] = w[o + SLIP1], w[o + TREND1], w[o + SLIP_RATE1]
         return ready
 
     return trace

@@ -41,17 +41,19 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     start, _ = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
     random = np.random.default_rng(wanted.seed)
-    members = []
+    members, reasons = [], []
     other = cache(lambda: engine_of(implicit(scene), bundles, progress))
     for k in range(wanted.members):
         offsets = random.normal(size=(len(scene.contacts()), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
-        last, trajectory, _ = follow(engine, moved, _quiet, other)
+        last, trajectory, switched = follow(engine, moved, _quiet, other)
         members.append(_member(last, trajectory, names))
+        reasons += [switched] if switched else []
         progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
-    return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation)
+    told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
+    return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
 
 
 def _quiet(share: float | None, text: str) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 
 from pipeline.post.plotting.style import INK, files, grid, heading, style
@@ -21,6 +22,14 @@ CAUSES = {
     "ensemble spread": "more members",
 }
 COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
+
+
+def beside(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
+    """A study's dataset with ``error_by_cause(quantity, cause)``, NaN where a scene has no such cause."""
+    names = [str(name) for name in study["quantity"].values]
+    values = np.array([[split[name].get(cause, np.nan) for cause in CAUSES] for name in names])
+    told = {"units": "1", "long_name": "error of the scene as it stands, as a share of the quantity's size"}
+    return study.assign_coords(cause=list(CAUSES)).assign(error_by_cause=(("quantity", "cause"), values, told))
 
 
 def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:
@@ -56,7 +65,8 @@ def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dic
         ax.set_xlim(0.0, 1.9)
         ax.grid(visible=False, axis="y")
         ax.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
-        ax.set_xlabel("share of the sum of all errors")
+        ax.set_xlabel("share of the sum of all errors", x=0.5 / 1.9)
+        ax.spines["bottom"].set_bounds(0.0, 1.0)
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=4, fontsize=8.2)

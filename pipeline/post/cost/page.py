@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.post.cost.price import TARGETS, cheapest
+from pipeline.post.cost.causes import CAUSES, dominant
+from pipeline.post.cost.price import TARGETS, Choice, cheapest
 
 INTRODUCTION = """# What accuracy costs
 
@@ -42,18 +43,49 @@ def markdown(scenes: tuple[Studied, ...], page: str) -> str:
 
 
 def _advice(scene: Studied) -> str:
-    """One paragraph: the cheapest way to each accuracy, what the last digits cost, where the method changes."""
+    """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
     found = {target: cheapest(scene.study, target) for target in TARGETS}
     had = {target: choice for target, choice in found.items() if choice is not None}
-    if not had:
-        return f"- **{scene.scene}**: none of the accuracies asked for can be had; see the table below.\n"
     text = "; ".join(f"{target:g} takes {c.name} ({c.evaluations:.0f} evaluations)" for target, c in had.items())
-    first, last = had[min(had, key=lambda t: -t)], had[min(had)]
-    digits = np.log10(max(had) / min(had)) if len(had) > 1 else 0.0
-    grows = ""
-    if digits > 0.0 and last.evaluations > first.evaluations:
-        factor = (last.evaluations / first.evaluations) ** (1.0 / digits)
-        grows = f" Each further digit multiplies the evaluations by {factor:.2f}."
+    said = [
+        f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
+    ]
     missing = [f"{t:g}" for t in TARGETS if t not in had]
-    lacks = f" {' and '.join(missing)} cannot be had." if missing else ""
-    return f"- **{scene.scene}**: {text}.{grows}{lacks}\n"
+    if had:
+        said += [_digits(had)] + ([f"{' and '.join(missing)} cannot be had for all quantities."] if missing else [])
+    said += [_horizon(scene), _limits(scene.study)]
+    return f"- **{scene.scene}**: {' '.join(filter(None, said))}\n"
+
+
+def _digits(had: Mapping[float, Choice]) -> str:
+    loose, tight = had[max(had)], had[min(had)]
+    digits = np.log10(max(had) / min(had))
+    if not digits > 0.0 or tight.evaluations <= loose.evaluations:
+        return ""
+    factor = (tight.evaluations / loose.evaluations) ** (1.0 / digits)
+    return f"Each further digit multiplies the evaluations by {factor:.2f}."
+
+
+def _horizon(scene: Studied) -> str:
+    """What is to be done where a run cannot be predicted to its end."""
+    horizon, end = scene.study.attrs["horizon"], scene.study.attrs["end"]
+    if horizon == "none" or horizon >= end:
+        return ""
+    beyond = "the means of an ensemble, below, which more members make better and tighter tolerances do not"
+    if not any("Beyond the horizon" in table for table in scene.tables):
+        beyond = "an ensemble, which the scene can ask for (`[ensemble]`)"
+    return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that nothing but {beyond}."
+
+
+def _limits(study: xr.Dataset) -> str:
+    """What to refine in the scene as it stands: the causes that dominate, each with its quantities."""
+    if "error_by_cause" not in study:
+        return ""
+    by_cause: dict[str, list[str]] = {}
+    for name in study["quantity"].values:
+        cause = dominant(
+            dict(zip(study["cause"].values, study["error_by_cause"].sel(quantity=name).values, strict=True))
+        )
+        by_cause.setdefault(cause, []).append(str(name))
+    parts = [f"{CAUSES[c]} ({c} limits {', '.join(q)})" for c, q in by_cause.items() if c in CAUSES]
+    return f"To refine the scene as it stands: {'; '.join(parts)}." if parts else ""

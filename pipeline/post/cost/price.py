@@ -13,34 +13,61 @@ from pipeline.post.plotting.table import Table
 TARGETS = (1e-3, 1e-6, 1e-9)
 #: groups that say how a run is integrated, and the factor that is a setting
 INTEGRATION = {"tolerance": "rtol", "step": "step"}
+#: a best error of so many times the reference's uncertainty, which it contains, is rounding
+ROUNDED = 3.0
 COLUMNS = ("relative accuracy", "you need", "evaluations", "CPU (s)", "its error", "limited by")
 
 
-def price_list(study: xr.Dataset, title: str) -> Table:
-    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting."""
+def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Table:
+    """'for 1e-3 / 1e-6 / 1e-9 you need ... and it takes ...', the worst of all quantities counting.
+
+    notes: what else is to be said.
+    """
     rows = []
     for target in TARGETS:
         found = cheapest(study, target)
         if found is None:
-            best = min(_choices(study), key=lambda c: c.error)
+            best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
             rows.append((f"{target:g}", "cannot be had", "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
             seconds = f"{found.seconds:.3f}"
             rows.append(
                 (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
             )
-    return Table(title, COLUMNS, tuple(rows), tuple(_notes(study)))
+    return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
+
+
+def by_quantity(study: xr.Dataset, title: str) -> Table:
+    """The same for each quantity by itself, where the worst of all does not decide."""
+    rows = []
+    for name in study["quantity"].values:
+        one = study.sel(quantity=[name])
+        best = min(_choices(one), key=lambda c: c.error, default=NOTHING)
+        rows.append((str(name), *(_cell(cheapest(one, target)) for target in TARGETS), f"{best.error:.1e}"))
+    heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
+    return Table(title, heads, tuple(rows), ("In brackets: processor time of one run.",))
+
+
+def _cell(choice: Choice | None) -> str:
+    return "cannot be had" if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """One way to integrate: its name, cost, largest relative error and the quantity that has it."""
+    """One way to integrate: its name, cost, largest relative error and the quantity that has it.
+
+    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be told.
+    """
 
     name: str
     evaluations: float
     seconds: float
     error: float
     worst: str
+
+
+#: where no run of a study can be compared
+NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
@@ -51,6 +78,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 def _choices(study: xr.Dataset) -> list[Choice]:
     found = []
+    unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
         if f"error_by_{group}" not in study:
             continue
@@ -58,7 +86,7 @@ def _choices(study: xr.Dataset) -> list[Choice]:
         for m in study[method].values:
             for s in study[setting].values:
                 one = study.sel({method: m, setting: s})
-                error = one[f"error_by_{group}"]
+                error = one[f"error_by_{group}"] + unsure
                 if not np.isfinite(error).all():
                     continue
                 worst = str(study["quantity"].values[int(np.argmax(error.values))])
@@ -69,24 +97,53 @@ def _choices(study: xr.Dataset) -> list[Choice]:
 
 
 def _notes(study: xr.Dataset) -> list[str]:
-    uncertain = float(study["reference_uncertainty"].max())
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a share of its own size.",
-        f"Reference: {study.attrs['reference']}. Confirmed by {study.attrs['confirmation']}, "
-        f"which differs by at most {uncertain:.1e}.",
+        + "; each as a share of its own size, the reference's uncertainty included.",
+        _confirmed(study),
     ]
+    missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
+    if missing:
+        notes.append(f"{' and '.join(missing)} cannot be had: {_why_not(study)}.")
     hidden = sum(int((~resolved(study, g) & np.isfinite(study[f"error_by_{g}"])).sum()) for g in _present(study))
     if hidden:
         notes.append(
-            f"{hidden} errors are too near to the reference's own uncertainty to be told; they are drawn hollow."
+            f"{hidden} errors are less than 10 times the reference's own uncertainty and are not drawn; "
+            "the figure shows that bound."
         )
     if study.attrs["horizon"] != "none":
         notes.append(f"Pointwise errors count up to the horizon of the reference, t = {study.attrs['horizon']:.4g} s.")
     if study.attrs["refused"]:
         notes.append(f"Refused: {study.attrs['refused']}.")
     return notes
+
+
+def _confirmed(study: xr.Dataset) -> str:
+    unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
+    said = f"Reference: {study.attrs['reference']}. "
+    if np.isnan(unsure).any():
+        return f"{said}Not confirmed: {by} was refused."
+    if np.isinf(unsure).any():
+        return f"{said}Not confirmed: {by} finds another number of impacts."
+    worst = str(study["quantity"].values[int(np.argmax(unsure))])
+    return f"{said}Confirmed by {by}, which differs by at most {unsure.max():.1e} ({worst})."
+
+
+def _why_not(study: xr.Dataset) -> str:
+    """Whether the settings that were tried end too early, or rounding decides."""
+    unsure = study["reference_uncertainty"].fillna(0.0)
+    best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
+    if np.isinf(unsure).any():
+        return "the reference and its confirmation do not agree on the number of impacts"
+    if best is NOTHING:
+        return "every run is refused, or has another number of impacts than the reference"
+    if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
+        return (
+            f"two independent methods at their tightest tolerances differ as much ({best.worst}); "
+            "rounding errors, which the motion itself magnifies, decide there, and no method helps"
+        )
+    return f"the best setting that was tried reaches {best.error:.1e} ({best.worst})"
 
 
 def _present(study: xr.Dataset) -> list[str]:

@@ -9,18 +9,27 @@ import xarray as xr
 
 from pipeline.core import quantities
 from pipeline.core.quantities import Quantity
+from pipeline.post.cost.statistics import relative_error
 from pipeline.post.cost.study import Point, horizon_of, relative
+
+#: half the width of a normal distribution's 95 % interval, in standard deviations
+NORMAL_95 = 1.96
 
 
 def causes_of(
-    quantity: Quantity, points: Sequence[Point], runs: Mapping[str, xr.Dataset], located: float
+    quantity: Quantity,
+    points: Sequence[Point],
+    runs: Mapping[str, xr.Dataset],
+    located: float,
+    ensemble: xr.Dataset | None = None,
 ) -> dict[str, float]:
     """Relative error by cause (names of `causes.CAUSES`); NaN where the scene has no such cause.
 
-    located: share of the clearance to which contact events are located.
+    located: share of the clearance to which contact events are located.  ensemble: at the tightest tolerance, of a
+    scene that has one; its spread is that of the whole run, all other errors are those up to the horizon.
     """
     there = [p for p in points if "refused" not in runs[p.key].attrs]
-    asis = next(runs[p.key] for p in there if p.group == "sampling" and p.key == "as it stands")
+    asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it stands"), None)
     reference = next(runs[p.key] for p in there if p.group == "reference")
     until = horizon_of(reference)
     size = quantities.scale(reference, quantity)
@@ -39,6 +48,7 @@ def causes_of(
         "time integration": between(asis, reference),
         "event location": _location(quantity, reference, located, size),
         "sampling of the output": _sampling(quantity, asis, there, runs, size),
+        "ensemble spread": _spread(quantity, ensemble, size),
     }
 
 
@@ -94,10 +104,21 @@ def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: f
 
 
 def _sampling(
-    quantity: Quantity, asis: xr.Dataset, points: Sequence[Point], runs: Mapping[str, xr.Dataset], size: float
+    quantity: Quantity, asis: xr.Dataset | None, points: Sequence[Point], runs: Mapping[str, xr.Dataset], size: float
 ) -> float:
     """What the largest value changes when the output is denser; events are located, not sampled."""
     denser = next((runs[p.key] for p in points if p.key == "denser output"), None)
-    if denser is None or not quantities.is_series(quantity):
+    if asis is None or denser is None or not quantities.is_series(quantity):
         return np.nan
     return relative(abs(quantities.scale(denser, quantity) - quantities.scale(asis, quantity)), size)
+
+
+def _spread(quantity: Quantity, ensemble: xr.Dataset | None, size: float) -> float:
+    """Half the 95 % interval of the members' mean: by bootstrap of peaks, 1.96 standard errors of series."""
+    if ensemble is None:
+        return np.nan
+    if quantity.kind == "peak_force":
+        return relative_error(ensemble["peak_force"].sel(contact=quantity.owner).values.astype(float))
+    if quantity.name in ensemble["quantity"].values:
+        return relative(NORMAL_95 * float(ensemble["standard_error"].sel(quantity=quantity.name)), size)
+    return np.nan

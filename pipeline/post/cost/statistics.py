@@ -6,13 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from matplotlib.axes import Axes
 
+from pipeline.post.plotting.style import files, grid, heading, plain, style
 from pipeline.post.plotting.table import Table
 
 RESAMPLES = 2000
 SEED = 7
 #: what is asked of a chaotic run, by contact, and its unit
 STATISTICS = {"peak_force": "N", "impact_count": "1", "contact_time_share": "1"}
+#: the smallest part of an ensemble of which a spread is told
+FEWEST = 4
+LOOKS = (("#0072B2", "o"), ("#E69F00", "s"), ("#009E73", "^"), ("#D55E00", "v"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +35,54 @@ def estimate(values: np.ndarray) -> Estimate:
     draws = np.random.default_rng(SEED).integers(0, len(values), size=(RESAMPLES, len(values)))
     low, high = np.quantile(values[draws].mean(axis=1), [0.025, 0.975])
     return Estimate(float(values.mean()), float(values.std(ddof=1)), float(low), float(high))
+
+
+def relative_error(values: np.ndarray) -> float:
+    """Half the interval of the mean as a share of the mean; NaN where that is zero."""
+    found = estimate(values)
+    return 0.5 * (found.high - found.low) / abs(found.mean) if found.mean else np.nan
+
+
+def growing(members: int) -> list[int]:
+    """Sizes of the parts of an ensemble: doubled until all members are in."""
+    sizes = [FEWEST]
+    while 2 * sizes[-1] < members:
+        sizes.append(2 * sizes[-1])
+    return [size for size in sizes if size < members] + [members]
+
+
+def make(name: str, ensembles: dict[str, xr.Dataset], title: str) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``: statistical error of each mean against the cost of so many members.
+
+    ensembles: as of `table`, with ``cpu_seconds`` per member as an attribute.
+    """
+    contacts = [str(c) for c in next(iter(ensembles.values()))["contact"].values]
+    panels = [(contact, statistic) for contact in contacts for statistic in STATISTICS]
+    with style():
+        figure, axes = grid(len(contacts), len(STATISTICS), (10.5, 1.3 + 2.9 * len(contacts)))
+        for ax, (contact, statistic) in zip(axes.ravel(), panels, strict=True):
+            _panel(ax, contact, statistic, ensembles)
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8.4)
+        told = "statistical error of ensemble means (half of the 95 % bootstrap interval), by the number of members; "
+        heading(figure, title, told + "not pointwise")
+        return files(name, figure)
+
+
+def _panel(ax: Axes, contact: str, statistic: str, ensembles: dict[str, xr.Dataset]) -> None:
+    for (color, mark), (name, ensemble) in zip(LOOKS, ensembles.items(), strict=False):
+        values = ensemble[statistic].sel(contact=contact).values.astype(float)
+        sizes = growing(len(values))
+        seconds = [ensemble.attrs["cpu_seconds"] * size for size in sizes]
+        errors = [relative_error(values[:size]) for size in sizes]
+        ax.plot(seconds, errors, color=color, marker=mark, markersize=4.5, linewidth=1.0, label=name)
+        for size, x, y in zip(sizes, seconds, errors, strict=True):
+            ax.annotate(f"{size}", (x, y), xytext=(3, 3), textcoords="offset points", fontsize=6.8, color=color)
+    ax.set(xscale="log", yscale="log", title=f"{contact} {statistic.replace('_', ' ')}")
+    plain(ax.xaxis)
+    plain(ax.yaxis)
+    ax.set_xlabel("CPU time of the ensemble (s)")
+    ax.set_ylabel("relative error of the mean")
 
 
 def table(ensembles: dict[str, xr.Dataset], title: str) -> Table:

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core import quantities
+from pipeline.core.errors import SolverError
 from pipeline.core.quantities import Quantity
 
 #: groups of points and the factors that span each
@@ -57,8 +58,14 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     """The study's dataset; `runs` holds what each point left, by key.
 
     A run that was refused has no values: its place is NaN and its reason stands in `refused`.
+    Raises SolverError when that is the reference.
     """
     reference = runs[next(p.key for p in points if p.group == "reference")]
+    if "refused" in reference.attrs:
+        raise SolverError(
+            f"nothing to compare with: the reference ({_described(points, 'reference')}) is refused: "
+            f"{reference.attrs['refused']}"
+        )
     until = horizon_of(reference)
     scales = {q: quantities.scale(reference, q) for q in chosen}
     data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
@@ -82,6 +89,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         "reference": _described(points, "reference"),
         "confirmation": _described(points, "confirmation"),
         "horizon": until if np.isfinite(until) else "none",
+        "end": float(reference["time"].values[-1]),
         "refused": "; ".join(
             f"{p.key}: {runs[p.key].attrs['refused']}" for p in points if "refused" in runs[p.key].attrs
         ),

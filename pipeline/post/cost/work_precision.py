@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import xarray as xr
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+from matplotlib.patches import Patch
 
-from pipeline.post.cost.study import GROUPS, resolved
-from pipeline.post.plotting.style import INK, SOFT, files, grid, heading, style
+from pipeline.post.cost.study import GROUPS, MARGIN, resolved
+from pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
 
 #: one colour and mark per integrator, the same in every figure
 LOOKS = {
@@ -25,7 +28,7 @@ LOOKS = {
 COLUMNS = 3
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Curve:
     """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be told."""
 
@@ -33,6 +36,7 @@ class Curve:
     seconds: np.ndarray
     error: np.ndarray
     told: np.ndarray
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,8 +48,10 @@ class Mark:
     error: dict[str, float]
 
 
-def make(name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = ()) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``."""
+def make(
+    name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = (), others: Sequence[Curve] = ()
+) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     found = curves(study)
     rows = -(-len(chosen) // COLUMNS)
@@ -53,10 +59,11 @@ def make(name: str, study: xr.Dataset, title: str, marks: tuple[Mark, ...] = ())
         figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
         for k, ax in enumerate(axes.ravel()):
             if k < len(chosen):
-                _panel(ax, chosen[k], k, found, marks)
+                bound = MARGIN * float(study["reference_uncertainty"].values[k])
+                _panel(ax, chosen[k], k, (found, others), marks, bound)
             else:
                 ax.set_visible(False)
-        _legend(figure, found, marks)
+        _legend(figure, found, others, marks)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
 
@@ -86,14 +93,33 @@ def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     return np.array(kept, dtype=int)
 
 
-def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, ...]) -> None:
-    for curve in found:
-        color, mark = LOOKS.get(curve.name, (SOFT, "x"))
-        there = np.isfinite(curve.error[:, k]) & (curve.error[:, k] > 0.0)
-        ax.plot(curve.seconds[there], curve.error[there, k], color=color, linewidth=1.0)
-        for told, face in ((True, color), (False, "white")):
-            pick = there & (curve.told[:, k] == told)
-            ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, markerfacecolor=face, markersize=4.5)
+def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:
+    """Curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
+    found = []
+    for track in tracks:
+        seconds = np.array(track["seconds"], dtype=float)
+        error = np.full((len(seconds), study.sizes["quantity"]), np.nan)
+        for k, name in enumerate(study["quantity"].values):
+            if str(name) in track["error"]:
+                error[:, k] = np.array(track["error"][str(name)], dtype=float) / float(study["scale"][k])
+        found.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
+    return found
+
+
+def _panel(
+    ax: Axes,
+    name: str,
+    k: int,
+    curves_of: tuple[Sequence[Curve], Sequence[Curve]],
+    marks: tuple[Mark, ...],
+    bound: float,
+) -> None:
+    """One quantity. curves_of: ours, and others'. bound: error below which the reference tells nothing."""
+    found, others = curves_of
+    for curve in (*found, *others):
+        color, mark = look(curve, others)
+        pick = np.isfinite(curve.error[:, k]) & curve.told[:, k]
+        ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
     seconds = np.concatenate([c.seconds for c in found])
     error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in found])
     front = pareto(seconds, error)
@@ -103,27 +129,35 @@ def _panel(ax: Axes, name: str, k: int, found: list[Curve], marks: tuple[Mark, .
             ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
             ax.annotate(m.name, (m.seconds, m.error[name]), xytext=(4, 4), textcoords="offset points", fontsize=6.8)
     ax.set(xscale="log", yscale="log", title=name)
-    # plain numbers at 1, 2 and 5: a range of less than a decade has hardly any power of ten
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter(FormatStrFormatter("%g"))
-    ax.xaxis.set_minor_formatter(NullFormatter())
+    plain(ax.xaxis)
+    if bound > 0.0:
+        ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
+        ax.set_ylim(bottom=0.3 * bound)
     ax.set_xlabel("CPU time of one run (s)")
     ax.set_ylabel("relative error")
 
 
-def _legend(figure: object, found: list[Curve], marks: tuple[Mark, ...]) -> None:
-    handles = [
-        Line2D([], [], color=LOOKS.get(c.name, (SOFT, "x"))[0], marker=LOOKS.get(c.name, (SOFT, "x"))[1], label=c.name)
-        for c in found
-    ]
+def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
+    """Colour and mark of a curve; grey ones for other programs."""
+    if curve.name in LOOKS:
+        return LOOKS[curve.name]
+    return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
+
+
+def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+    handles: list[Artist] = []
+    for curve in (*found, *others):
+        color, mark = look(curve, others)
+        handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
+    handles.append(Patch(color=GRID, label="cannot be told"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5), fontsize=8.4)  # type: ignore[attr-defined]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)  # type: ignore[attr-defined]
 
 
 def _subtitle(study: xr.Dataset) -> str:
     horizon = study.attrs["horizon"]
     span = "over the whole run" if horizon == "none" else f"up to the horizon of the reference, t = {horizon:.4g} s"
-    uncertain = float(study["reference_uncertainty"].max())
-    return f"errors {span}, relative to each quantity's size; hollow: nearer to the reference than 10 x {uncertain:.0e}"
+    told = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
+    return f"errors {span}, relative to each quantity's size; {told}"

@@ -13,7 +13,9 @@ mpl.use("Agg")
 
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 INK, SOFT, GRID = "#222222", "#6b6b6b", "#e3e3e3"
 
@@ -75,6 +77,13 @@ def files(name: str, figure: Figure) -> dict[str, bytes]:
 def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:
     """A figure and its axes, always as a 2-D array."""
     return plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
+
+
+def plain(axis: Axis) -> None:
+    """Plain numbers at 1, 2 and 5 of a logarithmic axis: a range of less than a decade has hardly any power of ten."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def heading(figure: Figure, title: str, subtitle: str = "") -> None:

@@ -12,10 +12,19 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
+from pipeline.post.body_shape import faces
 from pipeline.post.plotting import style
-from pipeline.post.render.mechanism import CLEARANCE_COLOR, IMPACT_COLOR, JOINT_COLOR, Mechanism, pose, rod_surface
+from pipeline.post.render.mechanism import (
+    CLEARANCE_COLOR,
+    IMPACT_COLOR,
+    JOINT_COLOR,
+    Flexible,
+    Mechanism,
+    placed,
+    pose,
+)
 from pipeline.post.render.panel import panel
-from pipeline.post.render.stage import SOFT, grid, image, plotter
+from pipeline.post.render.stage import SOFT, image, plotter, shading, skin
 
 SECONDS, RATE = 5.6, 30
 VIEW, SIDE, HEIGHT = 800, 352, 640
@@ -23,11 +32,11 @@ VIEW, SIDE, HEIGHT = 800, 352, 640
 
 @dataclass(frozen=True, slots=True)
 class Actors:
-    """What moves in the picture: actors of rigid bodies and balls, meshes of rods."""
+    """What moves in the picture: actors of rigid bodies and balls, meshes of flexible bodies."""
 
     rigid: tuple[Any, ...]
     balls: tuple[Any, ...]
-    rods: tuple[pv.StructuredGrid, ...]
+    flexible: tuple[pv.PolyData, ...]
 
 
 def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> np.ndarray:
@@ -101,7 +110,7 @@ def _frames(drawn: Mechanism, post: xr.Dataset, progress: Callable[[float, str],
 
 
 def _exaggeration(drawn: Mechanism) -> str:
-    return f", deformation {max(rod.scale for rod in drawn.flexible):.0f} times larger" if drawn.flexible else ""
+    return f", deformation {max(body.scale for body in drawn.flexible):.0f} times larger" if drawn.flexible else ""
 
 
 def _struck(run: xr.Dataset, before: int, now: int) -> bool:
@@ -124,27 +133,19 @@ def _build(scene: pv.Plotter, drawn: Mechanism) -> Actors:
         )
         for ball in drawn.balls
     )  # fmt: skip
-    rods = []
-    for rod in drawn.flexible:
-        points, size = rod_surface(drawn.run, rod, 0)
-        surface = grid(points)
-        surface["deflection"] = np.repeat(size[:, None], points.shape[1], axis=1).ravel(order="F")
-        rods.append(surface)
-        largest = _largest_deflection(drawn, rod)
-        scene.add_mesh(
-            surface,
-            scalars="deflection",
-            cmap="viridis",
-            clim=(0.0, largest),
-            smooth_shading=True,
-            show_scalar_bar=False,
-        )
-    return Actors(rigid, balls, tuple(rods))
+    return Actors(rigid, balls, tuple(_flexible(scene, drawn, body) for body in drawn.flexible))
 
 
-def _largest_deflection(drawn: Mechanism, rod: Any) -> float:
-    q = np.abs(drawn.run.modal_coordinate.values[:, rod.columns]).max(axis=1)
-    return max(float(rod_surface(drawn.run, rod, int(np.argmax(q)))[1].max()), 1e-12)
+def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyData:
+    points, size = placed(drawn.run, body, 0)
+    q = np.abs(drawn.run.modal_coordinate.values[:, body.columns]).max(axis=1)
+    largest = max(float(placed(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
+    mesh = skin(points, faces(body.bundle))
+    mesh["deflection"] = size
+    scene.add_mesh(
+        mesh, scalars="deflection", cmap="viridis", clim=(0.0, largest), show_scalar_bar=False, **shading(body.bundle)
+    )
+    return mesh
 
 
 def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
@@ -155,10 +156,8 @@ def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
         actor.position = run.frame_position.values[step, ball.frame]
         if ball.contact is not None:
             actor.prop.color = IMPACT_COLOR if glow else CLEARANCE_COLOR
-    for rod, surface in zip(drawn.flexible, actors.rods, strict=True):
-        points, size = rod_surface(run, rod, step)
-        surface.points = points.transpose(1, 0, 2).reshape(-1, 3)
-        surface["deflection"] = np.repeat(size[:, None], points.shape[1], axis=1).ravel(order="F")
+    for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
+        mesh.points, mesh["deflection"] = placed(run, bent, step)
 
 
 def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:

@@ -11,8 +11,8 @@ import pyvista as pv
 import xarray as xr
 
 from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.post.body_shape import scale_to, surface
 from pipeline.post.render.solids import Solid, equivalent, mesh
-from pipeline.post.rod_shape import scale_to, surface
 from pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -24,7 +24,7 @@ JOINT_SHARE = 0.03
 ARM_SHARE = 0.014
 #: a body with at most so many frames that surrounds a joint is drawn translucent: it is the joint's socket
 SOCKET_FRAMES = 3
-#: largest drawn deformation as a share of the rod's length
+#: largest drawn deformation as a share of the body's length
 DEFORMATION_SHARE = 0.05
 
 
@@ -66,19 +66,20 @@ class Mechanism:
     flexible: tuple[Flexible, ...]
     balls: tuple[Ball, ...]
     centre: np.ndarray
-    size: float  #: diagonal of the box of all frames [m]
+    size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
 
 
 def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
     """The drawn mechanism of a run; bundles by name of the flexible body."""
     told = parameters(run)
+    flexible = tuple(_flexible(run, name, bundle) for name, bundle in bundles.items() if name in run.body.values)
     places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
-    low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+    shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
+    low, high = shown.min(axis=0), shown.max(axis=0)
     size = float(np.linalg.norm(high - low)) or 1.0
     balls = _balls(run, told, JOINT_SHARE * size)
     solids = _solids(run, told.get("body", {}), bundles)
     rigid = _rigid(run, solids, balls, _spherical_frames(told), ARM_SHARE * size)
-    flexible = tuple(_flexible(run, name, bundle) for name, bundle in bundles.items() if name in run.body.values)
     return Mechanism(run, rigid, flexible, balls, 0.5 * (low + high), size)
 
 
@@ -90,15 +91,15 @@ def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
     return matrix
 
 
-def rod_surface(run: xr.Dataset, rod: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """World points of the exaggerated rod, shape (ring, around, 3), and the true displacement per ring [m]."""
-    q = run.modal_coordinate.values[step, rod.columns]
-    points, size = surface(rod.bundle, q, rod.scale)
-    mass = float(rod.bundle.mass)
+def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """World points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
+    q = run.modal_coordinate.values[step, body.columns]
+    points, size = surface(body.bundle, q, body.scale)
+    mass = float(body.bundle.mass)
     # the run's position is the centre of mass; the bundle's origin is elsewhere
-    centre = (rod.bundle.first_moment.values + rod.bundle.modal_first_moment.values @ q) / mass
-    matrix = pose(run, rod.index, step)
-    return (points - centre) @ matrix[:3, :3].T + matrix[:3, 3], size / rod.scale
+    centre = (body.bundle.first_moment.values + body.bundle.modal_first_moment.values @ q) / mass
+    matrix = pose(run, body.index, step)
+    return (points - centre) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
 
 
 def _names(run: xr.Dataset, dim: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Mode shapes of a rod: still pictures, a page to turn in the browser, and a file for ParaView."""
+"""Mode shapes of a body: still pictures, a page to turn in the browser, and a file for ParaView."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
+from pipeline.post.body_shape import box, faces, is_rod, scale_to, surface
 from pipeline.post.render import offline
-from pipeline.post.render.stage import grid, image, plotter
-from pipeline.post.rod_shape import scale_to, surface
+from pipeline.post.render.stage import image, plotter, shading, skin
+from pipeline.post.rod_shape import AROUND
 
-#: drawn size of the largest displacement, as a share of the rod's length
+#: drawn size of the largest displacement, as a share of the body's length
 SHARE = 0.16
 COLORS: Literal["viridis"] = "viridis"
+#: cell of VTK by its number of corners
+CELLS = {1: pv.CellType.VERTEX, 2: pv.CellType.LINE, 3: pv.CellType.TRIANGLE, 4: pv.CellType.QUAD}
 
 
 def picture(bundle: xr.Dataset, mode: int, size: tuple[int, int] = (900, 430)) -> np.ndarray:
-    """Deformed rod coloured by displacement over its undeformed ghost, shape (height, width, 3)."""
+    """Deformed body coloured by displacement over its undeformed ghost, shape (height, width, 3)."""
     scene = plotter(size)
     _draw(scene, bundle, mode)
     _look(scene, bundle)
@@ -40,10 +43,11 @@ def page(bundle: xr.Dataset, mode: int) -> bytes:
 
 
 def vtu(bundle: xr.Dataset) -> bytes:
-    """All mode shapes as node vectors ``mode_1``.. on the undeformed line, for ParaView."""
+    """All mode shapes as node vectors ``mode_1``.. on the undeformed body, for ParaView."""
     cells = bundle.cell.values.astype(int)
-    connectivity = np.column_stack([np.full(len(cells), 2), cells]).ravel()
-    kinds = np.full(len(cells), pv.CellType.LINE)
+    corners = cells.shape[1]
+    connectivity = np.column_stack([np.full(len(cells), corners), cells]).ravel()
+    kinds = np.full(len(cells), CELLS[corners])
     mesh = pv.UnstructuredGrid(connectivity, kinds, bundle.node_position.values)
     for k, frequency in enumerate(bundle.frequency.values):
         mesh.point_data[f"mode_{k + 1}_{frequency:.1f}Hz"] = bundle.shape_translation.values[:, :, k]
@@ -60,38 +64,33 @@ def _draw(scene: pv.Plotter, bundle: xr.Dataset, mode: int) -> None:
     ghost, _ = surface(bundle, q)
     q[mode] = 1.0
     points, size = surface(bundle, q, scale_to(bundle, q, SHARE))
-    rod = grid(points)
+    corners, look = faces(bundle), shading(bundle)
+    body = skin(points, corners)
     # colour by displacement; for torsion, where the centre line rests, by the turn of the surface
-    moved = (
-        np.linalg.norm(points - ghost, axis=-1)
-        if size.max() < 1e-9
-        else np.repeat(size[:, None], points.shape[1], axis=1)
-    )
-    rod["displacement"] = (moved / moved.max()).ravel(order="F")
-    scene.add_mesh(grid(ghost), color="#9aa5b1", opacity=0.22)
+    moved = np.linalg.norm(points - ghost, axis=-1) if size.max() < 1e-9 else size
+    body["displacement"] = moved / moved.max()
+    scene.add_mesh(skin(ghost, corners), color="#9aa5b1", opacity=0.22, **(look if corners.shape[1] == 1 else {}))
     scene.add_mesh(
-        rod,
-        scalars="displacement",
-        cmap=COLORS,
-        clim=(0.0, 1.0),
-        smooth_shading=True,
-        specular=0.25,
-        show_scalar_bar=False,
+        body, scalars="displacement", cmap=COLORS, clim=(0.0, 1.0), specular=0.25, show_scalar_bar=False, **look
     )
-    for k in range(0, points.shape[1] - 1, 6):
-        scene.add_mesh(pv.lines_from_points(points[1:-1, k]), color="#ffffff", opacity=0.55, line_width=1.5)
+    if is_rod(bundle):
+        rings = points.reshape(-1, AROUND + 1, 3)
+        for k in range(0, AROUND, 6):
+            scene.add_mesh(pv.lines_from_points(rings[1:-1, k]), color="#ffffff", opacity=0.55, line_width=1.5)
 
 
 def _look(scene: pv.Plotter, bundle: xr.Dataset, *, parallel: bool = True) -> None:
-    """From above and in front, the rod across the picture; the browser's view knows perspective only."""
+    """From above and in front, the body's length across the picture; the browser's view knows perspective only."""
     x = bundle.node_position.values
-    axis = x[-1] - x[0]
-    length = float(np.linalg.norm(axis))
-    axis = axis / length
+    (axis, *_), (length, *others) = box(bundle)
+    axis = axis * (1.0 if axis @ (x[-1] - x[0]) >= 0.0 else -1.0)
     up = np.eye(3)[2] if abs(axis[2]) < 0.9 else np.eye(3)[0]
     across = np.cross(axis, up)
     direction = across / np.linalg.norm(across) + 0.9 * up - 0.35 * axis
-    centre = 0.5 * (x[0] + x[-1])
-    scene.camera_position = [tuple(centre + (3.0 if parallel else 1.7) * length * direction), tuple(centre), tuple(up)]
+    centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
+    # half the picture's height; the length of a slender body fills its width
+    half = 0.30 * length + 0.5 * float(np.linalg.norm(others))
+    reach = (3.0 if parallel else 1.7) * half / 0.30
+    scene.camera_position = [tuple(centre + reach * direction), tuple(centre), tuple(up)]
     scene.camera.parallel_projection = parallel
-    scene.camera.parallel_scale = 0.30 * length
+    scene.camera.parallel_scale = half

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pyvista as pv
+import xarray as xr
 from vtkmodules.vtkCommonCore import vtkLogger
+
+from pipeline.post.body_shape import is_rod
 
 BACKGROUND, BACKGROUND_TOP = "#ffffff", "#e6ecf2"
 SOFT = "#5b6570"
@@ -22,11 +27,20 @@ def plotter(size: tuple[int, int]) -> pv.Plotter:
     return scene
 
 
-def grid(points: np.ndarray) -> pv.StructuredGrid:
-    """A surface out of points of shape (along, around, 3)."""
-    return pv.StructuredGrid(*(np.ascontiguousarray(points[:, :, None, k]) for k in range(3)))
+def skin(points: np.ndarray, faces: np.ndarray) -> pv.PolyData:
+    """Points (n, 3) joined by faces (m, corners); faces of one corner are bare points."""
+    points = np.ascontiguousarray(points)
+    return pv.PolyData(points) if faces.shape[1] == 1 else pv.PolyData.from_regular_faces(points, faces)
+
+
+def shading(bundle: xr.Dataset) -> dict[str, Any]:
+    """How a body's skin is shaded: rods smoothly, solids with their edges, bare nodes as dots."""
+    if bundle.sizes["corner"] == 1:
+        return {"style": "points", "point_size": 9.0, "render_points_as_spheres": True}
+    return {"smooth_shading": True, "split_sharp_edges": not is_rod(bundle)}
 
 
 def image(scene: pv.Plotter) -> np.ndarray:
-    """The picture as bytes, shape (height, width, 3)."""
+    """The picture as it is now, as bytes, shape (height, width, 3)."""
+    scene.render()  # a second screenshot would show the first one again
     return np.asarray(scene.screenshot(return_img=True))

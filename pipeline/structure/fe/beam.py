@@ -26,6 +26,7 @@ from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
 from pipeline.core.algebra import skew
 from pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
+from pipeline.structure.fe.model import rigid_motions, symmetric
 from pipeline.structure.fe.quadrature import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
@@ -87,13 +88,12 @@ def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_arr
     return _in_vector_order(form.assemble(beam.basis, force=force), beam.to_fields)
 
 
-def rigid_vectors(beam: Beam) -> np.ndarray:
-    """Three translations and three rotations about the mesh origin, shape (ndof, 6)."""
-    nodes = len(beam.node_position)
-    vectors = np.zeros((nodes, N_DOFS, 6))
-    vectors[:, range(6), range(6)] = 1.0
-    vectors[:, :3, 3:] = -skew(beam.node_position)  # e x X = -X x e
-    return np.concatenate([vectors.reshape(-1, 6), np.zeros((beam.size - nodes * N_DOFS, 6))])
+def rigid_vectors(beam: Beam, about: np.ndarray | None = None) -> np.ndarray:
+    """Three translations and three rotations about a point, by default the mesh origin, shape (ndof, 6)."""
+    inside = beam.size - beam.nodal_size
+    place = np.concatenate([np.repeat(beam.node_position, N_DOFS, axis=0), np.zeros((inside, 3))])
+    component = np.append(np.tile(np.arange(N_DOFS), len(beam.node_position)), np.full(inside, N_DOFS))
+    return rigid_motions(place, component, np.zeros(3) if about is None else about)
 
 
 def node_dofs(nodes: np.ndarray) -> np.ndarray:
@@ -216,6 +216,4 @@ def _lumped(mesh: xr.Dataset, size: int) -> sp.csr_array:
 
 
 def _in_vector_order(matrix: Any, to_fields: sp.csr_array) -> sp.csr_array:
-    result = to_fields.T @ sp.csr_array(matrix) @ to_fields
-    # quadrature sums in another order above and below the diagonal; exact symmetry is what eigensolvers expect
-    return sp.csr_array(0.5 * (result + result.T))
+    return symmetric(to_fields.T @ sp.csr_array(matrix) @ to_fields)

@@ -21,8 +21,6 @@ from pipeline.structure.fe.beam_recipe import (
 from pipeline.structure.fe.quadrature import POINTS
 from pipeline.structure.fe.recipe import sources
 
-#: columns: x, y, z of a named frame in rod axes; z runs along the beam
-FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 #: constants that a taper changes, each with a profile
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
 
@@ -36,6 +34,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
     cells = np.arange(len(x) - 1)
     names = list(recipe.frames)
     nodes = np.array([_node_at(x, recipe.frames[name].x, f"{place} [frames.{name}.x]") for name in names])
+    turned = [frame.orientation() for frame in recipe.frames.values()]
     data: dict[str, Any] = {
         "node_position": (("node", "axis"), position),
         "abscissa": (("node",), x),
@@ -43,7 +42,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
         "cell": (("cell", "corner"), np.stack([cells, cells + 1], axis=1)),
         "frame_node": (("frame",), nodes),
         "frame_position": (("frame", "axis"), position[nodes]),
-        "frame_rotation": (("frame", "axis", "axis2"), np.tile(R_MR @ FRAME_ROTATION, (len(names), 1, 1))),
+        "frame_rotation": (("frame", "axis", "axis2"), R_MR @ np.array(turned)),
     }
     data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, place)
     return conform(xr.Dataset(data, coords={"frame": names}), MESH, **_attributes(recipe, parts))

@@ -5,29 +5,17 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import Density, Inertia, Length, Mass, Number, Part, Pose, Position, Pressure
+from pipeline.core.algebra import axes_to_matrix
+from pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position
+from pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
 from pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
-Positive = Field(gt=0.0)
 Elements = Annotated[int, Field(ge=1, le=100_000)]
 #: places along a rod that differ by less than this share of its length are the same; they come from decimal text
 SAME_PLACE = 1e-9
-
-
-class Isotropic(Part):
-    """A linear elastic, isotropic material."""
-
-    density: Annotated[Density, Positive]
-    youngs_modulus: Annotated[Pressure, Positive]
-    poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)]
-
-    @property
-    def shear_modulus(self) -> float:
-        """E / (2 (1 + nu)) [Pa]."""
-        return self.youngs_modulus / (2.0 * (1.0 + self.poisson))
 
 
 class StraightBeam(Part):
@@ -94,10 +82,28 @@ class LumpedMass(Part):
     inertia: Inertia = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
+#: columns: x, y, z of a named frame in rod axes, unless it says others; z runs along the beam
+FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+
+
 class NodeFrame(Part):
-    """A named frame at a node: z along the beam (x of the rod frame), x = y of the rod, y = z of the rod."""
+    """A named frame at a node.
+
+    axes: as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod.
+    A pin across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``.
+    """
 
     x: Length
+    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+
+    @model_validator(mode="after")
+    def _orthogonal_axes(self) -> NodeFrame:
+        self.orientation()
+        return self
+
+    def orientation(self) -> np.ndarray:
+        """Columns: x, y, z of the frame in rod axes."""
+        return FRAME_ROTATION if self.axes is None else axes_to_matrix(self.axes)
 
 
 class BeamRecipe(Part):
@@ -121,11 +127,7 @@ class BeamRecipe(Part):
 
     @model_validator(mode="after")
     def _interfaces_are_frames(self) -> BeamRecipe:
-        for name in self.interfaces:
-            if name not in self.frames:
-                raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, self.frames)}")
-        if len(set(self.interfaces)) < len(self.interfaces):
-            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
+        check_interfaces(self.interfaces, self.frames)
         return self
 
 

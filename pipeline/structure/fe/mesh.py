@@ -1,4 +1,4 @@
-"""Stage 1: nodes, cells, constants and named frames from a recipe."""
+"""Stage 1 of beams: nodes, cells, constants and named frames from a recipe."""
 
 from __future__ import annotations
 

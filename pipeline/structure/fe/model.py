@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
+from pipeline.core.algebra import skew
+
 #: directions of a frame's motion, in the order of every six
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -76,7 +78,8 @@ class Drawn:
 class Model:
     """A free body: stiffness [N/m ...] and mass [kg ...] of its degrees of freedom, both (ndof, ndof).
 
-    rigid: three translations, three rotations about the mesh origin, shape (ndof, 6).
+    rigid: three translations, three rotations about the middle of the body, shape (ndof, 6); about an origin far away
+        they would differ from translations by rounding only.
     place: where each degree of freedom belongs [m], shape (ndof, 3).
     interfaces: every named frame.  ends: the two ends that a fixed-fixed condition clamps.
     integrate: volume integrals of vectors, shape (ndof, n); exact but for rounding.
@@ -96,6 +99,23 @@ class Model:
     def size(self) -> int:
         """Number of degrees of freedom."""
         return self.mass.shape[0]
+
+
+def rigid_motions(place: np.ndarray, component: np.ndarray, about: np.ndarray) -> np.ndarray:
+    """Three translations, three rotations about a point, shape (ndof, 6).
+
+    place: of each unknown [m], shape (ndof, 3).  component: its index in DIRECTIONS, shape (ndof,); beyond, an unknown
+    that rests in every rigid motion.  about: [m], shape (3,).
+    """
+    motion = np.zeros((len(place), 7, 6))
+    motion[:, range(6), range(6)] = 1.0
+    motion[:, :3, 3:] = -skew(place - about)  # e x X = -X x e
+    return motion[np.arange(len(place)), np.minimum(component, 6)]
+
+
+def symmetric(matrix: sp.csr_array) -> sp.csr_array:
+    """The symmetric part: rounding differs above and below the diagonal, and eigensolvers expect exact symmetry."""
+    return sp.csr_array(0.5 * (matrix + matrix.T))
 
 
 def rows(interfaces: tuple[Interface, ...], size: int) -> sp.csr_array:

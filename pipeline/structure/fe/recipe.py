@@ -8,11 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from pipeline.core.errors import InputError, InputErrors
+from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.fields import Part, Source
 from pipeline.core.scene.load import read_toml
-from pipeline.structure.fe import section_recipe
+from pipeline.core.scene.mistakes import input_errors
 from pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
 from pipeline.structure.fe.exchange.recipe import MatricesRecipe
 from pipeline.structure.fe.solid.recipe import SolidRecipe
@@ -39,10 +39,11 @@ def read_recipe(path: str | Path) -> dict[str, Any]:
 
 def parse(table: Mapping[str, Any], place: str) -> Recipe:
     """The recipe that a table holds; `place` opens every message of an InputError."""
+    model = _model(table, place)
     try:
-        return _model(table, place).model_validate(dict(table))
+        return model.model_validate(dict(table))
     except ValidationError as error:
-        raise InputErrors([_input_error(place, e) for e in error.errors()]) from None
+        raise input_errors(place, error, model) from None
 
 
 def _model(table: Mapping[str, Any], place: str) -> type[Recipe]:
@@ -53,16 +54,6 @@ def _model(table: Mapping[str, Any], place: str) -> type[Recipe]:
     if not isinstance(name, str) or name not in MODELS:
         raise InputError(f"{place} [shape.type]", f"no shape is called {name!r}", suggestion(str(name), MODELS))
     return MODELS[name]
-
-
-def _input_error(place: str, error: Any) -> InputError:
-    # pydantic names the chosen member of a union in the path; the file does not
-    key = ".".join(str(k) for k in error["loc"] if k not in section_recipe.TYPES and k not in MODELS)
-    known = {"extra_forbidden": "unknown key", "missing": "is missing"}
-    message = known.get(error["type"], error["msg"].removeprefix("Value error, "))
-    value = error.get("input")
-    shown = f" (got {value!r})" if isinstance(value, (str, int, float)) and error["type"] != "missing" else ""
-    return InputError(f"{place} [{key}]" if key else place, message + shown)
 
 
 def sources(recipe: Part) -> str:

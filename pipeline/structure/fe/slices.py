@@ -101,10 +101,17 @@ def _lumps(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _lump_maps(mesh: xr.Dataset, size: int) -> tuple[Maps, Maps]:
-    """The node's motion carried to the lump's centre, s = u + theta x r."""
-    nodes, r = mesh["lump_node"].values, mesh["lump_offset"].values
+    nodes = mesh["lump_node"].values
     rows = np.arange(len(nodes))
     node = [sp.csr_array((np.ones(len(nodes)), (rows, N_DOFS * nodes + k)), shape=(len(nodes), size)) for k in range(6)]
+    return carried(node, mesh["lump_offset"].values)
+
+
+def carried(node: list[sp.csr_array], r: np.ndarray) -> tuple[Maps, Maps]:
+    """Motion of nodes carried to centres beside them, s = u + theta x r.
+
+    node: vector to ux uy uz rx ry rz of the nodes, each of shape (p, ndof).  r: from node to centre [m], (p, 3).
+    """
     lever = [[sp.diags_array(column) for column in row] for row in -skew(r).transpose(1, 2, 0)]
     x, y, z = (
         sp.csr_array(move + row[0] @ node[3] + row[1] @ node[4] + row[2] @ node[5])

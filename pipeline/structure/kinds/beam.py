@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,11 @@ import xarray as xr
 from pipeline.structure.fe import beam as beams
 from pipeline.structure.fe import mesh as meshes
 from pipeline.structure.fe.beam import N_DOFS, Beam
+from pipeline.structure.fe.inertia_integrals import integrate
 from pipeline.structure.fe.model import Drawn, Families, Interface, Model
+from pipeline.structure.fe.slices import slices
 from pipeline.structure.kinds.kind import Kind
 from pipeline.structure.modes import exact
-from pipeline.structure.modes.inertia_integrals import integrate
 
 #: components along the rod's axes by family, the one that decides the sign first
 FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}
@@ -29,11 +29,11 @@ def assemble(mesh: xr.Dataset) -> Model:
     return Model(
         stiffness=beam.stiffness,
         mass=beam.mass,
-        rigid=beams.rigid_vectors(beam),
+        rigid=beams.rigid_vectors(beam, beam.node_position.mean(axis=0)),
         place=_place(beam),
         interfaces=_interfaces(mesh, beam),
         ends=_ends(mesh, beam),
-        integrate=partial(integrate, mesh, beam),
+        integrate=lambda vectors: integrate(slices(mesh, beam), vectors),
         families=_families(beam),
         drawn=_drawn(mesh, beam),
     )

@@ -19,6 +19,13 @@ FAMILY = "pipeline.structure.kinds"
 Progress = Callable[[float | None, str], None]
 
 
+def no_closed_form(
+    mesh: xr.Dataset, reference: str, families: list[str], interfaces: tuple[str, ...]
+) -> dict[str, np.ndarray]:
+    """The closed-form frequencies of a kind that has none."""
+    return {}
+
+
 @dataclass(frozen=True)
 class Kind:
     """Functions of one kind of body.
@@ -35,7 +42,7 @@ class Kind:
     write_vtu: Callable[[xr.Dataset, Path], None]
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
-    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]]
+    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] = no_closed_form
 
 
 def name_of(recipe: Mapping[str, Any]) -> str:

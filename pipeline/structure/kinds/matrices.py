@@ -29,8 +29,4 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     return ["elastic"] * vectors.shape[1]
 
 
-def _exact(mesh: xr.Dataset, reference: str, families: list[str], interfaces: tuple[str, ...]) -> dict[str, np.ndarray]:
-    return {}
-
-
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=_exact)
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words)

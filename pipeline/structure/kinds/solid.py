@@ -52,8 +52,4 @@ def _word(along: float, out: float, turn: float) -> str:
     return "axial" if along > out + turn else "bending"
 
 
-def _exact(mesh: xr.Dataset, reference: str, families: list[str], interfaces: tuple[str, ...]) -> dict[str, np.ndarray]:
-    return {}
-
-
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=_exact)
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words)

@@ -12,6 +12,7 @@ from pipeline.core.registry import suggestion
 from pipeline.structure.fe.model import DIRECTIONS, Interface, Model, own_dofs
 
 WHERE = "modes.reference"
+ONCE = "hold each motion once; interfaces that are tied to the same nodes move alike"
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def check(model: Model, condition: Condition) -> None:
         rows = held.toarray()
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         if np.any(size == 0.0) or np.linalg.matrix_rank(rows / size, tol=1e-9) < len(rows):
-            raise InputError(WHERE, "the held motions are not independent of each other", "hold each motion once")
+            raise InputError(WHERE, "the held motions are not independent of each other", ONCE)
     lengths = np.linalg.norm(model.place - model.place.mean(axis=0), axis=1)
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
     left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)

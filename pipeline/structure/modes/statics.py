@@ -18,13 +18,12 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from pipeline.core.errors import SolverError
+from pipeline.core.errors import InputError, SolverError
 from pipeline.structure.fe.model import Model, own_dofs
 from pipeline.structure.sparse.multifrontal import Factor, cholesky
 
 #: a pivot this small beside its diagonal entry is rounding: the body moves there without strain
 PIVOT = 1e-14
-MECHANISM = "modes: the body can move without strain beyond its six rigid motions; is it in one piece?"
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class Flexibility:
 
 
 def support(model: Model, tell: Callable[[float], None]) -> Flexibility:
-    """Factorise a body on six supports; SolverError when it is a mechanism."""
+    """Factorise a body on six supports; InputError when it is a mechanism."""
     size = np.linalg.norm(model.rigid, axis=0)
     _, places = scipy.linalg.qr(model.rigid.T / size[:, None], pivoting=True, mode="r")
     free = np.setdiff1d(np.arange(model.size), places[:6])
@@ -61,11 +60,19 @@ def support(model: Model, tell: Callable[[float], None]) -> Flexibility:
     try:
         factor = cholesky(inner, model.place[free], tell)
     except SolverError:
-        raise SolverError(MECHANISM) from None
+        raise _mechanism() from None
     if factor.smallest_pivot(inner.diagonal()) < PIVOT:
-        raise SolverError(MECHANISM)
+        raise _mechanism()
     momentum = model.mass @ model.rigid
     return Flexibility(model, factor, free, momentum, model.rigid.T @ momentum)
+
+
+def _mechanism() -> InputError:
+    return InputError(
+        "mesh",
+        "the body can move without strain beyond its six rigid motions, as where parts share an edge or a node only",
+        "join the parts along faces, or make each a body of its own",
+    )
 
 
 @dataclass(frozen=True)

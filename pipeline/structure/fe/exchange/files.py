@@ -131,13 +131,20 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
         raise InputError(where, f"'{path.name}' is no MatrixMarket file: {error}") from None
 
 
+def _component(text: str) -> int:
+    name = text.strip().lower()
+    if name not in COMPONENTS:
+        raise ValueError(f"there is no component '{text}'")
+    return COMPONENTS.index(name)
+
+
 def _table(path: Path, where: str) -> Table:
     try:
         with path.open(newline="") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))
         node = np.array([int(row["node"]) for row in rows])
         position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
-        component = np.array([COMPONENTS.index(row["component"].strip()) for row in rows])
+        component = np.array([_component(row["component"]) for row in rows])
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
         raise InputError(where, f"'{path.name}' is no table of unknowns: {error}", hint) from None

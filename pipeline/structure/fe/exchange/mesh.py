@@ -15,6 +15,7 @@ from pipeline.core.errors import InputError
 from pipeline.structure.fe.exchange import files
 from pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
+from pipeline.structure.fe.model import symmetric
 from pipeline.structure.fe.recipe import sources
 
 #: length [m], mass [kg] and time [s] of each consistent system
@@ -78,7 +79,7 @@ def _symmetric(matrix: sp.csr_array, name: str, where: str) -> sp.csr_array:
     away = abs(matrix - matrix.T).max() / abs(matrix).max()
     if away > SYMMETRIC:
         raise InputError(where, f"the {name} matrix is not symmetric: entries differ by {away:.2g} of the largest")
-    return sp.csr_array(0.5 * (matrix + matrix.T))
+    return symmetric(matrix)
 
 
 def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, place: str) -> dict[str, Any]:

@@ -10,10 +10,11 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 import xarray as xr
 
-from pipeline.core.algebra import skew
 from pipeline.core.errors import InputError, SolverError
+from pipeline.structure.fe.exchange import lumped
 from pipeline.structure.fe.exchange.files import COMPONENTS
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model
+from pipeline.structure.fe.inertia_integrals import integrate
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
 from pipeline.structure.fe.solid import ties
 from pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
 from pipeline.structure.sparse.multifrontal import cholesky
@@ -30,7 +31,7 @@ def assemble(mesh: xr.Dataset) -> Model:
     component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
     place, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
-    rigid = _rigid(place, component)
+    rigid = rigid_motions(place, component, place.mean(axis=0))
     _check(K, M, rigid, place)
     interfaces = _interfaces(mesh, component)
     names = mesh.attrs["interfaces"].split()
@@ -50,13 +51,6 @@ def assemble(mesh: xr.Dataset) -> Model:
 def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
     row, column, value = (mesh[f"{name}_{part}"].values for part in ("row", "column", "value"))
     return sp.csr_array(sp.coo_array((value, (row, column)), shape=(n, n)))
-
-
-def _rigid(place: np.ndarray, component: np.ndarray) -> np.ndarray:
-    motion = np.zeros((len(place), 7, 6))
-    motion[:, range(6), range(6)] = 1.0
-    motion[:, :3, 3:] = -skew(place)
-    return motion[np.arange(len(place)), component]
 
 
 def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarray) -> None:
@@ -98,11 +92,15 @@ def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Call
         blocks = [(k, l, M[rows[k]][:, rows[l]]) for k in range(3) for l in range(3)]
         same = all(abs(block - line if k == l else block).max() <= alike for k, l, block in blocks)
     if not same:
-        raise InputError(
-            WHERE,
-            "the mass matrix differs for motion along x, y and z, so that it does not tell the volume integrals",
-            "use nodes with three displacements and a consistent or lumped mass, or an npz with the integrals",
-        )
+        rigid = lumped.nodes(M, node, component, mesh["unknown_position"].values)
+        if rigid is None:
+            raise InputError(
+                WHERE,
+                "the mass matrix differs for motion along x, y and z and is not lumped at the nodes, so that it does "
+                "not tell the volume integrals",
+                "lump the mass, use nodes with three displacements, or give an npz with the integrals",
+            )
+        return partial(integrate, rigid)
     order = np.stack(rows, axis=1).ravel()
     spread = sp.csr_array(sp.eye_array(len(node), format="csr")[order])
     return partial(integrals, line, mesh["unknown_position"].values[rows[0]], spread)

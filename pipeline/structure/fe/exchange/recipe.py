@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import Direction, Part, Pose
+from pipeline.core.scene.fields import Part
+from pipeline.structure.fe.recipe_parts import TurnedFrame, check_interfaces
 
 
 class Matrices(Part):
@@ -33,26 +33,20 @@ class Matrices(Part):
         return self
 
 
-class NodeFrame(Part):
+class NodeFrame(TurnedFrame):
     """A named frame at a node with six unknowns, or following the mean motion of several nodes (RBE3, equal weights).
 
-    node, nodes: numbers from the table of unknowns.  axes: as of a pose; default: the axes of the matrices.
+    node, nodes: numbers from the table of unknowns.
     """
 
     node: int | None = None
     nodes: tuple[int, ...] = ()
-    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> NodeFrame:
         if (self.node is None) == (not self.nodes):
             raise ValueError("give either `node` or `nodes`")
-        self.orientation()
         return self
-
-    def orientation(self) -> Pose:
-        """The orientation as a pose at the origin."""
-        return Pose(axes=self.axes)
 
 
 class MatricesRecipe(Part):
@@ -65,9 +59,5 @@ class MatricesRecipe(Part):
 
     @model_validator(mode="after")
     def _known(self) -> MatricesRecipe:
-        for name in self.interfaces:
-            if name not in self.frames:
-                raise ValueError(
-                    f"interfaces: there is no frame called '{name}'; {suggestion(name, dict(self.frames))}"
-                )
+        check_interfaces(self.interfaces, self.frames)
         return self

@@ -20,6 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from pipeline.core.errors import InputError
+from pipeline.structure.fe.model import symmetric
 from pipeline.structure.fe.solid.elements import ELEMENTS, Sampled, sampled
 
 #: numbers of a cell matrix that are worked on at once; bounds the memory
@@ -69,7 +70,7 @@ def stiffness(solid: Solid) -> sp.csr_array:
             for j in range(3):
                 data[:, i, j] += np.bincount(place, K[:, :, i, :, j].ravel(), minlength=len(data))
     blocks = sp.bsr_array((data, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n))
-    return _symmetric(blocks.tocsr())
+    return symmetric(blocks.tocsr())
 
 
 def mass(solid: Solid) -> sp.csr_array:
@@ -83,7 +84,7 @@ def mass(solid: Solid) -> sp.csr_array:
         weight = _jacobian(solid, part, at)[0] * at.weight * solid.density[part][:, None]
         place = pattern.place[part.start * pairs : part.stop * pairs]
         data += np.bincount(place, (weight @ products).ravel(), minlength=len(data))
-    return _symmetric(sp.csr_array((data, pattern.indices, pattern.indptr), shape=(n, n)))
+    return symmetric(sp.csr_array((data, pattern.indices, pattern.indptr), shape=(n, n)))
 
 
 def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) -> None:
@@ -130,8 +131,3 @@ def _pattern(solid: Solid) -> _Pattern:
     keys, place = np.unique(rows * n + columns, return_inverse=True)
     indptr = np.searchsorted(keys, np.arange(n + 1) * n)
     return _Pattern(place.ravel(), (keys % n).astype(np.int32), indptr.astype(np.int32))
-
-
-def _symmetric(matrix: sp.csr_array) -> sp.csr_array:
-    """Rounding differs above and below the diagonal; exact symmetry is what eigensolvers expect."""
-    return sp.csr_array(0.5 * (matrix + matrix.T))

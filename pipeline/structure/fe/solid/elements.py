@@ -41,9 +41,14 @@ class Element:
 
     @property
     def face_nodes(self) -> np.ndarray:
-        """All nodes of each face, corners first, shape (faces, nodes)."""
-        inner = [[node for node, part in self.between.items() if set(part) <= set(face)] for face in self.faces]
-        return np.array([[*face, *nodes] for face, nodes in zip(self.faces, inner, strict=True)])
+        """All nodes of each face, shape (faces, nodes): corners, those between each and the next, the middle."""
+        at = {frozenset(part): node for node, part in self.between.items()}
+        found = []
+        for face in self.faces:
+            sides = zip(face, (*face[1:], face[0]), strict=True)
+            parts = [frozenset(side) for side in sides] + [frozenset(face)]
+            found.append([*face, *(at[part] for part in parts if part in at)])
+        return np.array(found)
 
     @property
     def corners(self) -> int:

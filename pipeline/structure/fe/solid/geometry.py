@@ -51,10 +51,16 @@ def made(shape: Cylinder | Block) -> Geometry:
 
 def boundary(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
     """Cell and number of the face, for each face that belongs to one cell only."""
+    first, count = _faces(geometry)
+    return np.divmod(np.sort(first[count == 1]), len(ELEMENTS[geometry.element].faces))
+
+
+def _faces(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
+    """Each face once: its first place among the faces of all cells in turn, and the number of cells that have it."""
     faces = np.array(ELEMENTS[geometry.element].faces)
     corners = np.sort(geometry.cells[:, faces], axis=2).reshape(-1, faces.shape[1])
     _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)
-    return np.divmod(np.sort(first[count == 1]), len(faces))
+    return first, count
 
 
 def face_nodes(geometry: Geometry, cells: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -68,9 +74,23 @@ def boundary_nodes(geometry: Geometry) -> np.ndarray:
 
 
 def check(geometry: Geometry, where: str) -> None:
-    """InputError for cells that are inverted or oddly numbered, and for a body in several pieces."""
+    """InputError for cells that are inverted, oddly numbered or there twice, and for a body in several pieces."""
     _check_numbering(geometry, where)
     check_cells(geometry.element, geometry.nodes, geometry.cells, where)
+    _check_overlap(geometry, where)
+    _check_pieces(geometry, where)
+
+
+def _check_overlap(geometry: Geometry, where: str) -> None:
+    corners = np.sort(geometry.cells[:, : ELEMENTS[geometry.element].corners], axis=1)
+    twice = len(corners) - len(np.unique(corners, axis=0))
+    crowded = int(np.count_nonzero(_faces(geometry)[1] > 2))
+    if twice or crowded:
+        problem = f"{twice} cells are there twice" if twice else f"{crowded} faces belong to more than two cells"
+        raise InputError(where, f"cells overlap: {problem}", "write each cell once; merge meshes only where they touch")
+
+
+def _check_pieces(geometry: Geometry, where: str) -> None:
     n, a = len(geometry.nodes), geometry.cells.shape[1]
     rows = np.repeat(geometry.cells[:, 0], a)
     graph = sp.csr_array((np.ones(rows.size, dtype=np.int8), (rows, geometry.cells.ravel())), shape=(n, n))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,11 @@ NAMES = {element.cell: name for name, element in ELEMENTS.items()}
 #: cells that may come along; those of faces name surfaces
 FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 BESIDES = ("vertex", "line", "line3", *FACES)
+#: what meshio keeps among the sets of cells of a Gmsh 4 file, but numbers of curves and points
+NO_CELLS = "gmsh:bounding_entities"
+#: an integer array of cell data with more values than this numbers the cells and names no regions
+MOST_REGIONS = 1000
+REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
 
 
 def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
@@ -26,12 +33,12 @@ def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
     name = _cell_type(mesh, where)
     scale = UNITS[shape.length_unit][0]
     solid = [k for k, block in enumerate(mesh.cells) if block.type == name]
-    cells = np.vstack([mesh.cells[k].data for k in solid]).astype(np.int64)
+    cells = _cells([mesh.cells[k].data for k in solid], len(ELEMENTS[NAMES[name]].local), len(mesh.points), where)
     used, inverse = np.unique(cells, return_inverse=True)
     renumber = np.full(len(mesh.points), -1, dtype=np.int64)
     renumber[used] = np.arange(len(used))
     cell_regions, node_regions = _regions(mesh, solid, renumber)
-    nodes = scale * np.asarray(mesh.points, dtype=float)[used]
+    nodes = scale * _points(mesh, where)[used]
     return Geometry(NAMES[name], nodes, inverse.reshape(cells.shape), node_regions, cell_regions)
 
 
@@ -40,14 +47,17 @@ def _read(path: Path, where: str) -> Any:
 
     if not path.is_file():
         raise InputError(where, f"there is no file {path}", "paths are relative to the recipe")
+    said = io.StringIO()
     try:
-        return meshio.read(path)
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            return meshio.read(path)
     except SystemExit:
-        # meshio ends the process on a suffix that it does not know, or content that is not what the suffix says
-        problem = f"meshio cannot read '{path.name}': its format is unknown or its content is something else"
-        raise InputError(where, problem, "write it again, or as VTU") from None
+        # meshio prints its reason and ends the process where the content is not what it knows of that suffix
+        words = " ".join(said.getvalue().split())
+        raise InputError(where, f"meshio cannot read '{path.name}': {words}", REWRITE) from None
     except Exception as error:
-        raise InputError(where, f"meshio cannot read '{path.name}': {error}", "write it again, or as VTU") from None
+        reason = str(error) or type(error).__name__
+        raise InputError(where, f"meshio cannot read '{path.name}': {reason}", REWRITE) from None
 
 
 def _cell_type(mesh: Any, where: str) -> str:
@@ -65,18 +75,42 @@ def _cell_type(mesh: Any, where: str) -> str:
     return name
 
 
+def _cells(blocks: list[Any], nodes: int, points: int, where: str) -> np.ndarray:
+    """Nodes of all solid cells, shape (cells, nodes); readers may have lost some on the way."""
+    wrong = [np.shape(block)[1:] for block in blocks if np.shape(block)[1:] != (nodes,)]
+    if wrong:
+        problem = (
+            f"cells that need {nodes} nodes were read with {wrong[0][0] if wrong[0] else 'different numbers of them'}"
+        )
+        raise InputError(where, problem, REWRITE)
+    cells = np.vstack(blocks).astype(np.int64)
+    if cells.min() < 0 or cells.max() >= points:
+        raise InputError(where, f"cells name nodes beyond the {points} that the file has", REWRITE)
+    return cells
+
+
+def _points(mesh: Any, where: str) -> np.ndarray:
+    points = np.asarray(mesh.points, dtype=float)
+    if points.shape[1] != 3 or not np.isfinite(points).all():
+        raise InputError(where, "the nodes' coordinates are not three finite numbers each", REWRITE)
+    return points
+
+
 def _regions(mesh: Any, solid: list[int], renumber: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Regions of solid cells (indices into all of them) and of nodes (renumbered), by name."""
+    """Regions of solid cells (indices into all of them) and of nodes (renumbered), by name.
+
+    Numbers of faces and of solid cells may be counted apart: where a group has both, its nodes are those of the faces.
+    """
     first = np.cumsum([0, *(len(mesh.cells[k].data) for k in solid)])
     of_cells: dict[str, list[np.ndarray]] = {}
     of_nodes: dict[str, list[np.ndarray]] = {}
     for name, chosen in _cell_groups(mesh):
+        faces = [k for k, block in enumerate(mesh.cells) if block.type in FACES and len(chosen[k])]
         for k, block in enumerate(mesh.cells):
-            if len(chosen[k]) == 0:
-                continue
-            if k in solid:
+            if k in solid and len(chosen[k]):
                 of_cells.setdefault(name, []).append(first[solid.index(k)] + chosen[k])
-            of_nodes.setdefault(name, []).append(block.data[chosen[k]].ravel())
+            if len(chosen[k]) and (not faces or k in faces):
+                of_nodes.setdefault(name, []).append(block.data[chosen[k]].ravel())
     for name, nodes in (mesh.point_sets or {}).items():
         of_nodes.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64).ravel())
     cells = {name: np.unique(np.concatenate(parts)) for name, parts in of_cells.items()}
@@ -88,6 +122,8 @@ def _cell_groups(mesh: Any) -> list[tuple[str, list[np.ndarray]]]:
     """Named groups of cells: for each block, the indices that belong to it."""
     groups: list[tuple[str, list[np.ndarray]]] = []
     for name, chosen in (mesh.cell_sets or {}).items():
+        if name == NO_CELLS:
+            continue
         parts = [np.empty(0, dtype=np.int64) if c is None else np.asarray(c, dtype=np.int64).ravel() for c in chosen]
         groups.append((str(name), parts))
     named = {(int(tag), int(dim)): str(name) for name, (tag, dim) in (mesh.field_data or {}).items()}
@@ -95,7 +131,8 @@ def _cell_groups(mesh: Any) -> list[tuple[str, list[np.ndarray]]]:
         values = [np.asarray(part) for part in data]
         if any(part.dtype.kind not in "iu" or part.ndim != 1 for part in values):
             continue
-        for value in np.unique(np.concatenate(values)):
+        different = np.unique(np.concatenate(values))
+        for value in different if len(different) <= MOST_REGIONS else ():
             chosen = [np.flatnonzero(part == value) for part in values]
             groups.append((f"{key}={value}", chosen))
             if key == "gmsh:physical":

@@ -90,6 +90,8 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, An
                     where, f"'{names[other]}' and '{name}' tie the same nodes rigidly", "make one of them a mean tie"
                 )
             taken[nodes] = k
+            if taken.min() >= 0:
+                raise InputError(where, "rigid ties take every node of the body", "tie fewer nodes, or their mean")
         found["node"].append(nodes)
         found["weight"].append(weight)
         found["frame"].append(np.full(len(nodes), k))

@@ -9,8 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.algebra import skew
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model
+from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions, symmetric
 from pipeline.structure.fe.solid import elasticity, ties
 from pipeline.structure.fe.solid.elasticity import Solid
 from pipeline.structure.fe.solid.elements import ELEMENTS
@@ -44,9 +43,9 @@ def assemble(mesh: xr.Dataset) -> Model:
     recipe = mesh.attrs["interfaces"].split()
     ends = tuple(frame for name in recipe[:2] for frame in interfaces if frame.name == name)
     return Model(
-        stiffness=_symmetric(K),
-        mass=_symmetric(M),
-        rigid=_rigid(unknowns),
+        stiffness=symmetric(K),
+        mass=symmetric(M),
+        rigid=rigid_motions(unknowns.place, unknowns.component, unknowns.place.mean(axis=0)),
         place=unknowns.place,
         interfaces=interfaces,
         ends=ends,
@@ -113,14 +112,6 @@ def _unknowns(mesh: xr.Dataset) -> _Unknowns:
     return _Unknowns(spread, np.vstack(place), np.concatenate(component), first)
 
 
-def _rigid(unknowns: _Unknowns) -> np.ndarray:
-    """Rigid motions about the mesh origin, shape (ndof, 6)."""
-    full = np.zeros((len(unknowns.place), 6, 6))
-    full[:, range(6), range(6)] = 1.0
-    full[:, :3, 3:] = -skew(unknowns.place)
-    return full[np.arange(len(full)), unknowns.component]
-
-
 def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
     size, found = len(unknowns.place), []
     for k, name in enumerate(mesh["frame"].values):
@@ -162,14 +153,9 @@ def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
 
 
 def _cut(nodes: int) -> list[list[int]]:
-    """Corners of the plane pieces of a face with so many nodes, corners first and then edges in turn."""
+    """Corners of the pieces of a face with so many nodes, which are in the order of `Element.face_nodes`."""
     if nodes in (3, 4, 8):
         return [[0, 1, 2]] if nodes == 3 else [[0, 1, 2, 3]]
     if nodes == 6:
         return [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
     return [[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]]
-
-
-def _symmetric(matrix: sp.csr_array) -> sp.csr_array:
-    """Rounding differs above and below the diagonal; exact symmetry is what eigensolvers expect."""
-    return sp.csr_array(0.5 * (matrix + matrix.T))

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import Direction, Length, Part, Pose, Position
-from pipeline.structure.fe.beam_recipe import Isotropic
+from pipeline.core.scene.fields import Direction, Length, Part, Position
+from pipeline.structure.fe.recipe_parts import Isotropic, Positive, TurnedFrame, check_interfaces
 
-Positive = Field(gt=0.0)
 Cells = Annotated[int, Field(ge=1, le=1000)]
 ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]
 
@@ -59,18 +57,27 @@ class MeshFile(Part):
     length_unit: Literal["m", "cm", "mm", "um", "in"]
 
 
+def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not any(direction):
+        raise ValueError("a direction of length zero points nowhere")
+    return direction
+
+
+Pointing = Annotated[Direction, AfterValidator(_pointing)]
+
+
 class Plane(Part):
     """Nodes on a plane."""
 
     point: Position
-    normal: Direction
+    normal: Pointing
 
 
 class Tube(Part):
     """Nodes on a cylinder's surface around the line through `point` along `axis`."""
 
     point: Position
-    axis: Direction
+    axis: Pointing
     radius: Annotated[Length, Positive]
 
 
@@ -102,25 +109,15 @@ class On(Part):
         return self
 
 
-class TiedFrame(Part):
+class TiedFrame(TurnedFrame):
     """A named frame tied to nodes: rigidly (RBE2; they move as one), or to their mean motion (RBE3; they deform).
 
-    position: origin in the mesh frame; default: the centre of the nodes.  axes: as of a pose; default: the mesh axes.
+    position: origin in the mesh frame; default: the centre of the nodes.
     """
 
     on: On
     tie: Literal["rigid", "mean"]
     position: Position | None = None
-    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
-
-    @model_validator(mode="after")
-    def _orthogonal_axes(self) -> TiedFrame:
-        self.orientation()
-        return self
-
-    def orientation(self) -> Pose:
-        """The orientation as a pose at the origin."""
-        return Pose(axes=self.axes)
 
 
 class SolidRecipe(Part):
@@ -141,10 +138,5 @@ class SolidRecipe(Part):
     def _complete(self) -> SolidRecipe:
         if (self.material is None) == (not self.materials):
             raise ValueError("give either `material` for the whole body or `materials` by region")
-        for name in self.interfaces:
-            if name not in self.frames:
-                hint = suggestion(name, dict(self.frames))
-                raise ValueError(f"interfaces: there is no frame called '{name}'; {hint}")
-        if len(set(self.interfaces)) < len(self.interfaces):
-            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
+        check_interfaces(self.interfaces, self.frames)
         return self

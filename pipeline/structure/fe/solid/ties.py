@@ -31,7 +31,8 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
     if on.region is not None:
         regions = _regions(geometry)
         if on.region not in regions:
-            raise InputError(f"{where}.region", f"no region is called '{on.region}'", suggestion(on.region, regions))
+            hint = suggestion(on.region, regions) if regions else "the mesh names none; choose by plane or cylinder"
+            raise InputError(f"{where}.region", f"no region is called '{on.region}'", hint)
         found = regions[on.region]
     else:
         found = _on_surface(geometry, on)

@@ -23,7 +23,7 @@ def condition(model: Model, given: Given) -> Condition:
     first, second = given.interfaces[:2]
     line = second.position - first.position
     length = float(np.linalg.norm(line))
-    if length <= 1e-9 * np.abs(model.place).max():
+    if length <= 1e-9 * np.ptp(model.place, axis=0).max():
         raise InputError(WHERE, f"'{first.name}' and '{second.name}' lie at one place", "pin the body at two places")
     along, *across = _triad(line / length)
     held = sp.vstack(

@@ -11,16 +11,13 @@ Source: the invariants of Wang & Wang (2019), eqs. (9)-(15); Shabana, *Dynamics 
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 
-from pipeline.structure.fe.beam import Beam
 from pipeline.structure.fe.model import Integrals
-from pipeline.structure.fe.slices import slices
+from pipeline.structure.fe.slices import Slices
 
 
-def integrate(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray) -> Integrals:
+def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
     """All invariants for vectors of shape (ndof, n); exact but for rounding."""
-    body = slices(mesh, beam)
     m, X, D = body.mass, body.place.T, body.spread
     s, theta = (np.stack([along @ vectors for along in maps]) for maps in (body.translation, body.rotation))
     mode_mode = _mode_mode(m, s)

@@ -1,0 +1,128 @@
+"""What is wrong with a scene file, in words: pydantic's findings as input errors with place, value, rule and remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ValidationError
+
+from pipeline.core.errors import InputError, InputErrors
+from pipeline.core.registry import suggestion
+
+#: kinds of findings -> what was expected
+EXPECTED = {
+    **dict.fromkeys(("tuple_type", "list_type"), "expected a list [...]"),
+    **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "expected a table { key = value }"),
+    "string_type": "expected text",
+    "missing": "is missing",
+    "extra_forbidden": "unknown key",
+    "union_tag_not_found": "is missing",
+}
+
+#: models that are chosen otherwise than by their type -> how pydantic calls them in a place
+TAGS = {
+    "JointDrive": ("joint-drive",),
+    "PathDrive": ("path-drive",),
+    "ExplicitPair": ("<explicit>",),
+    "FixedStep": ("<fixed>",),
+    "GeneralizedAlpha": ("<generalized-alpha>",),
+    "Radau": ("<radau>",),
+    "RatioPerMode": ("RatioPerMode",),
+    "Rayleigh": ("Rayleigh",),
+}
+
+
+def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
+    """Everything that pydantic found in a file that should be a `model`."""
+    unique = {str(found): found for found in (_input_error(path, e, model) for e in error.errors())}
+    return InputErrors(list(unique.values()))
+
+
+def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputError:
+    kind, context, value = error["type"], error.get("ctx", {}), error.get("input")
+    keys, known, types = _place(model, error["loc"])
+    message, remedy = EXPECTED.get(kind) or _reworded(error), None
+    if kind == "extra_forbidden":
+        remedy = suggestion(str(keys[-1]), [key for key in known if key != keys[-1]])
+    elif kind == "union_tag_not_found":
+        keys, remedy = [*keys, "type"], f"one of: {', '.join(types)}"
+    elif kind == "union_tag_invalid":
+        keys, value = [*keys, "type"], context["tag"]
+        message, remedy = "there is no such type", suggestion(str(value), types)
+    place = ".".join(str(key) for key in keys if key != "[key]")
+    told = isinstance(value, (str, int, float)) and kind not in ("missing", "union_tag_not_found")
+    shown = f" (got {value!r})" if told and repr(value) not in message else ""
+    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}", remedy)
+
+
+def _reworded(error: Any) -> str:
+    context = error.get("ctx", {})
+    if error["type"] in ("too_long", "too_short"):
+        bound, rule = ("max_length", "at most") if error["type"] == "too_long" else ("min_length", "at least")
+        return f"takes {rule} {context[bound]} entries, not {context['actual_length']}"
+    text: str = error["msg"].removeprefix("Value error, ")
+    return text.replace("Input should be a valid ", "expected a ").replace("Input should be ", "must be ")
+
+
+def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], list[str], list[str]]:
+    """Keys of a place as the file has them, the keys that are known beside its last one, and the types it may have.
+
+    pydantic puts the type by which it chose a part's model into the place; the file has no such key.
+    """
+    keys, here, beside = list[Any](), [model], list[str]()
+    for key in loc:
+        inner = [found for a in here for found in _inside(a, key)]
+        if inner:
+            keys.append(key)
+            beside, here = _keys(here), inner
+        elif any(_chosen_by(a, key) for a in here):
+            here = [a for a in here if _chosen_by(a, key)]
+        elif any(_is_model(a) for a in here):
+            keys.append(key)
+            beside, here = _keys(here), []
+    return keys, beside, [kind for a in here for kind in _types(a)]
+
+
+def _alternatives(annotation: Any) -> Iterator[Any]:
+    """What a field may hold, without the wrappings."""
+    if get_origin(annotation) is Annotated:
+        yield from _alternatives(get_args(annotation)[0])
+    elif get_origin(annotation) in (Union, UnionType):
+        for one in get_args(annotation):
+            yield from _alternatives(one)
+    else:
+        yield annotation
+
+
+def _inside(alternative: Any, key: Any) -> list[Any]:
+    """What may stand under a key of a table or list."""
+    if _is_model(alternative):
+        info = alternative.model_fields.get(key) if isinstance(key, str) else None
+        return [] if info is None else list(_alternatives(info.annotation))
+    if get_origin(alternative) is dict and isinstance(key, str):
+        return list(_alternatives(get_args(alternative)[1]))
+    if get_origin(alternative) is tuple and isinstance(key, int):
+        return list(_alternatives(get_args(alternative)[0]))
+    return []
+
+
+def _is_model(alternative: Any) -> bool:
+    return isinstance(alternative, type) and issubclass(alternative, BaseModel)
+
+
+def _keys(alternatives: list[Any]) -> list[str]:
+    return sorted({name for a in alternatives if _is_model(a) for name in a.model_fields})
+
+
+def _types(alternative: Any) -> tuple[str, ...]:
+    """Names by which a part says that it is this one."""
+    info = alternative.model_fields.get("type") if _is_model(alternative) else None
+    return get_args(info.annotation) if info is not None and get_origin(info.annotation) is Literal else ()
+
+
+def _chosen_by(alternative: Any, tag: Any) -> bool:
+    """Whether pydantic's tag, or its name of a model, chooses this alternative."""
+    return _is_model(alternative) and (tag in _types(alternative) or tag in TAGS.get(alternative.__name__, ()))

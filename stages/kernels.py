@@ -1,0 +1,59 @@
+"""Kernels compiled ahead, side by side, of runs that are measured one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core.workflow.task import Task
+from stages import s4_simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+    from pipeline.core.workflow.execute import Progress
+
+
+def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
+    """Compiles what a scene and all that `shared` equates with it run on.
+
+    bundles: tasks by the names that the simulate stage knows them by.
+    """
+    return Task(
+        stage="kernels",
+        scene=scene.name,
+        part=f"{scene.solver.integrator} {'chosen' if scene.solver.step is None else 'fixed'} {scene.solver.events}",
+        run="stages.kernels:run",
+        params={"simulate": s4_simulate.params(scene)},
+        inputs=bundles,
+        modules=s4_simulate.modules(scene),
+        folder="",
+    )
+
+
+def shared(scene: Scene) -> tuple[str, ...]:
+    """Equal for scenes that run on the same kernels: numbers and wiring are not compiled."""
+    return s4_simulate.modules(scene)
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Compile, unless it is on disk already; the attribute `compile_seconds` is the processor time that it took.
+
+    params: `simulate`, as of the simulate stage.  inputs: bundles.
+    """
+    import time
+
+    import xarray as xr
+
+    begun = time.process_time()
+    warm(s4_simulate.rebuild(params["simulate"]), s4_simulate.bundles(inputs), progress)
+    return {"nc": xr.Dataset(attrs={"compile_seconds": time.process_time() - begun})}
+
+
+def warm(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
+    """Compile or fetch the kernels and call them, so that no measurement contains it."""
+    from pipeline.dynamics.integrate.engine import consistent_start
+    from pipeline.dynamics.run import engine_of
+
+    consistent_start(engine_of(scene, reduced, progress))
