@@ -14,6 +14,8 @@ from tests.analytic.mechanism_runs import TREE
 ROLLING, END = "checks/socket_rolling.toml", "3 ms"
 #: evaluations after which a run is looked at, and more than which in all would be hopeless; dop853 takes 3000
 LOOK, HOPELESS = 1000, 1100
+#: members that start so near to each other stay in touch with the wall, as the scene's ball is
+CLOSE = {"members": 2, "perturbation": "1e-12 m"}
 
 
 def run(told: list[str] | None = None, end: str = END, **solver: object) -> xr.Dataset:
@@ -33,10 +35,11 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("impatient")
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5"])
-def test_an_explicit_method_that_crawls_hands_over_where_it_is(integrator: str) -> None:
+@pytest.mark.parametrize("integrator, rtol", [("dop853", 1e-10), ("dopri5", 1e-6)])
+def test_an_explicit_method_that_crawls_hands_over_where_it_is(integrator: str, rtol: float) -> None:
+    """At tolerances that stability, not accuracy, makes dear."""
     told: list[str] = []
-    made, known = run(told, integrator=integrator), run(integrator="radau")
+    made, known = run(told, integrator=integrator, rtol=rtol), run(integrator="radau", rtol=rtol)
     assert made.attrs["method"] == "radau"
     assert "limited by stability" in made.attrs["switched"]
     assert any("going on with radau" in text for text in told)
@@ -48,10 +51,9 @@ def test_an_explicit_method_that_crawls_hands_over_where_it_is(integrator: str) 
     # the contact that it had begun goes on, with its impact rate
     assert made.event_kind.values.tolist() == known.event_kind.values.tolist()
     assert made.event_time.values == pytest.approx(known.event_time.values, abs=1e-9)
-    # both integrate at 1e-10 of the mechanism's size, half a millimetre
-    assert float(abs(made.position - known.position).max()) < 1e-11
-    # a hundred steps at 1e-10 of the energy that is turned over
-    assert float(abs(made.energy_error).max()) < 1e-8 * np.ptp(known.potential.values)
+    # some hundred steps, each good to rtol of the way, 3 um, and of the energy that is turned over
+    assert float(abs(made.position - known.position).max()) < 100.0 * rtol * 3e-6
+    assert float(abs(made.energy_error).max()) < 100.0 * rtol * np.ptp(known.potential.values)
 
 
 @pytest.mark.usefixtures("impatient")
@@ -59,7 +61,7 @@ def test_the_limit_of_evaluations_makes_it_hand_over_earlier(monkeypatch: pytest
     """A run that could not end within its limit is not followed up to it."""
     monkeypatch.setattr(trajectory, "HOPELESS", 10_000_000)
     assert "switched" not in run().attrs
-    assert "switched" in run(evaluations=HOPELESS).attrs
+    assert "switched" in run(evaluations=2500).attrs
 
 
 @pytest.mark.usefixtures("impatient")
@@ -70,12 +72,12 @@ def test_nothing_is_handed_over_where_the_motion_is_not_stiff() -> None:
 
 @pytest.mark.usefixtures("impatient")
 def test_members_of_an_ensemble_hand_over_too() -> None:
-    scene = load_scene(TREE / "scenes" / ROLLING, override={"time.end": END, "ensemble": {"members": 2}})
+    scene = load_scene(TREE / "scenes" / ROLLING, override={"time.end": END, "ensemble": CLOSE})
     found = dynamics.ensemble(scene, {}, lambda share, text: None)
     assert found.attrs["switched"].startswith("2 of 2 members")
     assert np.isfinite(found.position.values).all()
-    # they start 1e-8 m apart, which at 19 Hz does not grow in 3 ms
-    assert float(found.position.std("member").max()) < 1e-8
+    # at 19 Hz a distance does not grow in 3 ms, but the ball chatters on the contact's two kilohertz
+    assert float(found.position.std("member").max()) < 1e-10
 
 
 @pytest.mark.parametrize("step, stable", [("1e-5 s", False), ("1e-6 s", True)])
