@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow bench clean
+.PHONY: all help setup check test test-slow bench atlas clean
 
 VENV := .venv
 READY := $(VENV)/.ready
@@ -33,6 +33,9 @@ test-slow: $(READY) ## The tests marked slow
 
 bench: $(READY) ## Benchmarks of accuracy against cost
 	$(RUN) -m benchmarks
+
+atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour; goes on where it stopped)
+	@$(RUN) -m benchmarks.stability
 
 clean: ## Remove results and caches; .venv stays
 	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

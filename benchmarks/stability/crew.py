@@ -87,7 +87,7 @@ def _serve(line: connection.Connection, work: Work, limit: int) -> None:
         used = resource.getrusage(resource.RUSAGE_SELF)
         resource.setrlimit(resource.RLIMIT_CPU, (int(used.ru_utime + used.ru_stime) + limit, hard))
 
-    with suppress(EOFError):
+    with suppress(EOFError, BrokenPipeError):  # whoever asked is gone
         while True:
             parameters = line.recv()
             resource.setrlimit(resource.RLIMIT_CPU, (hard, hard))

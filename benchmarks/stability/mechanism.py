@@ -23,8 +23,8 @@ SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 #: centre and to its lower end
 CYLINDER, ROD, LOWER_END = 0.146, 0.160, 0.280
 STROKE, LIFT = 0.18, 0.06  # duration [s] and change of the driven legs [m]
-#: evaluations after which a case counts as refused; about a minute
-CAP = 4_000_000
+#: evaluations after which a case counts as refused: with rigid bodies about a minute; a hundred strokes take half of it
+CAP = 8_000_000
 
 
 @dataclass(frozen=True)

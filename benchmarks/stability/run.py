@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pipeline.core.scene.schema import Scene
 
 #: how much tighter the run is that a finished one is compared with, and runs so dear are not made twice
-TIGHTER, TWICE = 1e-2, 600_000
+TIGHTER, TWICE = 1e-2, 300_000
 TIGHTEST = 1e-14
 
 

@@ -22,12 +22,12 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
-    from pipeline.dynamics.record.dataset import contact_warnings, dataset
+    from pipeline.dynamics.record.dataset import dataset, warnings
     from pipeline.dynamics.run import integrate
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
-        for sentence in contact_warnings(done.engine.built, done.trajectory):
+        for sentence in warnings(done.engine.built, done.trajectory):
             progress(None, f"warning: {sentence}")
         return dataset(done)
 

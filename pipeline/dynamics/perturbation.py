@@ -13,7 +13,7 @@ def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
 
     From the velocities that unit speeds give, so that no step width enters.
     """
-    engine.select_first_pieces()
+    engine.select_pieces_after(engine.start)
     layout = engine.built.layout
     columns = []
     for k in range(layout.nv):
@@ -35,7 +35,7 @@ def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """The start with the balls moved by `offsets` (3 per contact) as nearly as the joints allow."""
-    engine.select_first_pieces()
+    engine.select_pieces_after(engine.start)
     layout = engine.built.layout
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
     moving = y.copy()

@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import SolverError
-from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.integrate.beside import beside
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start, observe, prepare
-from pipeline.dynamics.integrate.trajectory import StiffError, Trajectory
-from pipeline.dynamics.integrate.trajectory import integrate as step
+from pipeline.dynamics.integrate.trajectory import Trajectory
 from pipeline.dynamics.record.ledger import require_closed
+from pipeline.dynamics.switching import follow, implicit
 from pipeline.dynamics.tables import SINGULAR
 
 if TYPE_CHECKING:
     from pipeline.dynamics.sensitivity import Twin
-
-#: what takes over where an explicit integrator would crawl
-IMPLICIT = "radau"
 
 
 @dataclass(frozen=True)
@@ -36,7 +32,7 @@ class Run:
     scene: as the user gave it; the engine may hold another, made for it.
     start_residual: loops' residual as the scene gives its start [m].
     twin: the run's twin, of scenes with contacts.
-    switched: why an implicit integrator took the place of the scene's; empty when none did.
+    switched: from when on and why an implicit integrator took the place of the scene's; empty when none did.
     """
 
     scene: Scene
@@ -60,24 +56,14 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
         from pipeline.dynamics.inverse import actuated
 
         driven, given = actuated(scene, bundles, progress)
-    try:
-        return _run(scene, driven, given, bundles, progress)
-    except StiffError as stiff:
-        progress(None, f"{stiff}; going on with {IMPLICIT}")
-        implicit = edited(driven, {"solver.integrator": IMPLICIT})
-        return replace(_run(scene, implicit, given, bundles, progress), switched=str(stiff))
-
-
-def _run(
-    scene: Scene, driven: Scene, given: dict[str, Pieces], bundles: Mapping[str, xr.Dataset], progress: Progress
-) -> Run:
-    """One run of `driven`, which stands for the user's scene."""
     engine = prepare(tabulate(build(driven, bundles), given), progress)
     start, residual = consistent_start(engine)
-    trajectory = step(engine, start, progress)
+    engine, trajectory, switched = follow(
+        engine, start, progress, lambda: prepare(tabulate(build(implicit(driven), bundles), given), progress)
+    )
     seen = observed(engine, trajectory)
     require_closed(engine.built, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory))
+    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched)
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -12,8 +11,6 @@ import xarray as xr
 from pipeline import dynamics
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.integrate.trajectory import StiffError
-from pipeline.dynamics.record import ensemble as record
 from pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
@@ -65,22 +62,3 @@ def test_statistics_of_the_members_are_in_the_post_artifact() -> None:
     assert float(post.contact_time_share_mean.sel(contact="contact")) > 0.0
     speed = members().velocity.sel(body="ball", axis="z").values
     assert post.velocity_mean.sel(kept="ball", axis="z").values == pytest.approx(speed.mean(axis=0), abs=1e-12)
-
-
-def test_an_ensemble_that_an_explicit_method_cannot_finish_goes_on_with_an_implicit_one(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """As a single run does."""
-    tried: list[str] = []
-
-    def once_too_stiff(asked: Scene, *rest: Any) -> xr.Dataset:
-        tried.append(asked.solver.integrator)
-        if len(tried) == 1:
-            raise StiffError("at t = 0.1 s: steps were limited by stability")
-        return made
-
-    made = members().copy()
-    monkeypatch.setattr(record, "_members", once_too_stiff)
-    found = dynamics.ensemble(scene(), {}, _quiet)
-    assert tried == ["dop853", "radau"]
-    assert "limited by stability" in found.attrs["switched"]

@@ -60,9 +60,10 @@ class Engine:
         first = self.n[ACTIVE]
         self.n[first : first + self.built.packed.sizes["N_LAWS"]] = pieces_at(self.built, inside)
 
-    def select_first_pieces(self) -> None:
-        """Put the pieces in force that hold after the start; an earlier run leaves those of its end."""
-        self.select_pieces(0.5 * (self.breaks[0] + self.breaks[1]))
+    def select_pieces_after(self, t: float) -> None:
+        """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""
+        k = int(np.clip(np.searchsorted(self.breaks, t, side="right"), 1, len(self.breaks) - 1))
+        self.select_pieces(0.5 * (self.breaks[k - 1] + self.breaks[k]))
 
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
@@ -118,7 +119,7 @@ def prepare(built: Tables, progress: Progress) -> Engine:
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     """State at the start with its loops closed, and the joints' largest residual as the scene gives them [m]."""
     built = engine.built
-    engine.select_first_pieces()
+    engine.select_pieces_after(engine.start)
     y = initial.start_state(built)
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:

@@ -19,9 +19,9 @@ from pipeline.dynamics.integrate.state import (
     STEP,
     TIME,
 )
-from pipeline.dynamics.integrate.stepper import finite
+from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
 from pipeline.dynamics.integrate.straddle import steer
-from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y
+from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y_NEW, Y
 from pipeline.dynamics.vectors import index, kernel
 
 
@@ -50,6 +50,12 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         return 0.0
 
     @kernel
+    def judge_with_scales(h, f, w, n, step):
+        """The same, of a method that looks for stiffness, which measures changes in units of the tolerance."""
+        set_magnitudes(h, f, w, h[Y_NEW])
+        return 0.0
+
+    @kernel
     def after_rejection(h, w, n, step, norm):
         """There is no shorter step to try."""
         if n[EVALUATION] == OK:
@@ -68,4 +74,5 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         """Length of the step to try from t: as given, unless a singular pose is ahead."""
         return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap, 1.0)
 
-    return first_step, judge, after_rejection, next_step, lay, straddle.compose(evaluate)
+    good = judge if method.stability is None else judge_with_scales
+    return first_step, good, after_rejection, next_step, lay, straddle.compose(evaluate)

@@ -9,9 +9,10 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.assembly.places import PIVOT_SIZE
-from pipeline.dynamics.integrate import singular, state
+from pipeline.dynamics.integrate import refusal, singular, state
 from pipeline.dynamics.integrate.depart import depart
 from pipeline.dynamics.integrate.engine import Engine, Progress, overlapping
+from pipeline.dynamics.integrate.handover import Handover, StiffError, hand_over, take_over
 from pipeline.dynamics.tables import MODE
 
 #: evaluations between two looks at the clock and the keyboard
@@ -20,12 +21,8 @@ SLICE = 20_000
 EVENT_ROWS = 4096
 #: why the stepper stops that another choice of closure rows may mend
 STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
-#: above this share of steps that stability limits, stiffness is named as the cause of a long run
-STIFF_SHARE = 0.3
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
-#: integrators with Newton iterations
-IMPLICIT = ("generalized-alpha", "radau")
 
 
 Stop = Callable[[np.ndarray], bool]
@@ -34,10 +31,6 @@ Stop = Callable[[np.ndarray], bool]
 def never(rows: np.ndarray) -> bool:
     """A run goes to its end."""
     return False
-
-
-class StiffError(SolverError):
-    """An explicit method crawls along at the limit of its stability; an implicit one may go on in long steps."""
 
 
 @dataclass(frozen=True)
@@ -96,16 +89,21 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     return np.union1d(regular[apart], breaks)
 
 
-def integrate(engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = never) -> Trajectory:
+def integrate(
+    engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = never, left: Handover | None = None
+) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
     stop: asked now and then with the rows recorded so far, whether they are enough.
+    left: what another method left of this run; it is gone on with from there.
     """
-    run = _begin(engine, y)
-    if engine.mobility.singular_start:
+    run = _begin(engine, y) if left is None else _resume(engine, left)
+    if left is None and engine.mobility.singular_start:
         _depart(engine, run)
     control = engine.view("CONTROL", state.N_CONTROLS)
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
+        if b <= control[state.TIME]:
+            continue
         engine.select_pieces(0.5 * (a + b))
         control[state.END], run.n[state.FRESH] = b, 1
         if _segment(engine, run, progress, stop):
@@ -114,12 +112,30 @@ def integrate(engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = ne
 
 
 def _begin(engine: Engine, y: np.ndarray) -> _Run:
+    run = _prepare(engine, y, engine.start)
+    run.rows[0, 0], run.rows[0, 1 + 2 * engine.built.packed.sizes["N_CONTACTS"] :] = engine.start, y
+    run.n[state.N_RECORDED], run.n[state.NEXT_OUTPUT] = 1, 1
+    _begin_closed(engine, y, run.rows[0], run.events)
+    return run
+
+
+def _resume(engine: Engine, left: Handover) -> _Run:
+    run = _prepare(engine, left.y, left.time)
+    take_over(engine, left)
+    run.rows, run.events = np.concatenate([left.rows, run.rows]), np.concatenate([left.events, run.events])
+    same = np.array_equal(left.selections[-1][1], engine.kept)
+    run.selections = [*left.selections, *([] if same else run.selections)]
+    return run
+
+
+def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
+    """Work space and record of an integration from state y at time t, nothing recorded yet."""
     built, n = engine.built, engine.n
     scene, contacts = built.system.scene, built.packed.sizes["N_CONTACTS"]
     control = engine.view("CONTROL", state.N_CONTROLS)
-    engine.select_first_pieces()
+    engine.select_pieces_after(t)
     control[:] = 0.0
-    control[state.TIME], control[state.SPAN] = engine.start, engine.end - engine.start
+    control[state.TIME], control[state.SPAN] = t, engine.end - engine.start
     control[state.RTOL], control[state.LENGTH] = engine.rtol, built.system.length
     control[state.FIXED], control[state.PARAMETER] = scene.solver.step or 0.0, built.method.parameter(scene.solver)
     n[state.STATUS : state.INTEGERS] = 0
@@ -130,14 +146,11 @@ def _begin(engine: Engine, y: np.ndarray) -> _Run:
     outputs = output_times(engine.breaks, scene.output.interval)
     room = EVENT_ROWS if contacts else state.ROOM
     rows = np.zeros((len(outputs) + room + state.ROOM, 1 + 2 * contacts + len(y)))
-    rows[0, 0], rows[0, 1 + 2 * contacts :] = engine.start, y
-    n[state.N_RECORDED], n[state.NEXT_OUTPUT] = 1, 1
-    ratio = singular.select_rows(engine, y, engine.start)
+    ratio = singular.select_rows(engine, y, t)
     engine.view("Y", len(y))[:] = y
     engine.view("PIVOT", PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
     events = np.full((room + state.ROOM, state.EVENT_SIZE), np.nan)
-    _begin_closed(engine, y, rows[0], events)
-    return _Run(engine.w, n, outputs, rows, events, [(engine.start, engine.kept.copy())])
+    return _Run(engine.w, n, outputs, rows, events, [(t, engine.kept.copy())])
 
 
 def _depart(engine: Engine, run: _Run) -> None:
@@ -198,11 +211,12 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
             if singular.improve(engine, float(t)):
                 run.selections.append((float(t), engine.kept.copy()))
             elif status != state.WORN_ROWS:
-                raise SolverError(_refusal(engine, run))
+                raise SolverError(refusal.text(engine))
         elif status != state.PAUSED:
-            raise SolverError(_refusal(engine, run))
+            raise SolverError(refusal.text(engine))
         elif _crawls(engine, run):
-            raise StiffError(f"at t = {t:.6g} s: {_why_so_many(n, control)}")
+            left = hand_over(engine, run.rows, run.events, run.selections)
+            raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", left)
         elif stop(run.rows[: n[state.N_RECORDED]]):
             return True
 
@@ -213,53 +227,8 @@ def _crawls(engine: Engine, run: _Run) -> bool:
     if engine.built.method.stability is None or control[state.FIXED] or n[state.EVALUATIONS] < TRIAL:
         return False
     done = max((control[state.TIME] - engine.start) / control[state.SPAN], 1e-12)
-    return bool(n[state.STIFF_STEPS] > STIFF_SHARE * n[state.STEPS] and n[state.EVALUATIONS] / done > HOPELESS)
-
-
-def _refusal(engine: Engine, run: _Run) -> str:
-    control, n = engine.view("CONTROL", state.N_CONTROLS), run.n
-    where = singular.diagnosis(engine)
-    contacts = [name for name, *_ in engine.built.system.contacts]
-    culprit = contacts[n[state.CULPRIT]] if contacts else ""
-    fixed = f"{control[state.FIXED]:.2g} s"
-    too_long = f"; or the fixed step of {fixed} is too long for it" if control[state.FIXED] else ""
-    unsolvable = f"the loops cannot be kept closed: a singular pose in which they can go on in several ways ({where})"
-    unsolvable += _other_integrator(engine)
-    if not engine.built.system.closures:
-        unsolvable = "the equations cannot be solved here: the motion has grown beyond bounds"
-    reasons = {
-        state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
-        + _why_so_many(n, control),
-        state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
-        f"or stiffer than the integrator can follow ({where})",
-        state.NO_START: f"the equations are singular here ({where})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
-        + too_long,
-        state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
-        "take a shorter step, or leave [solver.step] out",
-        state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
-        state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
-        f"({where}): give it another motion{_other_integrator(engine)}",
-        state.LOST_CLOSURE: unsolvable + too_long,
-    }
-    return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
-
-
-def _other_integrator(engine: Engine) -> str:
-    """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
-    name = engine.built.system.scene.solver.integrator
-    return f"; or it moves on and {name} does not get over the pose: try dop853" if name in IMPLICIT else ""
-
-
-def _why_so_many(n: np.ndarray, control: np.ndarray) -> str:
-    """What used the evaluations up."""
-    if n[state.STIFF_STEPS] > STIFF_SHARE * max(1, n[state.STEPS]):
-        return (
-            f"{n[state.STIFF_STEPS]} of {n[state.STEPS]} steps were limited by stability: the equations have rates up "
-            f"to {control[state.STEEPEST]:.2g} 1/s, as the slope of friction at small sliding speeds has; "
-            "choose an implicit integrator, or a larger v_static"
-        )
-    return "contacts may be collapsing in time, or the tolerance is too tight"
+    too_many = min(HOPELESS, n[state.CAP])
+    return bool(n[state.STIFF_STEPS] > refusal.STIFF_SHARE * n[state.STEPS] and n[state.EVALUATIONS] / done > too_many)
 
 
 def _collect(run: _Run, control: np.ndarray) -> Trajectory:

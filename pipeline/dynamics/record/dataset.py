@@ -94,18 +94,33 @@ def attributes(scene: Scene) -> dict[str, str]:
 
 
 def _told(built: Tables, trajectory: Trajectory) -> dict[str, str]:
-    """Laws of the contacts, and in words where the run left the range of one."""
+    """Laws of the contacts, and in words what is to be doubted."""
+    told = "\n".join(warnings(built, trajectory))
     if not built.system.contacts:
-        return {}
+        return {"warnings": told} if told else {}
     from pipeline.dynamics.contact import validity
 
-    return {
-        "contacts": validity.laws(built.system.contacts, built.laws),
-        "warnings": "\n".join(contact_warnings(built, trajectory)),
-    }
+    return {"contacts": validity.laws(built.system.contacts, built.laws), "warnings": told}
 
 
-def contact_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
+def warnings(built: Tables, trajectory: Trajectory) -> list[str]:
+    """Sentences about what a run is to be doubted for."""
+    return [*_contact_warnings(built, trajectory), *_step_warnings(built, trajectory)]
+
+
+def _step_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
+    """Fixed steps are not made shorter where the method is unstable: what happens there is not resolved."""
+    solver, stiff = built.system.scene.solver, trajectory.counters["stiff_steps"]
+    if solver.step is None or not stiff:
+        return []
+    return [
+        f"{stiff} of {trajectory.counters['steps']} steps of {solver.step:g} s were too long for {solver.integrator} "
+        f"to be stable: the equations have rates up to {trajectory.steepest:.2g} 1/s, as the slope of friction at "
+        "small sliding speeds has; a shorter step or an implicit integrator resolves that"
+    ]
+
+
+def _contact_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
     """Sentences about contacts that left the range for which their laws were made."""
     if not built.system.contacts:
         return []

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import xarray as xr
@@ -15,16 +16,16 @@ import xarray as xr
 from pipeline.core.artifacts.schema import ENSEMBLE, conform
 from pipeline.core.errors import InputError
 from pipeline.core.quantities import IMPACT
-from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Ensemble, Scene
 from pipeline.dynamics.integrate import state
 from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start
-from pipeline.dynamics.integrate.trajectory import StiffError, Trajectory, integrate, output_times
+from pipeline.dynamics.integrate.trajectory import Trajectory, output_times
 from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.record.dataset import attributes
 from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
-from pipeline.dynamics.run import IMPLICIT, engine_of, observed
+from pipeline.dynamics.run import engine_of, observed
+from pipeline.dynamics.switching import follow, implicit
 from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
 
 
@@ -35,30 +36,24 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         raise InputError(
             "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
         )
-    told: dict[str, str | int | float] = {"seed": wanted.seed, "perturbation": wanted.perturbation}
-    try:
-        made = _members(scene, bundles, wanted, progress)
-    except StiffError as stiff:
-        progress(None, f"{stiff}; going on with {IMPLICIT}")
-        made = _members(edited(scene, {"solver.integrator": IMPLICIT}), bundles, wanted, progress)
-        told["switched"] = str(stiff)
-    return conform(made, ENSEMBLE, **attributes(scene), **told)
-
-
-def _members(scene: Scene, bundles: Mapping[str, xr.Dataset], wanted: Ensemble, progress: Progress) -> xr.Dataset:
     engine = engine_of(scene, bundles, progress)
     names = _bodies(engine, wanted)
     start, _ = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
     random = np.random.default_rng(wanted.seed)
-    members = []
+    members, reasons = [], []
+    other = cache(lambda: engine_of(implicit(scene), bundles, progress))
     for k in range(wanted.members):
         offsets = random.normal(size=(len(scene.contacts()), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
-        members.append(_member(engine, integrate(engine, moved, _quiet), names))
+        last, trajectory, switched = follow(engine, moved, _quiet, other)
+        members.append(_member(last, trajectory, names))
+        reasons += [switched] if switched else []
         progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
-    return xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
+    made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
+    told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
+    return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
 
 
 def _quiet(share: float | None, text: str) -> None:
