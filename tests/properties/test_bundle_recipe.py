@@ -60,7 +60,7 @@ def test_a_frame_between_nodes_is_refused_with_the_nearest_nodes(recipe: dict[st
         ({"elements": 0}, r"\[elements\].*greater than or equal to 1"),
         ({"section": {"type": "circle", "radius": "10 kg"}}, r"\[section\.radius\].*is a mass, but a length"),
         ({"section": {"type": "circle", "radius": -0.01}}, r"\[section\.radius\].*greater than 0"),
-        ({"inertia_section": {"type": "hexagon"}}, r"\[inertia_section\].*hexagon"),
+        ({"inertia_section": {"type": "hexagon"}}, r"\[inertia_section\.type\].*hexagon"),
         ({"interfaces": ["bottom", "topp"]}, "interface 'topp' is no frame of the recipe; did you mean 'top'"),
         ({"interfaces": ["top", "top"]}, "name a frame twice"),
         ({"frames": {}}, r"\[frames\]"),

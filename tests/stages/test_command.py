@@ -77,10 +77,6 @@ WRONG = {
         SCENE + JOINT + '\n[solver]\nstep = "1 mm"\n',
         ["[solver.step]", "'1 mm' is a length"],
     ),
-    "steps of a method that chooses them": (
-        SCENE + JOINT + '\n[solver]\nintegrator = "radau"\nstep = "1 us"\n',
-        ["[solver]", "radau chooses its steps by rtol", "remove step"],
-    ),
     "unlocated events of chosen steps": (
         SCENE + JOINT + '\n[solver]\nevents = "at step ends"\n',
         ["[solver]", "needs fixed steps", "give step"],

@@ -110,7 +110,7 @@ def warnings(built: Tables, trajectory: Trajectory) -> list[str]:
 
 def _step_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
     """Fixed steps are not made shorter where the method is unstable: what happens there is not resolved."""
-    solver, stiff = built.system.scene.solver, trajectory.counters["stiff_steps"]
+    solver, stiff = built.system.scene.solver, trajectory.counters.get("stiff_steps", 0)
     if solver.step is None or not stiff:
         return []
     return [
