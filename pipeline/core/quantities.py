@@ -21,6 +21,8 @@ from pipeline.core.registry import suggestion
 SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
+#: a run is believed point by point until velocities of neighbouring runs differ by this share of the largest one
+PARTED = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,12 +92,16 @@ def series(run: xr.Dataset, quantity: Quantity) -> np.ndarray:
     return values.reshape(len(values), -1)
 
 
-def events(run: xr.Dataset, quantity: Quantity) -> np.ndarray:
-    """Impact times [s], the largest contact force [N] or the total normal impulse [N s], shape (n,)."""
+def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.ndarray:
+    """Impact times [s] or the largest contact force [N] of contacts that begin up to a time [s], shape (n,).
+
+    Or the total normal impulse of the run [N s].
+    """
     if quantity.kind == "impulse":
         return series(run, quantity)[-1]
     contacts = [str(name) for name in run["contact"].values]
     mine = (run["event_contact"].values == contacts.index(quantity.owner)) & (run["event_kind"].values == 1)
+    mine &= run["event_time"].values <= until
     if quantity.kind == "peak_force":
         return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])
     impact = mine & (run["event_approach_speed"].values > IMPACT)
@@ -131,9 +137,11 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
     if is_series(quantity):
         time, distance = deviation(run, reference, quantity)
         return float(distance[time <= until].max(initial=0.0))
-    a, b = events(run, quantity), events(reference, quantity)
-    if quantity.kind == "impact_times":
-        a, b = a[a <= until], b[b <= until]
+    if quantity.kind == "impulse":
+        i, j = common_times(run["time"].values, reference["time"].values)
+        last = max(int(np.searchsorted(run["time"].values[i], until, side="right")) - 1, 0)
+        return float(np.abs(series(run, quantity)[i[last]] - series(reference, quantity)[j[last]]).max())
+    a, b = events(run, quantity, until), events(reference, quantity, until)
     return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
 
 

@@ -91,7 +91,10 @@ def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarr
     for part, kept in trajectory.parts():
         engine.keep(kept)
         seen = observe(engine, trajectory.rows[part])
-        for k in np.flatnonzero(seen["status"][:, 0] == SINGULAR):
+        blurred = seen["status"][:, 0] == SINGULAR
+        if engine.mobility.singular_start and part.start == 0:
+            blurred[0] = True  # rows of the closures that vanish there had no size before to be compared with
+        for k in np.flatnonzero(blurred):
             for name, value in (beside(engine, trajectory.rows[part][k]) or {}).items():
                 seen[name][k] = value[0]
         parts.append(seen)

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.core.quantities import PARTED
 from pipeline.dynamics.integrate.engine import Engine, observe
 from pipeline.dynamics.integrate.trajectory import Trajectory, integrate, output_times
 from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.tables import FRAME_SIZE, VELOCITY
 
-#: the horizon ends where the velocities differ by this share of the largest velocity
-SHARE = 1e-3
 #: the two are compared at every so manieth regular output, which bounds the cost
 EVERY = 10
 #: offsets below this cannot be told from rounding of the positions [m]
@@ -46,7 +45,7 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
     time = output_times(engine.breaks, engine.built.system.scene.output.interval)[::EVERY]
     one = _velocities(engine, trajectory, time)
-    visible = SHARE * float(np.linalg.norm(one, axis=2).max())
+    visible = PARTED * float(np.linalg.norm(one, axis=2).max())
 
     def parted(rows: np.ndarray) -> bool:
         """Whether the twin is already beyond the horizon, where following it further tells nothing."""

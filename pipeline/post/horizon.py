@@ -5,10 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from pipeline.core.quantities import PARTED
 from pipeline.post.rotations import angle_about_y
-
-#: the horizon ends where members differ in velocity by this share of the largest velocity
-SHARE = 1e-3
 
 #: shares of the members below the quantiles that are kept: of so few, the middle and the bulk
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -24,7 +22,7 @@ def spread(velocity: np.ndarray) -> np.ndarray:
     return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
 
 
-def horizon(time: np.ndarray, velocity: np.ndarray, share: float = SHARE) -> float:
+def horizon(time: np.ndarray, velocity: np.ndarray, share: float = PARTED) -> float:
     """First time at which `spread` passes `share` of the largest speed; the last time if it never does [s].
 
     Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a

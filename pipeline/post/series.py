@@ -9,8 +9,8 @@ import xarray as xr
 
 from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.schema import conform
-from pipeline.core.quantities import IMPACT
-from pipeline.post.horizon import QUANTILES, SHARE, Variables, ensemble_statistics, horizon
+from pipeline.core.quantities import IMPACT, PARTED
+from pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
 from pipeline.post.impacts import impacts
 from pipeline.post.rotations import angle_about_y
 from pipeline.post.schema import POST
@@ -38,7 +38,7 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     attributes = {
         "scene": str(run.attrs.get("scene", "")),
         "impact_threshold": f"{IMPACT:g} m/s",
-        "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {SHARE:g} of the largest",
+        "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {PARTED:g} of the largest",
     }
     result = conform(xr.Dataset(data, coords=coords), POST, **attributes)
     if ensemble is not None:

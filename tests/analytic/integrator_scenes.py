@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.solver import Radau
 from pipeline.dynamics.assembly.numbers import tabulate
 from pipeline.dynamics.assembly.system import build
 from pipeline.dynamics.integrate.engine import Engine, consistent_start, prepare
@@ -95,13 +94,8 @@ def engine_with(scene: Scene) -> Engine:
 
 
 def trajectory(table: dict[str, Any], solver: dict[str, Any]) -> Trajectory:
-    """The run with this solver table; radau takes a step here, which scenes may not give it."""
-    fixed_radau = solver.get("integrator") == "radau" and "step" in solver
-    scene = Scene.model_validate({**table, "solver": {} if fixed_radau else solver})
-    if fixed_radau:
-        method = Radau(integrator="radau", rtol=solver["rtol"])
-        scene = scene.model_copy(update={"solver": method.model_copy(update={"step": solver["step"]})})
-    engine = engine_with(scene)
+    """The run with this solver table."""
+    engine = engine_with(Scene.model_validate({**table, "solver": solver}))
     start, _ = consistent_start(engine)
     return integrate(engine, start, lambda share, text: None)
 

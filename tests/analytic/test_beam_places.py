@@ -154,3 +154,17 @@ def test_nafems_fv2_double_cross_of_eight_turned_rods() -> None:
     free = double_cross(8, centre_held=False) / double_cross(8, centre_held=True)
     assert np.flatnonzero(np.abs(free - 1.0) > 1e-3).tolist() == [1, 2, 9, 10]
     assert free.max() < 1.0 + 1e-9
+
+
+@pytest.mark.parametrize("reference, count", [("craig-bampton", 12), ("pinned-pinned", 8)])
+def test_a_turned_frame_is_another_name_for_the_same_section(reference: str, count: int) -> None:
+    """Pins across a rod: the frames' axes change, the shapes and frequencies do not."""
+    across = {name: frame | {"axes": {"z": [0, 0, 1], "x": [1, 0, 0]}} for name, frame in ROD["frames"].items()}
+    along, turned = (mesh.build(ROD | {"frames": frames}) for frames in (ROD["frames"], across))
+    here, there = (bundle.build(rod, solve(rod, reference, count)) for rod in (along, turned))
+    assert turned["frame_rotation"].values[0] == pytest.approx(np.eye(3), abs=1e-15)
+    np.testing.assert_allclose(there["frequency"], here["frequency"], rtol=5e-12)
+    # shapes have components of the mesh frame; they agree but for signs, as far as the eigensolver knows them
+    for name in ("frame_translation_shape", "frame_rotation_shape"):
+        size = np.abs(here[name].values).max()
+        np.testing.assert_allclose(np.abs(there[name].values), np.abs(here[name].values), rtol=0, atol=1e-7 * size)

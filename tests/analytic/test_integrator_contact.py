@@ -28,6 +28,8 @@ BOUNCES = {
     # 200 steps a contact of 2 ms, each begun anew: (step / contact time)^4 of a second's flight
     "rk4": (solver(integrator="rk4", step=STEP), 1e-6, 1e-6),
     "adams-bashforth-moulton": (solver(integrator="adams-bashforth-moulton", step=STEP), 1e-6, 1e-6),
+    # order 5, 200 steps a contact
+    "radau fixed": (solver(integrator="radau", step=STEP), 1e-7, 1e-7),
     "generalized-alpha fixed": (solver(integrator="generalized-alpha", step=STEP), 1e-4, 1e-4),
 }
 QUICK = ("dopri5", "radau")

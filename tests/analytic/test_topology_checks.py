@@ -197,6 +197,18 @@ def test_the_motion_does_not_depend_on_which_rows_are_solved_for(monkeypatch: py
     same_motion(dataset_of(often), dataset_of(once), 1e-9)
 
 
+def test_rows_are_chosen_anew_before_the_present_ones_depend_on_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Near 1.25 s the five rows that are best at the start do, though the mechanism is as movable as ever."""
+    scene = Scene.model_validate(table("bricard", **{"time.end": 2.0, "solver": {"rtol": 1e-12}}))
+    run = integrate(scene, {}, lambda share, text: None)
+    (_, first), (time, second) = run.trajectory.selections
+    assert 1.0 < time < 1.247
+    assert not np.array_equal(first, second)
+    monkeypatch.setattr(singular, "WORN", 0.0)
+    with pytest.raises(SolverError, match=r"t = 1\.24"):
+        integrate(scene, {}, lambda share, text: None)
+
+
 # Singular poses ------------------------------------------------------------------------------------------------------
 
 

@@ -84,10 +84,10 @@ SCENES: dict[str, tuple[str, dict[str, object]]] = {
 
 
 @cache
-def spun(case: str) -> xr.Dataset:
+def spun(case: str, rtol: float = 1e-10) -> xr.Dataset:
     """The run of a case."""
     name, overrides = SCENES[case]
-    scene = load_scene(TREE / "scenes" / f"{name}.toml", overrides)
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", {**overrides, "solver.rtol": rtol})
     return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
 
 
@@ -121,8 +121,12 @@ def test_the_spun_beam_ends_stretched_by_its_centrifugal_force(case: str) -> Non
 
 @pytest.mark.parametrize("case", SCENES)
 def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
-    found = spun(case)
-    # errors of 1e-10 of some 8000 steps add up to 1e-8 like a random walk; a shortening that were not Lagrangian
-    # would show at 1e-4
-    assert np.abs(found.energy_error).max() < 1e-8 * found.kinetic.max()
-    assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-9)
+    """A shortening that were not Lagrangian would show at 1e-4.
+
+    Axial modes that nothing moves limit the steps by stability and ring up to the tolerance, at random: at neighbouring
+    tolerances of 1e-10 the error is anything from 2e-15 to 2e-11 of the energy, whatever groups its norm has.
+    At 1e-12 what rings is a hundred times smaller, its energy ten thousand times: 1e-14 at most in thirty such runs.
+    """
+    found = spun(case, 1e-12)
+    assert np.abs(found.energy_error).max() < 1e-13 * found.kinetic.max()
+    assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-13)

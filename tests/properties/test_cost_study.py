@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from pipeline.core import quantities
 from pipeline.core.errors import SolverError
-from pipeline.core.quantities import Quantity, standard_error
-from pipeline.post.cost import causes, page, price, split, statistics, work_precision
+from pipeline.core.quantities import Quantity
+from pipeline.post.cost import causes, page, price, split, work_precision
 from pipeline.post.cost.study import Point, assemble, resolved
 
 POSITION = Quantity("slider", "position")
@@ -177,33 +178,6 @@ def test_the_spread_of_an_ensemble_is_a_cause():
     assert peak == pytest.approx(1.96 * 0.05 / np.sqrt(members), rel=0.5)
 
 
-def test_the_standard_error_of_a_series_is_that_of_its_members_mean():
-    random = np.random.default_rng(5)
-    values = random.normal(0.0, 1.0, (400, 3, 1, 3)) * np.array([0.0, 1.0, 2.0])[:, None, None]
-    ensemble = xr.Dataset({"position": (("member", "time", "body", "axis"), values)}, {"body": ["slider"]})
-    # the last time: deviation 2 on each of three axes, over the root of 400
-    assert standard_error(ensemble, POSITION) == pytest.approx(2.0 * np.sqrt(3.0) / 20.0, rel=0.1)
-    assert standard_error(ensemble, Quantity("other", "position")) is None
-    assert standard_error(ensemble, Quantity("slider", "orientation")) is None
-    assert standard_error(ensemble, TIMES) is None
-
-
-def test_larger_ensembles_know_their_mean_better():
-    values = np.random.default_rng(3).normal(10.0, 1.0, size=64)
-    errors = [statistics.relative_error(values[:size]) for size in statistics.growing(64)]
-    assert statistics.growing(64) == [4, 8, 16, 32, 64]
-    # 1.96 standard deviations of 0.1 over the root of 64, from one draw of them
-    assert errors[-1] == pytest.approx(1.96 * 0.1 / 8.0, rel=0.2)
-    assert errors[-1] < errors[1]
-
-
-def test_the_figure_of_ensembles_is_drawn():
-    random = np.random.default_rng(1)
-    data = {name: (("member", "contact"), random.uniform(1, 2, (16, 1))) for name in statistics.STATISTICS}
-    one = xr.Dataset(data, {"contact": ["pin"]}, {"cpu_seconds": 0.5})
-    assert set(statistics.make("s", {"rtol 1e-06": one, "rtol 1e-08": one}, "t")) == {"s.png", "s.svg"}
-
-
 def test_the_pareto_front_holds_what_nothing_beats():
     seconds, error = np.array([1.0, 2.0, 3.0, 4.0, np.nan]), np.array([1e-2, 1e-1, 1e-4, 1e-3, 1e-9])
     assert work_precision.pareto(seconds, error).tolist() == [0, 2]
@@ -235,14 +209,25 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
     assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
 
 
-def test_bootstrap_intervals_hold_the_mean_of_the_population_as_often_as_they_say():
-    random = np.random.default_rng(1)
-    hits = 0
-    for _ in range(200):
-        found = statistics.estimate(random.normal(size=16))
-        hits += found.low < 0.0 < found.high
-    # 95 % intervals of the percentile kind from 16 members cover 88 to 96 %
-    assert 0.85 < hits / 200 < 0.98
+def test_a_cause_that_changes_the_number_of_impacts_dominates():
+    shares = {"pin.impact_times": {"mesh": 1e-3, "beam theory": np.inf, "modal truncation": np.nan}}
+    assert causes.dominant(shares["pin.impact_times"]) == "beam theory"
+    found = {row[0]: row[1] for row in causes.table(shares, "t").rows}
+    assert (found["mesh"], found["beam theory"]) == ("1.0e-03", "other impacts")
+    assert set(causes.make("c", shares, "t")) == {"c.png", "c.svg"}
+
+
+def test_contacts_beyond_the_horizon_do_not_count():
+    """Peaks and impulses, too, are those of contacts up to the horizon."""
+    a, b = run(0.0), run(0.0)
+    for one, last in ((a, 50.0), (b, 80.0)):
+        one["event_peak_force"] = (("event",), [10.0, 20.0, last])  # at 0.2, 0.4 and 0.6 s
+        grown = np.array([1.0] * 5 + [last] * 6)  # every 0.1 s
+        one["contact_impulse"] = (("time", "contact"), grown[:, None])
+    for kind in ("peak_force", "impulse"):
+        quantity = Quantity("pin", kind)
+        assert quantities.error(a, b, quantity) == 30.0
+        assert quantities.error(a, b, quantity, until=0.45) == 0.0
 
 
 def test_the_page_says_what_each_digit_costs():
@@ -252,6 +237,16 @@ def test_the_page_says_what_each_digit_costs():
     assert "0.001 takes rk4, step 0.001 s (50 evaluations)" in text
     assert "1e-09 cannot be had" in text
     assert "![Error of a/scene](x/y.png)" in text
+
+
+def test_the_page_says_which_quantities_can_be_had_when_not_all_can():
+    _, points, runs = study(uncertainty=1e-12)
+    finest = run(1e-11)
+    finest["event_time"] = finest["event_time"] + 1e-7
+    points.append(Point("d3", "tolerance", {"adaptive_integrator": "dop853", "rtol": 1e-12}))
+    found = assemble(points, runs | {"d3": finest}, [POSITION, TIMES])
+    text = page.markdown((page.Studied("a/scene", found, (), {}),), "p.md")
+    assert "1e-09 can be had for slider.position, not for pin.impact_times." in text
 
 
 def test_the_page_says_how_far_it_holds_and_what_to_refine():

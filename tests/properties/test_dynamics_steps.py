@@ -14,7 +14,7 @@ from pipeline.dynamics.integrate.engine import consistent_start
 from pipeline.dynamics.run import observed
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
-FIXED = ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "generalized-alpha")
+FIXED = ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "generalized-alpha", "radau")
 ADAPTIVE = ("dop853", "dopri5", "generalized-alpha", "radau")
 SOLVERS = [{"integrator": name, "step": 0.004} for name in FIXED] + [{"integrator": name} for name in ADAPTIVE]
 

@@ -22,6 +22,9 @@ from pipeline.core.scene.parts import (
 from pipeline.core.scene.solver import ExplicitPair, Solver
 from pipeline.core.units import quantity
 
+#: rows of a run that a machine can be asked to hold
+MOST_ROWS = 1e7
+
 
 class TimeSpan(Part):
     """Start and end of the run."""
@@ -52,9 +55,9 @@ class Ensemble(Part):
     bodies: whose motion is kept; default: the bodies that carry the clearance joints.
     """
 
-    members: Annotated[int, Field(ge=2)] = 16
+    members: Annotated[int, Field(ge=2, le=100_000)] = 16
     perturbation: Annotated[Length, Field(gt=0.0)] = 1e-8
-    seed: int = 20190310
+    seed: Annotated[int, Field(ge=0)] = 20190310
     bodies: tuple[str, ...] | None = None
 
 
@@ -126,6 +129,16 @@ class Scene(Part):
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None
+
+    @model_validator(mode="after")
+    def _rows_can_be_kept(self) -> Scene:
+        rows = (self.time.end - self.time.start) / self.output.interval
+        if rows > MOST_ROWS:
+            raise ValueError(
+                f"output.interval = {self.output.interval:g} s asks for {rows:.3g} rows, more than {MOST_ROWS:g}: "
+                "choose a longer one"
+            )
+        return self
 
     @model_validator(mode="after")
     def _quantities_are_there(self) -> Scene:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import csr_array, diags_array, eye_array
 
 from pipeline.core.algebra import rotation_vector_to_matrix, skew
 from pipeline.core.errors import InputError
@@ -30,10 +31,13 @@ LEAST_GYRATION = 0.01
 
 @dataclass(frozen=True)
 class Misfit:
-    """Residuals of all joints: `values` scaled by the mechanism's size, `gradient` against the links' motions."""
+    """Residuals of all joints: `values` scaled by the mechanism's size, `gradient` against the links' motions.
+
+    The gradient is sparse: a joint concerns two links.
+    """
 
     values: np.ndarray
-    gradient: np.ndarray
+    gradient: csr_array
 
     @property
     def worst(self) -> float:
@@ -73,13 +77,15 @@ def close(system: System, joints: list[Constraint], poses: Sequence[Placement]) 
     now = misfit(system, joints, here)
     if now.worst <= EXACT:
         return here
-    mobility = _mobilities(system, here)
+    from scipy.sparse.linalg import spsolve  # slow to import, and most scenes give poses that fit
+
+    mobility = diags_array(_mobilities(system, here))
     damping = 1.0
     for _ in range(ITERATIONS):
-        G = now.gradient * mobility
-        normal = G @ now.gradient.T
-        scale = damping * float(np.linalg.norm(now.values)) * np.trace(normal) / max(len(normal), 1)
-        step = -G.T @ np.linalg.solve(normal + scale * np.eye(len(normal)), now.values)
+        G = now.gradient @ mobility
+        normal, rows = G @ now.gradient.T, len(now.values)
+        scale = damping * float(np.linalg.norm(now.values)) * normal.trace() / rows
+        step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
         there = _moved(system, here, step)
         then = misfit(system, joints, there)
         if np.linalg.norm(then.values) < np.linalg.norm(now.values):
@@ -98,7 +104,7 @@ def misfit(system: System, joints: list[Constraint], poses: Sequence[Placement])
     units of the mechanism's size.
     """
     L = system.length
-    values, blocks = [], []
+    values, blocks, row = [], list[tuple[np.ndarray, int, int]](), 0
     centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(system.links, poses, strict=True)]
     for joint in joints:
         A, B = joint.frames(poses)
@@ -108,14 +114,22 @@ def misfit(system: System, joints: list[Constraint], poses: Sequence[Placement])
         for residual, wrench in parts:
             force = np.any(wrench[:, 3:] != 0.0, axis=1)
             values.append(np.where(force, residual / L, residual))
-            block = np.zeros((len(wrench), 6 * len(system.links)))
             for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
                 moment = wrench[:, :3] - wrench[:, 3:] @ skew(centres[link]).T
-                block[:, 6 * link : 6 * link + 3] += sign * np.where(force[:, None], moment / L, moment)
-                block[:, 6 * link + 3 : 6 * link + 6] += sign * wrench[:, 3:]
-            blocks.append(block)
-    columns = 6 * len(system.links)
-    return Misfit(np.concatenate([*values, np.zeros(0)]), np.concatenate([*blocks, np.zeros((0, columns))])[:, 6:])
+                block = sign * np.hstack([np.where(force[:, None], moment / L, moment), wrench[:, 3:]])
+                if link:  # the ground does not move
+                    blocks.append((block, row, 6 * (link - 1)))
+            row += len(wrench)
+    shape = (row, 6 * (len(system.links) - 1))
+    return Misfit(np.concatenate([*values, np.zeros(0)]), _sparse(blocks, shape))
+
+
+def _sparse(blocks: list[tuple[np.ndarray, int, int]], shape: tuple[int, int]) -> csr_array:
+    """Matrix of dense blocks, each with its first row and column; what overlaps is added."""
+    places = [np.add(np.indices(block.shape).reshape(2, -1), [[row], [column]]) for block, row, column in blocks]
+    entries = np.concatenate([*(block.ravel() for block, *_ in blocks), np.zeros(0)])
+    rows, columns = np.concatenate([*places, np.zeros((2, 0), dtype=np.int64)], axis=1)
+    return csr_array((entries, (rows, columns)), shape=shape)
 
 
 def _centre(link: Link) -> np.ndarray:

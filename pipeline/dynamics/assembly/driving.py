@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from pipeline.core.errors import InputError
@@ -26,8 +27,9 @@ class Prescribed:
     place: str
 
 
+@cache
 def joint_class(kind: str) -> Any:
-    """The class that declares a joint type."""
+    """The class that declares a joint type; asked for some hundred times per link while a mechanism is built."""
     return lookup(JOINTS, kind, where="joint")
 
 

@@ -21,6 +21,8 @@ from pipeline.dynamics.tables import AXES, OMEGA, VELOCITY
 #: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
+#: misses below this share of the speeds asked for are rounding
+RIGID = 1e-9
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
 
@@ -67,6 +69,7 @@ def _world(built: Tables, frame: str) -> Placement:
 def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
+    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
     Raises InputError when joints and drives do not allow the velocities.
     """
     scene, layout = built.system.scene, built.layout
@@ -75,17 +78,20 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
         for n, b in scene.body.items()
         if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
     }
-    if not wanted:
+    elastic = np.zeros(layout.nv, dtype=bool)
+    for link, first in layout.flex_c0.items():
+        elastic[first : first + layout.modes[link]] = True
+    if not wanted and not elastic.any():
         return y
     y = y.copy()
     nq, nv = layout.nq, layout.nv
     y[nq : nq + nv] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told = ~np.isnan(given)
+    told, arms = ~np.isnan(given), _arms(built, wanted)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
-        return np.concatenate([_twists(built, frames, wanted)[told], opening])
+        return np.concatenate([_twists(frames, *arms)[told], opening])
 
     base = rates(y)
     columns = []
@@ -95,9 +101,10 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
         columns.append(rates(moved) - base)
     matrix = np.array(columns).T.reshape(len(base), nv)
     target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
-    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
-    miss = float(np.max(np.abs(matrix @ speeds - target)))
-    if miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
+    speeds, miss = _least(matrix * ~elastic, target)
+    if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
+        speeds, miss = _least(matrix, target)
+    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
@@ -108,21 +115,31 @@ def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarra
     return y
 
 
+def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
+    """The least speeds that come nearest to the target, and by how much they miss it."""
+    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
+    return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))
+
+
 def _components(given: tuple[float, float, float] | None) -> list[float]:
     return [np.nan] * 3 if given is None else list(given)
 
 
-def _twists(built: Tables, link_frames: np.ndarray, bodies: dict) -> np.ndarray:
+def _arms(built: Tables, bodies: dict) -> tuple[np.ndarray, np.ndarray]:
+    """Number of each body's link, (n,), and its centre of mass in the link's frame, (n, 3)."""
+    links = [built.system.link_of[name] for name in bodies]
+    places = [built.system.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
+    coms = [np.array(getattr(body, "com", (0.0, 0.0, 0.0))) for body in bodies.values()]
+    arms = [place.p + place.R @ com for place, com in zip(places, coms, strict=True)]
+    return np.array(links, dtype=int), np.array(arms).reshape(len(links), 3)
+
+
+def _twists(link_frames: np.ndarray, links: np.ndarray, arms: np.ndarray) -> np.ndarray:
     """Angular velocity and velocity of the centre of mass of each body, flattened."""
-    found = []
-    for name in bodies:
-        link = built.system.link_of[name]
-        frame = link_frames[link]
-        R, omega, v = frame[AXES : AXES + 9].reshape(3, 3), frame[OMEGA : OMEGA + 3], frame[VELOCITY : VELOCITY + 3]
-        place = built.system.links[link].places[name]
-        arm = R @ (place.p + place.R @ np.array(getattr(bodies[name], "com", (0.0, 0.0, 0.0))))
-        found += [omega, v + np.cross(omega, arm)]
-    return np.concatenate(found).copy()
+    frames = link_frames[links]
+    omega, v = frames[:, OMEGA : OMEGA + 3], frames[:, VELOCITY : VELOCITY + 3]
+    turned = np.einsum("nij,nj->ni", frames[:, AXES : AXES + 9].reshape(-1, 3, 3), arms)
+    return np.hstack([omega, v + np.cross(omega, turned)]).ravel()
 
 
 def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

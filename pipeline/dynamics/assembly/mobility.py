@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.errors import InputError, SolverError
+from pipeline.core.errors import InputError
 from pipeline.dynamics.assembly.closing import close, settled
 from pipeline.dynamics.assembly.constraints import constraints, demands, freedoms, outboard_place
 from pipeline.dynamics.assembly.merge import Placement
@@ -34,14 +34,16 @@ CARRIES = 1e-6
 class Mobility:
     """Counts of a system at its start. coordinates: free ones of the tree.
 
-    rank: independent closure rows of `rows`.  redundant_joints: joints whose reaction the equations of motion of rigid
-    bodies do not determine.
+    rank: independent closure rows of `rows`; those of poses nearby where the start is singular.
+    redundant_joints: joints whose reaction the equations of motion of rigid bodies do not determine.
+    singular_start: of a start in a singular pose, why it cannot go on by itself, in words.
     """
 
     coordinates: int
     rows: int
     rank: int
     redundant_joints: frozenset[str]
+    singular_start: str = ""
 
     @property
     def mobility(self) -> int:
@@ -61,15 +63,17 @@ class Mobility:
 def analyse(built: Tables) -> Mobility:
     """Mobility of an assembled system.
 
-    Raises InputError for a mechanism that cannot move at all and for drives that contradict each other,
-    SolverError for a start in a singular pose.
+    Raises InputError for a mechanism that cannot move at all and for drives that contradict each other.
     """
-    poses = [link.start for link in built.system.links]
+    poses, singular = [link.start for link in built.system.links], ""
     J, known = jacobians(built, poses)
     rank = _rank(J)
-    if rank < len(J):
-        _refuse_singular_start(built, J, rank)
-    found = Mobility(built.layout.nv, len(J), rank, _undetermined(built, J, rank, poses))
+    regular = _regular_poses(built, J, rank) if rank < len(J) else None
+    if regular is not None:
+        poses, singular = regular, _singular_start(built, J, rank)
+        J, known = jacobians(built, poses)
+        rank = _rank(J)
+    found = Mobility(built.layout.nv, len(J), rank, _undetermined(built, J, rank, poses), singular)
     _refuse_locked(built, found)
     _refuse_contradiction(built, J, known, rank)
     return found
@@ -148,12 +152,12 @@ def _rank(J: np.ndarray) -> int:
     return int(np.sum(values > ZERO * values[0]))
 
 
-def _refuse_singular_start(built: Tables, J: np.ndarray, rank: int) -> None:
-    """SolverError when the closures have a higher rank in poses nearby."""
+def _regular_poses(built: Tables, J: np.ndarray, rank: int) -> list[Placement] | None:
+    """Poses nearby in which the closures have a higher rank than at the start, if there are any."""
     flexible = any(link.flexible for link in built.system.links)
     paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in built.system.links)
     if rank == built.layout.nv or flexible or paths:
-        return
+        return None
     joints = constraints(built.system)
     poses = [link.start for link in built.system.links]
     free = np.linalg.svd(J)[2][rank:]
@@ -166,14 +170,20 @@ def _refuse_singular_start(built: Tables, J: np.ndarray, rank: int) -> None:
             continue
         there = [link.start for link in settled(built.system, closed).links]
         if _rank(jacobians(built, there)[0]) > rank:
-            names = {built.system.closures[k][0].name: None for k in built.closure_order}
-            values = np.linalg.svd(J, compute_uv=False)
-            ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
-            raise SolverError(
-                f"at t = {built.system.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
-                f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
-                "start it in another pose of its path"
-            )
+            return there
+    return None
+
+
+def _singular_start(built: Tables, J: np.ndarray, rank: int) -> str:
+    """What is said of a start in a singular pose."""
+    names = {built.system.closures[k][0].name: None for k in built.closure_order}
+    values = np.linalg.svd(J, compute_uv=False)
+    ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
+    return (
+        f"at t = {built.system.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
+        f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
+        "give its bodies the velocities of one of these, or start it in another pose of its path"
+    )
 
 
 def _displaced(built: Tables, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:

@@ -83,4 +83,4 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
     return begin, attempt, None, hermite.make_extend(LAST), keep
 
 
-METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, memory=memory)
+METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, memory=memory)

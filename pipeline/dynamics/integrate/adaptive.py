@@ -32,6 +32,8 @@ from pipeline.dynamics.vectors import index, kernel
 # the memory keeps steps quiet where stability, not accuracy, limits them
 SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
 LEAST_NORM = 1e-4
+#: a step over a singular pose may be so much longer than accuracy allows otherwise; it can be rejected like any other
+STRETCH = 1.1
 
 
 def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
@@ -99,8 +101,6 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
     @kernel
     def lay(h, w, t):
         """Length of the step to try from t: as planned, unless a singular pose is ahead."""
-        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap)
+        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap, STRETCH)
 
-    # a method whose work space is part of its step must not have it disturbed
-    foresee = straddle.foresee_nothing if method.ends else straddle.compose(evaluate)
-    return first_step, judge, after_rejection, next_step, lay, foresee
+    return first_step, judge, after_rejection, next_step, lay, straddle.compose(evaluate)

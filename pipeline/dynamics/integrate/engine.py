@@ -106,6 +106,8 @@ def prepare(built: Tables, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
     scene, mobility = built.system.scene, analyse(built)
     progress(None, mobility.text())
+    if mobility.singular_start and not may_depart(built):
+        raise SolverError(mobility.singular_start)
     scheme = scheme_of(scene.solver)
     w, n = built.packed.work_space()
     entry = fuse.entry(built.kinds, scheme, lambda text: progress(None, text))
@@ -120,24 +122,53 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     engine.select_pieces_after(engine.start)
     y = initial.start_state(built)
     singular.select_rows(engine, y, engine.start)
-    y = project(engine, y)
+    if not engine.mobility.singular_start:
+        y = _closed(engine, y)
     links, rows = built.packed.sizes["N_LINKS"], built.packed.sizes["N_CLOSURE_ROWS"]
 
     def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        engine.evaluate(state_vector, engine.start)
+        _look(engine, state_vector)
         frames = engine.view("LINK_FRAMES", FRAME_SIZE * links).reshape(links, FRAME_SIZE)
         return frames, engine.view("RESIDUAL_RATE", rows).copy()
 
-    y = project(engine, initial.given_velocities(built, motion, y))
+    y = initial.given_velocities(built, motion, y)
+    if not engine.mobility.singular_start:
+        y = project(engine, y)
     if built.kinds.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, built.system.start_residual
 
 
+def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """`project` of a start that only the engine can close: with paths, or with flexible bodies."""
+    try:
+        return project(engine, y)
+    except SolverError as error:
+        paths = [name for name, drive in engine.built.system.scene.drive.items() if hasattr(drive, "frame")]
+        place = f"[drive.{paths[0]}]" if paths else "[joint]"
+        what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
+        raise InputError(place, f"the mechanism cannot be assembled: {error}", what) from None
+
+
+def _look(engine: Engine, y: np.ndarray) -> None:
+    """Evaluate at the start what does not take accelerations, which a singular pose does not have."""
+    if engine.mobility.singular_start:
+        engine.attempt(y, engine.start)
+    else:
+        engine.evaluate(y, engine.start)
+
+
+def may_depart(built: Tables) -> bool:
+    """Whether a run may start in a singular pose: bodies are given velocities, and no contact may interfere."""
+    bodies = built.system.scene.body.values()
+    given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
+    return not built.system.contacts and any(v is not None and np.any(np.asarray(v) != 0.0) for v in given)
+
+
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y with the angles that loads follow as they are at the start; InputError for a spring without direction."""
-    engine.evaluate(y, engine.start)
+    _look(engine, y)
     loads = engine.view("LOAD", LOAD_SIZE * engine.built.packed.sizes["N_LOADS"]).reshape(-1, LOAD_SIZE)
     return initial.start_loads(engine.built, y, loads.copy())
 

@@ -1,10 +1,12 @@
-"""Steps of the length that the scene gives, shortened only to end on events, drive breaks and the run's end."""
+"""Steps of the length that the scene gives, shortened only to end on events, drive breaks and the run's end, and to
+be laid over singular poses."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from pipeline.dynamics.integrate import straddle
 from pipeline.dynamics.integrate.state import (
     EVALUATIONS,
     FIXED,
@@ -18,13 +20,14 @@ from pipeline.dynamics.integrate.state import (
     TIME,
 )
 from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
-from pipeline.dynamics.integrate.straddle import foresee_nothing
+from pipeline.dynamics.integrate.straddle import steer
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y_NEW, Y
 from pipeline.dynamics.vectors import index, kernel
 
 
 def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
     """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
+    gap = method.gap
 
     @kernel
     def first_step(h, f, w, n):
@@ -68,8 +71,8 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
 
     @kernel
     def lay(h, w, t):
-        """Singular poses are stepped over as they come."""
-        return w[index(h[CONTROL] + STEP)]
+        """Length of the step to try from t: as given, unless a singular pose is ahead."""
+        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap, 1.0)
 
     good = judge if method.stability is None else judge_with_scales
-    return first_step, good, after_rejection, next_step, lay, foresee_nothing
+    return first_step, good, after_rejection, next_step, lay, straddle.compose(evaluate)

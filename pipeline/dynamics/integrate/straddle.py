@@ -30,8 +30,6 @@ from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW,
 from pipeline.dynamics.vectors import index, kernel
 
 NEVER = 1e300
-#: a straddling step may be so much longer than accuracy allows otherwise; it can be rejected like any other
-STRETCH = 1.1
 #: a step before the straddling one ends so much nearer than the straddling one needs
 MARGIN = 0.9
 #: share of the planned step below which a step has been cut short
@@ -70,11 +68,6 @@ def zero_ahead(sigma, fall, past, span):
     return (np.sqrt(fall * fall - 2.0 * bend * sigma) - fall) / -bend
 
 
-@kernel
-def foresee_nothing(h, f, w, n, t):
-    """Singular poses are stepped over as they come."""
-
-
 def compose(evaluate: Callable) -> Callable:
     """The kernel foresee(h, f, w, n, t)."""
 
@@ -108,12 +101,15 @@ def compose(evaluate: Callable) -> Callable:
 
 
 @kernel
-def steer(h, w, t, step, gap):
-    """The next step from t: laid over a singular pose ahead with it at the share `gap`, or up to where that can be."""
+def steer(h, w, t, step, gap, stretch):
+    """The next step from t: laid over a singular pose ahead with it at the share `gap`, or up to where that can be.
+
+    stretch: how much longer than `step` it may be for that.
+    """
     c = h[CONTROL]
     ahead = w[index(c + PASS_TIME)] - t
     w[index(c + STRADDLING)] = 0.0
-    if ahead <= STRETCH * gap * step:
+    if ahead <= stretch * gap * step:
         w[index(c + STRADDLING)] = 1.0
         return ahead / gap
     return min(step, max(ahead - MARGIN * gap * step, 0.0))

@@ -9,7 +9,8 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics.assembly.places import PIVOT_SIZE
-from pipeline.dynamics.integrate import singular, state
+from pipeline.dynamics.integrate import refusal, singular, state
+from pipeline.dynamics.integrate.depart import depart
 from pipeline.dynamics.integrate.engine import Engine, Progress, overlapping
 from pipeline.dynamics.integrate.handover import Handover, StiffError, hand_over, take_over
 from pipeline.dynamics.tables import MODE
@@ -20,8 +21,6 @@ SLICE = 20_000
 EVENT_ROWS = 4096
 #: why the stepper stops that another choice of closure rows may mend
 STALLED = (state.STEP_TOO_SMALL, state.NO_START, state.LOST_CLOSURE)
-#: above this share of steps that stability limits, stiffness is named as the cause of a long run
-STIFF_SHARE = 0.3
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
 
@@ -99,6 +98,8 @@ def integrate(
     left: what another method left of this run; it is gone on with from there.
     """
     run = _begin(engine, y) if left is None else _resume(engine, left)
+    if left is None and engine.mobility.singular_start:
+        _depart(engine, run)
     control = engine.view("CONTROL", state.N_CONTROLS)
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[state.TIME]:
@@ -152,6 +153,23 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
     return _Run(engine.w, n, outputs, rows, events, [(t, engine.kept.copy())])
 
 
+def _depart(engine: Engine, run: _Run) -> None:
+    """Lay the way out of a singular start, and choose the closure rows at its end."""
+    n, control, first = run.n, engine.view("CONTROL", state.N_CONTROLS), 1
+    way = depart(engine, run.rows[0, first:])
+    passed = run.outputs[(run.outputs > engine.start) & (run.outputs < engine.start + way.span)]
+    times = np.concatenate([[engine.start], passed, [engine.start + way.span]])
+    run.rows[: len(times), 0] = times
+    run.rows[: len(times), first:] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
+    n[state.N_RECORDED], n[state.NEXT_OUTPUT] = len(times), 1 + len(passed)
+    n[state.EVALUATIONS] += way.evaluations
+    control[state.TIME] = times[-1]
+    ratio = singular.select_rows(engine, way.y, float(times[-1]))
+    engine.view("Y", len(way.y))[:] = way.y
+    engine.view("PIVOT", PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    run.selections[:] = [(engine.start, engine.kept.copy())]
+
+
 def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.ndarray) -> None:
     """Contacts that the start already has begin there, at the approach speeds that the scene declares."""
     contacts = engine.built.system.contacts
@@ -193,12 +211,12 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
             if singular.improve(engine, float(t)):
                 run.selections.append((float(t), engine.kept.copy()))
             elif status != state.WORN_ROWS:
-                raise SolverError(_refusal(engine, run))
+                raise SolverError(refusal.text(engine))
         elif status != state.PAUSED:
-            raise SolverError(_refusal(engine, run))
+            raise SolverError(refusal.text(engine))
         elif _crawls(engine, run):
             left = hand_over(engine, run.rows, run.events, run.selections)
-            raise StiffError(f"at t = {t:.6g} s: {_stiffness(n, control)}", left)
+            raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", left)
         elif stop(run.rows[: n[state.N_RECORDED]]):
             return True
 
@@ -210,49 +228,7 @@ def _crawls(engine: Engine, run: _Run) -> bool:
         return False
     done = max((control[state.TIME] - engine.start) / control[state.SPAN], 1e-12)
     too_many = min(HOPELESS, n[state.CAP])
-    return bool(n[state.STIFF_STEPS] > STIFF_SHARE * n[state.STEPS] and n[state.EVALUATIONS] / done > too_many)
-
-
-def _refusal(engine: Engine, run: _Run) -> str:
-    control, n = engine.view("CONTROL", state.N_CONTROLS), run.n
-    where = singular.diagnosis(engine)
-    contacts = [name for name, *_ in engine.built.system.contacts]
-    culprit = contacts[n[state.CULPRIT]] if contacts else ""
-    fixed = f"{control[state.FIXED]:.2g} s"
-    too_long = f"; or the fixed step of {fixed} is too long for it" if control[state.FIXED] else ""
-    unsolvable = f"the loops cannot be kept closed: a singular pose in which they can go on in several ways ({where})"
-    if not engine.built.system.closures:
-        unsolvable = "the equations cannot be solved here: the motion has grown beyond bounds"
-    reasons = {
-        state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
-        + _why_so_many(n, control),
-        state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
-        f"or stiffer than the integrator can follow ({where})",
-        state.NO_START: f"the equations are singular here ({where})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
-        + too_long,
-        state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
-        "take a shorter step, or leave [solver.step] out",
-        state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
-        state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
-        f"({where}); give it another motion",
-        state.LOST_CLOSURE: unsolvable + too_long,
-    }
-    return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
-
-
-def _why_so_many(n: np.ndarray, control: np.ndarray) -> str:
-    """What used the evaluations up."""
-    if n[state.STIFF_STEPS] > STIFF_SHARE * max(1, n[state.STEPS]):
-        return f"{_stiffness(n, control)}; choose an implicit integrator, or a larger v_static"
-    return "contacts may be collapsing in time, or the tolerance is too tight"
-
-
-def _stiffness(n: np.ndarray, control: np.ndarray) -> str:
-    return (
-        f"{n[state.STIFF_STEPS]} of {n[state.STEPS]} steps were limited by stability: the equations have rates up "
-        f"to {control[state.STEEPEST]:.2g} 1/s, as the slope of friction at small sliding speeds has"
-    )
+    return bool(n[state.STIFF_STEPS] > refusal.STIFF_SHARE * n[state.STEPS] and n[state.EVALUATIONS] / done > too_many)
 
 
 def _collect(run: _Run, control: np.ndarray) -> Trajectory:

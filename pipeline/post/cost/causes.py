@@ -21,6 +21,8 @@ CAUSES = {
     "sampling of the output": "a shorter output interval",
     "ensemble spread": "more members",
 }
+#: what is told of an error that is infinite
+OTHER = "other impacts"
 COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
 
 
@@ -38,15 +40,21 @@ def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:
     rows = []
     for cause, remedy in CAUSES.items():
         values = [split[q].get(cause, np.nan) for q in quantities]
-        if any(np.isfinite(values)):
-            rows.append((cause, *(f"{v:.1e}" if np.isfinite(v) else "–" for v in values), remedy))
+        if not np.isnan(values).all():
+            rows.append((cause, *(_cell(v) for v in values), remedy))
     largest = ("dominated by", *(dominant(split[q]) for q in quantities), "")
-    return Table(title, ("cause", *quantities, "to refine"), (*rows, largest))
+    spread = any(row[0] == "ensemble spread" for row in rows)
+    notes = ("The spread of the ensemble is that of the whole run, all other errors are those up to the horizon.",)
+    return Table(title, ("cause", *quantities, "to refine"), (*rows, largest), notes if spread else ())
+
+
+def _cell(error: float) -> str:
+    return "–" if np.isnan(error) else f"{error:.1e}" if np.isfinite(error) else OTHER
 
 
 def dominant(causes: Mapping[str, float]) -> str:
-    """The cause with the largest error."""
-    known = {cause: error for cause, error in causes.items() if np.isfinite(error)}
+    """The cause with the largest error; one that changes the number of impacts is larger than any other."""
+    known = {cause: error for cause, error in causes.items() if not np.isnan(error)}
     return max(known, key=lambda cause: known[cause]) if known else "–"
 
 
@@ -82,5 +90,6 @@ def _bar(ax: Axes, row: int, causes: Mapping[str, float]) -> None:
             ax.barh(row, known[cause] / total, left=left, color=color, label=cause, height=0.7)
             left += known[cause] / total
     first = sorted(known, key=lambda cause: -known[cause])[:2]
-    text = ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
+    text = ", ".join([f"{cause}: {OTHER}" for cause, e in causes.items() if np.isinf(e)])
+    text = text or ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
     ax.text(1.02, row, text or "no error to be seen", va="center", fontsize=7.5, color=INK)

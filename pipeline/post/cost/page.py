@@ -50,11 +50,19 @@ def _advice(scene: Studied) -> str:
     said = [
         f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
     ]
-    missing = [f"{t:g}" for t in TARGETS if t not in had]
     if had:
-        said += [_digits(had)] + ([f"{' and '.join(missing)} cannot be had for all quantities."] if missing else [])
+        said += [_digits(had)]
+    said += [_some(scene.study, target) for target in TARGETS if target not in had]
     said += [_horizon(scene), _limits(scene.study)]
     return f"- **{scene.scene}**: {' '.join(filter(None, said))}\n"
+
+
+def _some(study: xr.Dataset, target: float) -> str:
+    """For which quantities an accuracy can be had that cannot be had for all."""
+    names = [str(name) for name in study["quantity"].values]
+    able = [name for name in names if cheapest(study.sel(quantity=[name]), target) is not None]
+    unable = ", ".join(name for name in names if name not in able)
+    return f"{target:g} can be had for {', '.join(able)}, not for {unable}." if able else f"{target:g} cannot be had."
 
 
 def _digits(had: Mapping[float, Choice]) -> str:

@@ -1,0 +1,194 @@
+"""Scene files of the worst kind: each refused in words, with place and remedy, and never by a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.units import UNITS, quantity, unit
+from pipeline.dynamics.assembly.closing import assembled
+from pipeline.dynamics.assembly.system import build
+
+BASE = """
+title = "sound"
+time.end = "1 s"
+[body.ground]
+type = "ground"
+frames.O = {}
+[body.crank]
+type = "rigid"
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+frames.A = {}
+frames.P = { position = [0.3, 0.0, 0.0] }
+[joint.A]
+type = "revolute"
+between = ["ground.O", "crank.A"]
+"""
+WELDED = """
+[body.x]
+type = "rigid"
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+frames.a = {}
+frames.b = { position = [0.1, 0.0, 0.0] }
+[joint.w1]
+type = "fixed"
+between = ["crank.P", "x.a"]
+[joint.w2]
+type = "fixed"
+between = ["crank.A", "x.b"]
+"""
+
+#: scene -> words of the refusal
+HOSTILE: dict[str, tuple[str, ...]] = {
+    "": ("[title]", "is missing"),
+    "body = [1, 2]": ("[body]", "expected a table", "[body.NAME]"),
+    "body = 3": ("[body]", "expected a table"),
+    BASE.replace("crank.A", "crankA"): ("[joint.A.between.1]", "body.FRAME"),
+    BASE.replace('"ground.O", ', ""): ("[joint.A.between.1]", "is missing"),
+    BASE.replace("mass = 1.0", "mass = nan"): ("[body.crank.mass]", "not a finite number"),
+    BASE.replace("mass = 1.0", "mass = 1e300"): ("[body.crank.mass]", "beyond what can be computed with"),
+    BASE.replace("mass = 1.0", "mas = 1.0"): ("[body.crank.mas]", "unknown key", "did you mean 'mass'?"),
+    BASE.replace("[0.1, 0.1, 0.1]", "[[0.1], [0.1, 1], 0.1]"): ("[body.crank.inertia]", "3x3 matrix"),
+    BASE.replace('"revolute"', '"revolut"'): ("[joint.A.type]", "no such type", "did you mean 'revolute'?"),
+    BASE.replace('type = "revolute"\n', ""): ("[joint.A.type]", "is missing", "one of: spherical"),
+    BASE.replace("time.end", "tme.end"): ("[tme]", "unknown key", "did you mean 'time'?"),
+    BASE + '[body."../up"]\ntype = "ground"': ("[body.../up]", "is no name"),
+    BASE + "[joint.B]\nbetween = 5": ("[joint.B.type]",),
+    BASE + "[load.f]\ntype = 'point-force'\nframe = 'crank.P'\nforce = 5": ("[load.f.force]", "expected a list"),
+    BASE + "[solver]\nrtol = -1e-9": ("[solver.rtol]", "must be greater than"),
+    BASE + "[output]\ninterval = 1e-12": ("output.interval", "1e+12 rows"),
+    BASE + "[solver]\nevaluations = 99999999999999999999999": ("[solver.evaluations]", "less than or equal to"),
+    BASE + "[output]\ninterval = 0": ("[output.interval]", "must be greater than 0"),
+    "x = " + "[" * 3000 + "]" * 3000: ("too deeply",),
+    "title = \n": ("is not TOML", "line 1"),
+    "[body.kürbel]": ("is not TOML", "quotation marks"),
+    'extends = "SELF"': ("extends itself",),
+    'extends = ["sound.toml"]': ("[extends]", "one file"),
+    'extends = "."': ("cannot be read",),
+    'extends = "sound.toml"\nreplace = [1]': ("[replace]", "expected a table"),
+    'extends = "sound.toml"\n[set.body]\ncrank = 5': ("[set.body]", "[set.body.NAME]"),
+    'extends = "sound.toml"\nremove = 5': ("[remove]", "list of places"),
+    'extends = "sound.toml"\nbody = 5': ("[body]", "expected a table"),
+    'extends = "sound.toml"\n[set.body.crank]\nmas = 1': ("[body.crank.mas]", "did you mean 'mass'?"),
+}
+
+
+@pytest.mark.parametrize("text", HOSTILE, ids=lambda text: text.replace("\n", " ")[-40:])
+def test_a_hostile_file_is_refused_in_words(text: str, tmp_path: Path) -> None:
+    (tmp_path / "sound.toml").write_text(BASE)
+    path = tmp_path / "hostile.toml"
+    path.write_text(text.replace("SELF", path.name))
+    with pytest.raises(InputError) as error:
+        load_scene(path)
+    assert error.value.exit_code == 2
+    for word in HOSTILE[text]:
+        assert word in str(error.value)
+
+
+def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    for content in (bytes(range(256)), BASE.encode("utf-16")):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match="is not text in UTF-8"):
+            load_scene(path)
+
+
+def test_a_byte_order_mark_is_no_mistake(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + BASE.replace("\n", "\r\n").encode())
+    assert load_scene(path).title == "sound"
+
+
+def test_fixed_joints_that_do_not_fit_together_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(BASE + WELDED)
+    with pytest.raises(InputError) as error:
+        build(load_scene(path), {})
+    assert "[joint.w2.between]" in str(error.value)
+    assert "0.4 m and 0 deg apart" in str(error.value)
+
+
+def test_drives_that_cannot_be_where_they_start_are_told_from_joints_that_do_not_fit(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        BASE
+        + """
+[body.block]
+type = "rigid"
+mass = 1.0
+inertia = [1.0, 1.0, 1.0]
+pose = { position = [0.3, 0.0, 0.0], axes = { z = [1, 0, 0], x = [0, 1, 0] } }
+frames.pin = { axes = { z = [0, 1, 0], x = [0, 0, 1] } }
+frames.slide = {}
+[body.rail]
+type = "ground"
+frames.slide = { axes = { z = [1, 0, 0], x = [0, 1, 0] } }
+[joint.P]
+type = "spherical"
+between = ["crank.P", "block.pin"]
+[joint.rail]
+type = "prismatic"
+between = ["rail.slide", "block.slide"]
+[drive.far]
+joint = "rail"
+law = "0.31 m"
+"""
+    )
+    with pytest.raises(InputError) as error:
+        assembled(build(load_scene(path), {}))
+    assert "[drive.far.law]" in str(error.value)
+    assert "out of reach" in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "text, dimension, value",
+    [
+        ("3 N*mm/deg", "torsional stiffness", 3e-3 * 57.29577951308232),
+        ("2 kg·m²", "inertia", 2.0),
+        ("9810 mm/s²", "acceleration", 9.81),
+        ("1 mm/ms^2", "acceleration", 1000.0),
+        ("4 g cm^2", "inertia", 4e-7),
+        ("210000 N/mm^2", "pressure", 2.1e11),
+        ("1 rev/min", "angular velocity", 0.10471975511965977),
+    ],
+)
+def test_products_of_units_are_understood(text: str, dimension: str, value: float) -> None:
+    assert quantity(text, dimension) == pytest.approx(value, rel=1e-14)
+
+
+def test_listed_units_are_the_products_that_they_look_like(monkeypatch: pytest.MonkeyPatch) -> None:
+    for text in [text for text in UNITS if not text.isalpha() and text != "%"]:
+        listed = UNITS[text]
+        with monkeypatch.context() as without:
+            without.delitem(UNITS, text)
+            unit.cache_clear()
+            found = unit(text)
+        assert found is not None, text
+        assert found == (pytest.approx(listed[0], rel=1e-14), listed[1]), text
+    unit.cache_clear()
+
+
+def test_coefficients_have_units_over_powers_of_seconds(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    drive = '[drive.d]\njoint = "A"\nlaw = { type = "polynomial", coefficients = ["30 deg", "X"] }\n'
+    path.write_text(BASE + drive.replace("X", "60 rpm"))
+    assembled(build(load_scene(path), {}))
+    path.write_text(BASE + drive.replace("X", "10 deg"))
+    with pytest.raises(InputError, match="coefficient of t\\^1 of an angle"):
+        assembled(build(load_scene(path), {}))
+
+
+def test_one_step_and_one_value_need_no_list(tmp_path: Path) -> None:
+    path = tmp_path / "scene.toml"
+    step = '{ type = "step", start = 0, end = "1 s", change = "30 deg" }'
+    path.write_text(BASE + f'[drive.d]\njoint = "A"\nlaw = {{ type = "sum", laws = ["10 deg", {step}] }}\n')
+    listed = step.replace("start = 0", "start = [0]").replace('"1 s"', '["1 s"]').replace('"30 deg"', '["30 deg"]')
+    other = tmp_path / "other.toml"
+    ten = '{ type = "constant", value = "10 deg" }'
+    other.write_text(BASE + f'[drive.d]\njoint = "A"\nlaw = {{ type = "sum", laws = [{ten}, {listed}] }}\n')
+    assert load_scene(path).drive == load_scene(other).drive
