@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from benchmarks.stability.cases import RANGES
+from benchmarks.stability.cases import ALONG, RANGES
+from benchmarks.stability.mechanism import Parameters
 from benchmarks.stability.outcome import FINISHED, LEDGER, REFUSED, WRONG, Outcome
 from pipeline.post.plotting.style import SOFT, plt, style
 
@@ -34,6 +36,21 @@ LABELS = {
 PLANES = (("clearance", "stiffness"), ("speed", "mass"), ("restitution", "friction"), ("nearness", "joints"))
 #: symbols by the integrator that made the run
 SYMBOLS = {"dop853": ("o", "as asked for"), "radau": ("s", "an implicit method took over")}
+
+
+@dataclass(frozen=True)
+class Shade:
+    """What colours the random points: a number of an outcome, and the decades of its colour bar."""
+
+    label: str
+    value: Callable[[Outcome], float]
+    ticks: tuple[float, ...]
+
+
+SHADES = (
+    Shade("energy error", lambda o: o.ledger, (-14.0, -12.0, -10.0, -8.0, -6.0, -4.0)),
+    Shade("evaluations", lambda o: o.evaluations, (4.0, 5.0, 6.0, 7.0)),
+)
 
 
 def write(rows: Sequence[Row], folder: Path) -> None:
@@ -70,6 +87,8 @@ def _sweeps(
         if logarithmic:
             ax.set_yscale("log")
         _panel(ax, [row for row in rows if row.case.sweep == sweep], sweep, height, floor)
+        if not logarithmic:
+            ax.set_ylim(0.0, 1.05)
         if limit is not None:
             ax.axhline(limit, color=MARKS[WRONG][1], linewidth=0.8, linestyle=":")
         if k % columns == 0:
@@ -95,36 +114,46 @@ def _panel(ax: Any, rows: Sequence[Row], sweep: str, height: Callable[[Outcome],
         ax.plot([places[k] for k in switched], [heights[k] for k in switched], "o", **ring)
     if sweep == "nearness":
         ax.invert_xaxis()
+    if sweep not in ALONG:
+        paper = float(getattr(Parameters(), sweep))
+        ax.axvline(1.0 - paper if sweep == "nearness" else paper, color=SOFT, linewidth=0.8, linestyle=":")
     ax.set_title(LABELS[sweep], fontsize=8.5)
 
 
 def _random(rows: Sequence[Row], path: Path) -> None:
-    """The random points in planes of two parameters each, coloured by their energy errors."""
-    figure, axes = plt.subplots(1, len(PLANES), figsize=(12.5, 3.6))
-    shown: Any = None
-    for ax, (x, y) in zip(axes, PLANES, strict=True):
-        for method, (symbol, _) in SYMBOLS.items():
-            done = [row for row in rows if row.outcome.verdict == FINISHED and row.outcome.method == method]
-            shown = ax.scatter(
-                [_axis(row, x) for row in done],
-                [_shaken(row, y) for row in done],
-                c=[np.log10(max(row.outcome.ledger, 1e-16)) for row in done],
-                marker=symbol,
-                cmap="viridis",
-                vmin=-14,
-                vmax=np.log10(LEDGER),
-                s=22,
-                linewidths=0,
-            )
-        for verdict, (mark, color) in MARKS.items():
-            lost = [row for row in rows if row.outcome.verdict == verdict]
-            ax.scatter([_axis(r, x) for r in lost], [_shaken(r, y) for r in lost], marker=mark, color=color, s=42)
-        _name_axes(ax, x, y)
-    bar = figure.colorbar(shown, ax=axes, shrink=0.9, label="energy error")
-    ticks = [-14.0, -12.0, -10.0, -8.0, -6.0, -4.0]
-    bar.set_ticks(ticks, labels=[f"$10^{{{t:.0f}}}$" for t in ticks])
+    """The random points in planes of two parameters each, coloured by their energy errors and by their cost."""
+    figure, axes = plt.subplots(2, len(PLANES), figsize=(12.5, 6.2))
+    for line, shade in zip(axes, SHADES, strict=True):
+        shown: Any = None
+        for ax, (x, y) in zip(line, PLANES, strict=True):
+            shown = _points(ax, rows, x, y, shade) or shown
+        bar = figure.colorbar(shown, ax=line, label=shade.label, aspect=16)
+        bar.set_ticks(shade.ticks, labels=[f"$10^{{{t:.0f}}}$" for t in shade.ticks])
     _legend(figure)
     _save(figure, path)
+
+
+def _points(ax: Any, rows: Sequence[Row], x: str, y: str, shade: Shade) -> Any:
+    """One plane of the random points; returns what a colour bar needs."""
+    shown: Any = None
+    for method, (symbol, _) in SYMBOLS.items():
+        done = [row for row in rows if row.outcome.verdict == FINISHED and row.outcome.method == method]
+        shown = ax.scatter(
+            [_axis(row, x) for row in done],
+            [_shaken(row, y) for row in done],
+            c=[np.log10(max(shade.value(row.outcome), 1e-16)) for row in done],
+            marker=symbol,
+            cmap="viridis",
+            vmin=shade.ticks[0],
+            vmax=shade.ticks[-1],
+            s=22,
+            linewidths=0,
+        )
+    for verdict, (mark, color) in MARKS.items():
+        lost = [row for row in rows if row.outcome.verdict == verdict]
+        ax.scatter([_axis(r, x) for r in lost], [_shaken(r, y) for r in lost], marker=mark, color=color, s=42)
+    _name_axes(ax, x, y)
+    return shown
 
 
 def _shaken(row: Row, name: str) -> float:
@@ -135,7 +164,7 @@ def _shaken(row: Row, name: str) -> float:
 
 def _name_axes(ax: Any, x: str, y: str) -> None:
     ax.set_xlabel(LABELS[x])
-    ax.set_title(LABELS[y], fontsize=8.5)
+    ax.set_ylabel(LABELS[y])
     if x in LOGARITHMIC:
         ax.set_xscale("log")
     if y in LOGARITHMIC:

@@ -34,8 +34,8 @@ its range, or a random point of all of them (seed {seed}). Parameters and result
 
 ![What each parameter costs](stability/sweeps.png)
 
-Evaluations over each parameter; the other parameters are the paper's. A diamond below is a refusal, a cross a run that
-finished wrong; rings are runs that an implicit method took over.
+Evaluations over each parameter; the other parameters are the paper's, whose own value is dotted. A diamond below is a
+refusal, a cross a run that finished wrong; rings are runs that an implicit method took over.
 
 ![Energy errors](stability/ledger.png)
 
@@ -50,7 +50,8 @@ away, part visibly. Beyond that a run is one draw out of many, however well its 
 
 ![Random points](stability/random.png)
 
-Every random point in four planes of its parameters, coloured by its energy error.
+Every random point in four planes of its parameters, coloured by its energy error and by its cost; the numbers of joints
+are spread a little, so that points do not hide each other.
 
 | sweep | cases | finished | refused | wrong | largest energy error | largest deviation | most evaluations |
 |---|---:|---:|---:|---:|---:|---:|---:|

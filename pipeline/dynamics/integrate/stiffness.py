@@ -7,12 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics.integrate.state import STEEPEST, STIFF_STEPS
+from pipeline.dynamics.integrate.state import FIXED, STEEPEST, STIFF_STEPS
 from pipeline.dynamics.tables import CONTROL, GROUPS, MAGNITUDE, NQ, NV, NY, SLOPES, Y_NEW, Y_STAGE
 from pipeline.dynamics.vectors import index, kernel
 
 #: changes of state below this share of the tolerance are rounding, from which no rate can be told
 FELT = 1e-2
+#: where stability limits them, steps of chosen length swing about its limit: from this share of it on they count
+SWINGING = 0.7
 
 
 @kernel
@@ -60,7 +62,8 @@ def detect(method: Any) -> Callable:
     def feel(h, w, n, step):
         rate, c = steepness(h, w, last), h[CONTROL]
         w[index(c + STEEPEST)] = max(w[index(c + STEEPEST)], rate)
-        if rate * step > reach:
+        share = 1.0 if w[index(c + FIXED)] > 0.0 else SWINGING
+        if rate * step > share * reach:
             n[STIFF_STEPS] += 1
 
     return feel
