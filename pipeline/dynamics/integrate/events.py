@@ -62,8 +62,9 @@ from pipeline.dynamics.tables import (
 )
 from pipeline.dynamics.vectors import kernel
 
-#: a gap below this share of the clearance is zero: rounding of the sites' positions
-ZERO_GAP = 1e-12
+#: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
+#: of the sites' positions has no digits below, which matters where clearances are of micrometres
+ZERO_GAP, ROUNDING = 1e-12, 8.9e-16
 ROOT_ITERATIONS = 60
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
@@ -80,6 +81,12 @@ def side(n, c):
 def clearance(h, f, c):
     """Clearance of contact c."""
     return f[contact_numbers(h, c) + CLEARANCE]
+
+
+@kernel
+def zero_gap(h, f, w, c):
+    """Size [m] below which the gap of contact c is zero."""
+    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[CONTROL] + LENGTH]
 
 
 @kernel
@@ -152,15 +159,19 @@ def make_settle(
 
     @kernel
     def turning_point(h, f, w, n, step, c, sign):
-        """Share of the step where sign * distance is least, or where it is found negative at once."""
+        """Share of the step where sign * distance is first least, or where it is found negative at once.
+
+        With sign -1 the distance rises from zero and is negative at the end of the step: wherever it is found negative,
+        its first rise and fall lie before, whatever it does after.
+        """
         low, high = 0.0, 1.0
-        zero = ZERO_GAP * clearance(h, f, c)
+        zero = zero_gap(h, f, w, c)
         for _ in range(40):
             theta = 0.5 * (low + high)
             value, rate = look(h, f, w, n, step, theta, c)
             if sign * value < -zero:
                 return theta
-            if sign * rate > 0.0:
+            if sign * rate > 0.0 or (sign < 0.0 and value < 0.0):
                 high = theta
             else:
                 low = theta
@@ -169,7 +180,7 @@ def make_settle(
     @kernel
     def crossing(h, f, w, n, step, c, low, high):
         """Share of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
-        theta, enough = 0.5 * (low + high), 1e-3 * ZERO_GAP * clearance(h, f, c)
+        theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(h, f, w, c)
         for _ in range(ROOT_ITERATIONS):
             value, rate = look(h, f, w, n, step, theta, c)
             if value > 0.0:
@@ -185,9 +196,9 @@ def make_settle(
     @kernel
     def find(h, f, w, n, step, c):
         """Share of the step where contact c changes its mode: 0 at once, NEVER not at all."""
-        o, s, zero = watch(h, c), side(n, c), ZERO_GAP * clearance(h, f, c)
+        o, s, zero = watch(h, c), side(n, c), zero_gap(h, f, w, c)
         start, falling = s * w[o + GAP0], s * w[o + RATE0] > 0.0
-        if s * w[o + GAP1] < 0.0:
+        if s * w[o + GAP1] < -zero:
             if start > zero:
                 return crossing(h, f, w, n, step, c, 0.0, 1.0)
             if falling:
@@ -217,7 +228,7 @@ def make_settle(
                 return -1.0
             n[EVALUATIONS] += used
             gap, rate = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
-            if abs(gap) <= 1e-13 * clearance(h, f, c) + 1e-15 or not abs(gap) < 0.1 * abs(rate) * step:
+            if abs(gap) <= zero_gap(h, f, w, c) or not abs(gap) < 0.1 * abs(rate) * step:
                 return step
             step += gap / rate
         return step
