@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from pipeline.dynamics.integrate import crossings
+from pipeline.dynamics.integrate.crossings import NEVER, turning, waving, zero_gap
 from pipeline.dynamics.integrate.state import (
     CLOSING,
     CULPRIT,
@@ -20,7 +22,6 @@ from pipeline.dynamics.integrate.state import (
     EVENT_TIME,
     FORCE0,
     GAP0,
-    GAP1,
     IMMEDIATE,
     LENGTH,
     LOST_CLOSURE,
@@ -42,7 +43,6 @@ from pipeline.dynamics.integrate.trace import compose as compose_trace
 from pipeline.dynamics.integrate.trace import note, remember_end, watch
 from pipeline.dynamics.tables import (
     BRISTLE,
-    CLEARANCE,
     CONTROL,
     GAP,
     LATCHED,
@@ -57,36 +57,12 @@ from pipeline.dynamics.tables import (
     Y_STAGE,
     Y,
     contact,
-    contact_numbers,
     touch,
 )
 from pipeline.dynamics.vectors import kernel
 
-#: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
-#: of the sites' positions has no digits below, which matters where clearances are of micrometres
-ZERO_GAP, ROUNDING = 1e-12, 8.9e-16
-ROOT_ITERATIONS = 60
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
-NEVER = 2.0
-
-
-@kernel
-def side(n, c):
-    """+1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
-    return 1.0 if n[n[MODE] + c] == 0 else -1.0
-
-
-@kernel
-def clearance(h, f, c):
-    """Clearance of contact c."""
-    return f[contact_numbers(h, c) + CLEARANCE]
-
-
-@kernel
-def zero_gap(h, f, w, c):
-    """Size [m] below which the gap of contact c is zero."""
-    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[CONTROL] + LENGTH]
 
 
 @kernel
@@ -96,13 +72,6 @@ def start_watch(h, w):
         o, now = watch(h, c), touch(h, c)
         w[o + GAP0], w[o + RATE0] = w[now + GAP], w[now + RATE]
         w[o + FORCE0], w[o + SLIP0], w[o + SLIP_RATE0] = w[now + NORMAL_FORCE], w[now + SLIP], 0.0
-
-
-@kernel
-def suspicious(h, w, n, c):
-    """Whether the ends of a step leave room for a mode change within it."""
-    o, s = watch(h, c), side(n, c)
-    return s * w[o + GAP1] < 0.0 or (s * w[o + RATE0] > 0.0 and s * w[o + RATE1] <= 0.0)
 
 
 @kernel
@@ -150,68 +119,7 @@ def make_settle(
         n[EVALUATIONS] += 1
 
     trace = compose_trace(evaluate, peek, extend, method, regimes)
-
-    @kernel
-    def look(h, f, w, n, step, theta, c):
-        """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
-        peek(h, f, w, n, step, theta)
-        return side(n, c) * w[touch(h, c) + GAP], -side(n, c) * w[touch(h, c) + RATE] * step
-
-    @kernel
-    def turning_point(h, f, w, n, step, c, sign):
-        """Share of the step where sign * distance is first least, or where it is found negative at once.
-
-        With sign -1 the distance rises from zero and is negative at the end of the step: wherever it is found negative,
-        its first rise and fall lie before, whatever it does after.
-        """
-        low, high = 0.0, 1.0
-        zero = zero_gap(h, f, w, c)
-        for _ in range(40):
-            theta = 0.5 * (low + high)
-            value, rate = look(h, f, w, n, step, theta, c)
-            if sign * value < -zero:
-                return theta
-            if sign * rate > 0.0 or (sign < 0.0 and value < 0.0):
-                high = theta
-            else:
-                low = theta
-        return 0.5 * (low + high)
-
-    @kernel
-    def crossing(h, f, w, n, step, c, low, high):
-        """Share of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
-        theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(h, f, w, c)
-        for _ in range(ROOT_ITERATIONS):
-            value, rate = look(h, f, w, n, step, theta, c)
-            if value > 0.0:
-                low = theta
-            else:
-                high = theta
-            if abs(value) <= enough or high - low <= 1e-15:
-                return theta
-            newton = theta - value / rate if rate < 0.0 else -1.0
-            theta = newton if low < newton < high else 0.5 * (low + high)
-        return theta
-
-    @kernel
-    def find(h, f, w, n, step, c):
-        """Share of the step where contact c changes its mode: 0 at once, NEVER not at all."""
-        o, s, zero = watch(h, c), side(n, c), zero_gap(h, f, w, c)
-        start, falling = s * w[o + GAP0], s * w[o + RATE0] > 0.0
-        if s * w[o + GAP1] < -zero:
-            if start > zero:
-                return crossing(h, f, w, n, step, c, 0.0, 1.0)
-            if falling:
-                return 0.0
-            top = turning_point(h, f, w, n, step, c, -1.0)
-            value, _ = look(h, f, w, n, step, top, c)
-            return crossing(h, f, w, n, step, c, top, 1.0) if value > zero else 0.0
-        if falling and start > zero:
-            bottom = turning_point(h, f, w, n, step, c, 1.0)
-            value, _ = look(h, f, w, n, step, bottom, c)
-            if value < -zero:
-                return crossing(h, f, w, n, step, c, 0.0, bottom)
-        return NEVER
+    find = crossings.compose(peek)
 
     @kernel
     def end_at(h, f, w, n, step, c):
@@ -238,7 +146,7 @@ def make_settle(
         """Contact and share of the step of its first mode change, and whether the dense output is ready."""
         ready, first, which = False, NEVER, -1
         for c in range(h[N_CONTACTS]):
-            if not suspicious(h, w, n, c):
+            if not (turning(h, w, n, c) or waving(h, w, n, c, step)):
                 continue
             if not ready:
                 extend(h, f, w, n, step)

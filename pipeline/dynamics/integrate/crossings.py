@@ -1,0 +1,151 @@
+"""Where within a step a contact changes its mode: its gap, or its penetration, falls through zero for the first time.
+
+The ends of a step tell gap and rate; between them a long step of free flight may hold more than one turn, so that the
+cubic through them is looked at, too. Where it leaves room for a mode change, the dense output is searched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.dynamics.integrate.state import GAP0, GAP1, LENGTH, RATE0, RATE1
+from pipeline.dynamics.integrate.trace import watch
+from pipeline.dynamics.tables import CLEARANCE, CONTROL, GAP, MODE, RATE, contact_numbers, touch
+from pipeline.dynamics.vectors import kernel
+
+#: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
+#: of the sites' positions has no digits below, which matters where clearances are of micrometres
+ZERO_GAP, ROUNDING = 1e-12, 8.9e-16
+ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
+NEVER = 2.0
+#: the cubic through a step's ends is trusted to this share of its own departure from a straight line; in long steps of
+#: order 8 it is off by a tenth of that
+TRUST = 0.2
+#: where it says that something may happen, the step is searched in so many pieces
+PIECES = 8
+
+
+@kernel
+def side(n, c):
+    """+1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
+    return 1.0 if n[n[MODE] + c] == 0 else -1.0
+
+
+@kernel
+def clearance(h, f, c):
+    """Clearance of contact c."""
+    return f[contact_numbers(h, c) + CLEARANCE]
+
+
+@kernel
+def zero_gap(h, f, w, c):
+    """Size [m] below which the gap of contact c is zero."""
+    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[CONTROL] + LENGTH]
+
+
+@kernel
+def turning(h, w, n, c):
+    """Whether the ends of a step show a mode change, or one turn that may hold one."""
+    o, s = watch(h, c), side(n, c)
+    return s * w[o + GAP1] < 0.0 or (s * w[o + RATE0] > 0.0 and s * w[o + RATE1] <= 0.0)
+
+
+@kernel
+def waving(h, w, n, c, step):
+    """Whether the distance to the mode change may fall below zero inside the step, by the cubic through its ends."""
+    o, s = watch(h, c), side(n, c)
+    d0, d1, r0, r1 = s * w[o + GAP0], s * w[o + GAP1], -s * w[o + RATE0] * step, -s * w[o + RATE1] * step
+    # Hermite's cubic at the quarters
+    first = (54.0 * d0 + 10.0 * d1 + 9.0 * r0 - 3.0 * r1) / 64.0
+    middle = 0.5 * (d0 + d1) + 0.125 * (r0 - r1)
+    last = (10.0 * d0 + 54.0 * d1 + 3.0 * r0 - 9.0 * r1) / 64.0
+    return min(first, min(middle, last)) < TRUST * (abs(r0 - (d1 - d0)) + abs(r1 - (d1 - d0)))
+
+
+def compose(peek: Callable) -> Callable:
+    """The kernel find(h, f, w, n, step, c), after `turning` or `waving`.
+
+    It gives the share of the step where contact c changes its mode: 0 at once, NEVER not at all.
+    peek(h, f, w, n, step, theta): evaluates the state at a share of the step.
+    """
+
+    @kernel
+    def look(h, f, w, n, step, theta, c):
+        """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
+        peek(h, f, w, n, step, theta)
+        return side(n, c) * w[touch(h, c) + GAP], -side(n, c) * w[touch(h, c) + RATE] * step
+
+    @kernel
+    def turning_point(h, f, w, n, step, c, sign, low, high):
+        """Share of the step where sign * distance is first least, or where it is found negative at once.
+
+        With sign -1 the distance rises from zero and is negative at the end: wherever it is found negative, its first
+        rise and fall lie before, whatever it does after.
+        """
+        zero = zero_gap(h, f, w, c)
+        for _ in range(TURN_ITERATIONS):
+            theta = 0.5 * (low + high)
+            value, rate = look(h, f, w, n, step, theta, c)
+            if sign * value < -zero:
+                return theta
+            if sign * rate > 0.0 or (sign < 0.0 and value < 0.0):
+                high = theta
+            else:
+                low = theta
+        return 0.5 * (low + high)
+
+    @kernel
+    def crossing(h, f, w, n, step, c, low, high):
+        """Share of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
+        theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(h, f, w, c)
+        for _ in range(ROOT_ITERATIONS):
+            value, rate = look(h, f, w, n, step, theta, c)
+            if value > 0.0:
+                low = theta
+            else:
+                high = theta
+            if abs(value) <= enough or high - low <= 1e-15:
+                return theta
+            newton = theta - value / rate if rate < 0.0 else -1.0
+            theta = newton if low < newton < high else 0.5 * (low + high)
+        return theta
+
+    @kernel
+    def within(h, f, w, n, step, c, low, high, start, falling, end, rising):
+        """First mode change between two shares of the step with at most one turn between them, or NEVER.
+
+        start, end: distances there; falling, rising: whether they fall at the first, and rise at the second.
+        """
+        zero = zero_gap(h, f, w, c)
+        if end < -zero:
+            if start > zero:
+                return crossing(h, f, w, n, step, c, low, high)
+            if falling:
+                return low
+            top = turning_point(h, f, w, n, step, c, -1.0, low, high)
+            value, _ = look(h, f, w, n, step, top, c)
+            return crossing(h, f, w, n, step, c, top, high) if value > zero else low
+        if falling and rising and start > zero:
+            bottom = turning_point(h, f, w, n, step, c, 1.0, low, high)
+            value, _ = look(h, f, w, n, step, bottom, c)
+            if value < -zero:
+                return crossing(h, f, w, n, step, c, low, bottom)
+        return NEVER
+
+    @kernel
+    def find(h, f, w, n, step, c):
+        o, s = watch(h, c), side(n, c)
+        pieces = PIECES if waving(h, w, n, c, step) else 1
+        low, start, falling = 0.0, s * w[o + GAP0], s * w[o + RATE0] > 0.0
+        for k in range(1, pieces + 1):
+            high, end, rising = k / pieces, s * w[o + GAP1], s * w[o + RATE1] <= 0.0
+            if k < pieces:
+                end, rate = look(h, f, w, n, step, high, c)
+                rising = rate >= 0.0
+            theta = within(h, f, w, n, step, c, low, high, start, falling, end, rising)
+            if theta != NEVER:
+                return theta
+            low, start, falling = high, end, not rising
+        return NEVER
+
+    return find
