@@ -1,0 +1,68 @@
+"""No contact is stepped over, however long the steps: a sprung ball swings a little beyond its socket's wall."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipeline import dynamics
+from pipeline.core.scene.schema import Scene
+
+#: radius of the swing [m] and its rate [rad/s]; the period is 2 pi s
+SWING, RATE = 1.0, 1.0
+
+
+def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Scene:
+    """A ball on a spring along x, let go inside the socket at a phase of its swing, until it is back there."""
+    return Scene.model_validate(
+        {
+            "title": "sprung ball",
+            "time": {"end": 2.0 * np.pi / RATE},
+            "output": {"interval": 10.0},
+            "solver": {**solver, "ledger_tolerance": 1.0},  # loose on purpose
+            "body": {
+                "ground": {
+                    "type": "ground",
+                    "frames": {"socket": {}, "rail": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}},
+                },
+                "ball": {
+                    "type": "rigid",
+                    "mass": 1.0,
+                    "inertia": [0.1, 0.1, 0.1],
+                    "pose": {"position": [SWING * np.sin(phase), 0.0, 0.0]},
+                    "velocity": [SWING * RATE * np.cos(phase), 0.0, 0.0],
+                    "frames": {"centre": {}, "rail": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}},
+                },
+            },
+            "joint": {
+                "rail": {"type": "prismatic", "between": ["ground.rail", "ball.rail"]},
+                "contact": {
+                    "type": "clearance-spherical",
+                    "between": ["ground.socket", "ball.centre"],
+                    "clearance": clearance,
+                    "ball_radius": 0.5,
+                    "normal": {"law": "hertz", "stiffness": 1e6},
+                },
+            },
+            "load": {"spring": {"type": "joint-spring", "joint": "rail", "stiffness": RATE**2}},
+        }
+    )
+
+
+@pytest.mark.parametrize("clearance", [0.9, 0.97, 0.995])
+@pytest.mark.parametrize("phase", [-1.0, -0.5, 0.0, 0.6])
+@pytest.mark.parametrize(
+    "solver", [{"rtol": 1e-2}, {"rtol": 1e-3}, {"rtol": 1e-6}, {"rtol": 1e-3, "integrator": "dopri5"}]
+)
+def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
+    """Steps of order 8 at loose tolerances are longer than the swing takes to and from the wall."""
+    if abs(np.sin(phase)) > clearance:
+        pytest.skip("starts in the wall")
+    run = dynamics.simulate(scene(clearance, phase, solver), {}, lambda share, text: None)
+    touch = (np.arcsin(clearance / SWING) - phase) / RATE
+    assert len(run.event_time) > 0
+    # the error of a step is rtol of the swing, and the ball meets the wall at sqrt(1 - c^2) of its largest speed
+    allowed = 10.0 * solver["rtol"] / np.sqrt(1.0 - clearance**2)
+    assert float(run.event_time[0]) == pytest.approx(touch, abs=allowed)
