@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
+from benchmarks.stability.run import bundles as bundles
 from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from stages import s1_mesh, s2_modes, s3_bundle
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
@@ -29,27 +27,6 @@ def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override={place: _table(value) for place, value in overrides})
     return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
-
-
-def bundles(scene: Scene) -> dict[str, xr.Dataset]:
-    """The reduced flexible bodies of a scene, through stages 1 to 3."""
-    return {name: _bundle(body.mesh, *_asked(scene, name)) for name, body in scene.flexible().items()}
-
-
-def _asked(scene: Scene, body: str) -> tuple[str, str]:
-    """What stages 2 and 3 are told of a body, as text that a cache can compare."""
-    return json.dumps(s2_modes.params(scene.flexible()[body])), json.dumps(s3_bundle.params(scene, body))
-
-
-@cache
-def _bundle(recipe: str, modes: str, bundle: str) -> xr.Dataset:
-    mesh = s1_mesh.run(s1_mesh.params(Path(recipe)), {}, _quiet)["nc"]
-    found = {"mesh": mesh, "modes": s2_modes.run(json.loads(modes), {"mesh": mesh}, _quiet)["nc"]}
-    return s3_bundle.run(json.loads(bundle), found, _quiet)["nc"]
-
-
-def _quiet(share: float | None, text: str) -> None:
-    """Nobody watches."""
 
 
 def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:
