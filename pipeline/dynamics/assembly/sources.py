@@ -176,7 +176,7 @@ def _contact_lines(kinds: ContactKinds) -> list[str]:
 
 def _event_lines(kinds: ContactKinds, scheme: Scheme) -> list[str]:
     if not kinds.surfaces:
-        return ["events = (stepper.watch_nothing, stepper.settle_nothing)"]
+        return ["events = (stepper.watch_nothing, stepper.settle_nothing, stepper.none_closed)"]
     if not scheme.located:
         return ["from pipeline.dynamics.integrate.step_ends import EVENTS_OF_CONTACTS as events"]
     return [

@@ -9,21 +9,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from pipeline.dynamics.integrate import straddle
 from pipeline.dynamics.integrate.state import (
     END,
     EVALUATIONS,
+    FIRST,
     FRESH,
     LAST_NORM,
     MOST_GROWTH,
     NO_START,
     NOT_A_NUMBER,
+    REJECTED_NORM,
+    REJECTED_STEP,
     SPAN,
     STATUS,
     STEP,
     TIME,
+    TOUCHED_STEP,
 )
-from pipeline.dynamics.integrate.stepper import finite, scaled_norm, set_magnitudes
+from pipeline.dynamics.integrate.stepper import FAILED, finite, scaled_norm, set_magnitudes
 from pipeline.dynamics.integrate.straddle import steer
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
@@ -32,16 +38,23 @@ from pipeline.dynamics.vectors import index, kernel
 # the memory keeps steps quiet where stability, not accuracy, limits them
 SAFETY, SHRINK, GROW, MEMORY = 0.9, 0.2, 6.0, 0.04
 LEAST_NORM = 1e-4
+#: how much stricter steps are judged while a contact is closed: the errors of a few steps there become that of a
+#: rebound speed, which every later impact magnifies. A bounce without loss keeps its energy to 1e-10 at the default
+#: tolerance, seven times better than with 1, for a fifth more evaluations
+STRICTER = 10.0
 #: a step over a singular pose may be so much longer than accuracy allows otherwise; it can be rejected like any other
 STRETCH = 1.1
 
 
-def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
+def compose(
+    evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
+) -> tuple:
     """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
     steady, gap = method.steady, method.gap
+    start_watch, closed = contacts
 
     @kernel
     def first_step(h, f, w, n):
@@ -69,7 +82,10 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
             steepness = max(steepness, scaled_norm(h, w, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
+        if closed(h, n) and w[index(c + TOUCHED_STEP)] > 0.0:
+            step = min(step, w[index(c + TOUCHED_STEP)])
         w[index(c + STEP)] = step
+        w[index(c + FIRST)], w[index(c + REJECTED_STEP)] = 1.0, 0.0
         w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = LEAST_NORM, GROW
         n[FRESH] = 0
         begin(h, f, w, n)
@@ -79,19 +95,39 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
     def judge(h, f, w, n, step):
         """Error norm of the step to Y_NEW, 1 at the tolerance."""
         set_magnitudes(h, f, w, h[Y_NEW])
-        return error(h, f, w, n, step)
+        norm = error(h, f, w, n, step)
+        return STRICTER * norm if closed(h, n) else norm
+
+    @kernel
+    def seen_order(h, w, step, norm):
+        """Power of the step with which the error falls, as this rejected step and the one before it say.
+
+        Where a contact begins or friction turns, the solution has less derivatives than the method asks for.
+        """
+        c = h[CONTROL]
+        longer, worse = w[index(c + REJECTED_STEP)], w[index(c + REJECTED_NORM)]
+        if longer == 0.0 or worse >= FAILED:
+            return 1.0 * order
+        if norm >= worse:
+            return 1.0
+        return min(max(np.log(worse / norm) / np.log(longer / step), 1.0), 1.0 * order)
 
     @kernel
     def after_rejection(h, w, n, step, norm):
         """Try again with a shorter step."""
-        w[index(h[CONTROL] + STEP)] = step * max(SHRINK, SAFETY * norm**exponent)
-        w[index(h[CONTROL] + MOST_GROWTH)] = 1.0
+        c = h[CONTROL]
+        w[index(c + STEP)] = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(h, w, step, norm)))
+        w[index(c + REJECTED_STEP)], w[index(c + REJECTED_NORM)] = step, norm
+        w[index(c + MOST_GROWTH)] = 1.0
         return True
 
     @kernel
-    def next_step(h, w, step, norm):
+    def next_step(h, w, n, step, norm):
         """Length of the step after the one that has just been accepted."""
         c = h[CONTROL]
+        if w[index(c + FIRST)] > 0.0 and closed(h, n):
+            w[index(c + TOUCHED_STEP)] = step
+        w[index(c + FIRST)], w[index(c + REJECTED_STEP)] = 0.0, 0.0
         norm = max(norm, LEAST_NORM)
         growth = SAFETY * norm**remembering * w[index(c + LAST_NORM)] ** MEMORY
         growth = min(w[index(c + MOST_GROWTH)], max(SHRINK, growth))

@@ -75,6 +75,15 @@ def start_watch(h, w):
 
 
 @kernel
+def closed(h, n):
+    """Whether some contact is closed."""
+    found = False
+    for c in range(h[N_CONTACTS]):
+        found |= n[n[MODE] + c] == 1
+    return found
+
+
+@kernel
 def straighten(h, w, c):
     """The bristles of a contact that begins bear nothing yet."""
     place = contact(h, c, BRISTLE)
@@ -196,8 +205,8 @@ def make_settle(
     return settle
 
 
-def watching(regimes: Callable) -> tuple[Callable, Callable]:
-    """What the stepper calls at the start of a segment, and the maker of what it calls after each step.
+def watching(regimes: Callable) -> tuple[Callable, Callable, Callable]:
+    """What the stepper calls at the start of a segment, the maker of what it calls after each step, and `closed`.
 
     regimes: whether contacts have regimes of sticking (`trace.regimes` or `trace.no_regimes`).
     """
@@ -205,4 +214,4 @@ def watching(regimes: Callable) -> tuple[Callable, Callable]:
     def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
         return make_settle(evaluate, attempt, extend, project, method, regimes)
 
-    return start_watch, make
+    return start_watch, make, closed

@@ -25,9 +25,12 @@ from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES
 from pipeline.dynamics.vectors import index, kernel
 
 
-def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: Callable, method: Any) -> tuple:
+def compose(
+    evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
+) -> tuple:
     """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
     gap = method.gap
+    start_watch, _ = contacts
 
     @kernel
     def first_step(h, f, w, n):
@@ -65,7 +68,7 @@ def compose(evaluate: Callable, start_watch: Callable, begin: Callable, error: C
         return False
 
     @kernel
-    def next_step(h, w, step, norm):
+    def next_step(h, w, n, step, norm):
         """All steps are alike."""
         return w[index(h[CONTROL] + FIXED)]
 

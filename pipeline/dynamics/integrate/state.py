@@ -14,9 +14,12 @@ from pipeline.dynamics.tables import STATE as LAST
 # accepted step, largest growth of the next (1 after a rejection), length of fixed steps, the method's parameter,
 # largest rate of a closure before projection, largest rate of the equations that a step met;
 # then what `straddle` keeps: independence of the closure rows at the end of the step and at its start, its start,
-# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one
+# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one;
+# then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
+# length of the last first step with a contact closed, whether the next accepted step is the first of a segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS, N_CONTROLS = range(13, 20)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS = range(13, 19)
+REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
 # integers
 (
     STATUS,

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics.integrate.events import start_watch, switch
+from pipeline.dynamics.integrate.events import closed, start_watch, switch
 from pipeline.dynamics.integrate.state import (
     EVALUATIONS,
     EVENT_ROW,
@@ -80,4 +80,4 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
     return settle
 
 
-EVENTS_OF_CONTACTS = (start_watch, make_settle)
+EVENTS_OF_CONTACTS = (start_watch, make_settle, closed)

@@ -79,6 +79,8 @@ RESTART = 1
 TIGHTLY = 1e-15
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
+#: error norm of a step that could not be made
+FAILED = 1e9
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
 
@@ -122,6 +124,12 @@ def watch_nothing(h, w):
     """No contact to watch."""
 
 
+@kernel
+def none_closed(h, n):
+    """No contact to be closed."""
+    return False
+
+
 def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
     """The stepper without root finding."""
 
@@ -138,19 +146,21 @@ def compose(
     displace: Callable,
     method: Any,
     stepping: Callable,
-    contact_events: tuple[Callable, Callable],
+    contact_events: tuple[Callable, Callable, Callable],
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
     stepping: `compose` of `adaptive` or `fixed`.
-    contact_events: start_watch and make_settle of `events` or `step_ends`, or those that do nothing.
+    contact_events: start_watch, make_settle and closed of `events` or `step_ends`, or those that do nothing.
     """
     begin, attempt, error, extend, keep = method.compose(evaluate, displace)
     interpolate, last, ends = method.interpolate, method.last, method.ends
-    start_watch, make_settle = contact_events
+    start_watch, make_settle, closed = contact_events
     settle = make_settle(evaluate, attempt, extend, project, method)
     feel = detect(method)
-    first_step, judge, after_rejection, next_step, lay, foresee = stepping(evaluate, start_watch, begin, error, method)
+    first_step, judge, after_rejection, next_step, lay, foresee = stepping(
+        evaluate, (start_watch, closed), begin, error, method
+    )
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
@@ -214,17 +224,17 @@ def compose(
 
     @kernel
     def try_step(h, f, w, n, step, t_new):
-        """Error norm of the step to Y_NEW, 1 at the tolerance; at least 1e9 when it failed."""
+        """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
         if not attempt(h, f, w, n, step):
-            return 1e9
+            return FAILED
         norm = judge(h, f, w, n, step)
         if norm != norm:
             n[EVALUATION] = NOT_FINITE
-            return 1e9
+            return FAILED
         if norm > allowed(h, w):
-            return min(norm, 1e9)
+            return min(norm, FAILED)
         if not finish(h, f, w, n, t_new):
-            return 1e9
+            return FAILED
         feel(h, w, n, step)
         return norm
 
@@ -267,7 +277,7 @@ def compose(
                 if not after_rejection(h, w, n, step, norm):
                     return
                 continue
-            following = next_step(h, w, step, norm)
+            following = next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
             happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
             if happened < 0:
