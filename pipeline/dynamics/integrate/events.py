@@ -35,6 +35,7 @@ from pipeline.dynamics.integrate.state import (
     SLIP_RATE0,
     SPEED,
     STATUS,
+    STEEPLY,
     STUCK_EVENT,
     TIME,
     TREND0,
@@ -104,7 +105,7 @@ def switch(h, w, n, events, c, t):
         row = note(events, n, c, CLOSING, t)
         event = events[row]
         event[SPEED], event[PEAK_FORCE], event[PEAK_DEPTH] = rate, 0.0, 0.0
-        w[o + EVENT_ROW], w[o + TREND0] = row, 1.0
+        w[o + EVENT_ROW], w[o + TREND0] = row, STEEPLY
     else:
         n[n[MODE] + c] = 0
         ended = events[note(events, n, c, OPENING, t)]

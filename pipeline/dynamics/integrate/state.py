@@ -47,9 +47,11 @@ NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR = 8, 9, 10, 11
 EVENT_CONTACT, EVENT_KIND, EVENT_TIME, SPEED, PEAK_FORCE, PEAK_DEPTH, DURATION, EVENT_SIZE = range(8)
 CLOSING, OPENING, COMPRESSION, STICKING, SLIPPING = range(5)
 # per contact, what the stepper watches: at the start and at the end of the step gap, rate, normal force, sliding
-# speed and whether the force grows (> 0); row of its last closing; mode and impact rate that hold within the step;
+# speed and rate of the force; row of its last closing; mode and impact rate that hold within the step;
 # rate of the sliding speed at start and end, 0 where it is not known
 GAP0, RATE0, FORCE0, SLIP0, TREND0, GAP1, RATE1, FORCE1, SLIP1, TREND1, EVENT_ROW, MODE0, LATCHED0 = range(13)
 SLIP_RATE0, SLIP_RATE1, WATCH_SIZE = range(13, 16)
+#: rate of the force of a contact that begins: grows, who knows how fast
+STEEPLY = 1e300
 #: free rows that one step may need: of the record; of the events, per contact
 ROOM, EVENTS_OF_A_CONTACT = 8, 4

@@ -61,8 +61,8 @@ from pipeline.dynamics.vectors import kernel
 #: share of the step over which the force's trend at its end is felt; a peak nearer to the end than this is
 #: the force at the end, to the square of this
 BACK = 1e-3
-#: located to this share of the step; a maximum to its root, since it is flat
-NEAR, NEAR_TOP = 1e-11, 1e-6
+#: a root's last correction, as a share of the step: what is left is its square, nearly; a maximum's, since it is flat
+NEAR, NEAR_TOP = 1e-8, 1e-6
 GOLDEN = 0.3819660112501051
 MOST_LOOKS = 60
 
@@ -135,7 +135,7 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
 
     @kernel
     def feel_trends(h, f, w, n, step):
-        """Whether each force grows (> 0) at the end of the step, and at what rate each sliding speed does."""
+        """At what rates each force and each sliding speed grow at the end of the step."""
         slope = h[SLOPES] + h[NY] * last
         for k in range(h[NY]):
             w[h[Y_STAGE] + k] = w[h[Y_NEW] + k] - BACK * step * w[slope + k]
@@ -144,7 +144,7 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
         n[EVALUATIONS] += 1
         for c in range(h[N_CONTACTS]):
             o, before = watch(h, c), touch(h, c)
-            w[o + TREND1] = w[o + FORCE1] - w[before + NORMAL_FORCE]
+            w[o + TREND1] = (w[o + FORCE1] - w[before + NORMAL_FORCE]) / (BACK * step)
             w[o + SLIP_RATE1] = (w[o + SLIP1] - w[before + SLIP]) / (BACK * step)
 
     @kernel
@@ -239,11 +239,16 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
             passage(h, f, w, n, step, c, where, 1.0, beyond, second, events)
 
     @kernel
-    def peaking(h, f, w, c):
-        """Whether a damped force peaks within the step; a lossless one does so at the deepest point."""
+    def peaking(h, f, w, c, step, record):
+        """Whether a damped force may peak above the record within the step; a lossless one peaks where it is deepest.
+
+        Around its peak a force lies below its tangents.
+        """
         o = watch(h, c)
         damped = f[contact_numbers(h, c) + NORMAL_LAW + 2] > 0.0
-        return damped and w[o + RATE0] > 0.0 and w[o + TREND0] > 0.0 and w[o + TREND1] <= 0.0
+        if not (damped and w[o + RATE0] > 0.0 and w[o + TREND0] > 0.0 and w[o + TREND1] <= 0.0):
+            return False
+        return min(w[o + FORCE0] + w[o + TREND0] * step, w[o + FORCE1] - w[o + TREND1] * step) > record
 
     @kernel
     def trends_matter(h, f, w, n):
@@ -274,7 +279,8 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
             event = events[int(w[o + EVENT_ROW])]
             event[PEAK_FORCE] = max(event[PEAK_FORCE], max(w[o + FORCE0], w[o + FORCE1]))
             event[PEAK_DEPTH] = max(event[PEAK_DEPTH], -w[o + GAP1])
-            turns, peaks = w[o + RATE0] > 0.0 and w[o + RATE1] <= 0.0, peaking(h, f, w, c)
+            turns = w[o + RATE0] > 0.0 and w[o + RATE1] <= 0.0
+            peaks = peaking(h, f, w, c, step, event[PEAK_FORCE])
             passes = changes_regime(h, f, w, c, step)
             if (turns or peaks or passes) and not ready:
                 extend(h, f, w, n, step)

@@ -187,7 +187,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
         event = events[n[state.N_EVENTS]]
         event[[state.EVENT_TIME, state.EVENT_CONTACT, state.EVENT_KIND]] = engine.start, c, state.CLOSING
         event[[state.SPEED, state.PEAK_FORCE, state.PEAK_DEPTH]] = speed, 0.0, 0.0
-        watched[c, [state.EVENT_ROW, state.TREND0]] = n[state.N_EVENTS], 1.0
+        watched[c, [state.EVENT_ROW, state.TREND0]] = n[state.N_EVENTS], state.STEEPLY
         n[state.N_EVENTS] += 1
     row[1 : 1 + count], row[1 + count : 1 + 2 * count] = modes, latched
 
