@@ -66,3 +66,20 @@ def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: floa
     # the error of a step is rtol of the swing, and the ball meets the wall at sqrt(1 - c^2) of its largest speed
     allowed = 10.0 * solver["rtol"] / np.sqrt(1.0 - clearance**2)
     assert float(run.event_time[0]) == pytest.approx(touch, abs=allowed)
+
+
+@pytest.mark.parametrize("clearance", [1e-4, 1e-5, 1e-6, 1e-7])
+@pytest.mark.parametrize("solver", [{"rtol": 1e-3}, {"rtol": 1e-10}, {"rtol": 1e-6, "integrator": "dopri5"}])
+def test_the_first_touch_is_found_in_a_step_of_many_clearances(clearance: float, solver: dict[str, Any]) -> None:
+    """A parabola 3 m away is one step: beyond the socket's wall by a fiftieth of the clearance, and out below."""
+    gravity, below = 10.0, 0.3 * clearance
+    up = np.sqrt(2.0 * gravity * (1.02 * clearance + below))
+    touch = (up - np.sqrt(up**2 - 2.0 * gravity * (clearance + below))) / gravity
+    parts = scene(clearance, 0.0, solver).model_dump(exclude_unset=True)
+    del parts["joint"]["rail"]
+    parts["load"] = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -gravity]}}
+    parts["body"]["ground"]["frames"]["socket"] = {"position": [3.0, 0.0, 0.0]}
+    parts["body"]["ball"] |= {"pose": {"position": [3.0, 0.0, -below]}, "velocity": [0.0, 0.0, up]}
+    parts["time"] = {"end": 1000.0 * touch}  # the first step may be that long
+    run = dynamics.simulate(Scene.model_validate(parts), {}, lambda share, text: None)
+    assert float(run.event_time[0]) == pytest.approx(touch, rel=1e-8)

@@ -1,17 +1,21 @@
 """Where within a step a contact changes its mode: its gap, or its penetration, falls through zero for the first time.
 
 The ends of a step tell gap and rate; between them a long step of free flight may hold more than one turn, so that the
-cubic through them is looked at, too. Where it leaves room for a mode change, the dense output is searched.
+cubic through them is looked at, too. Where it leaves room for a mode change, the dense output is searched from its
+start on, in stretches so short that cubics describe the gap: a step of free bodies may be as long as their motion is
+smooth, in which a ball travels many times its clearance and its gap, a length, turns and turns again.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from pipeline.dynamics.integrate.state import GAP0, GAP1, LENGTH, RATE0, RATE1
 from pipeline.dynamics.integrate.trace import watch
-from pipeline.dynamics.tables import CLEARANCE, CONTROL, GAP, MODE, RATE, contact_numbers, touch
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.tables import CLEARANCE, CONTROL, GAP, MODE, RATE, TOUCH_OFFSET, contact_numbers, touch
+from pipeline.dynamics.vectors import at, dot, kernel, sub
 
 #: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
 #: of the sites' positions has no digits below, which matters where clearances are of micrometres
@@ -21,8 +25,15 @@ NEVER = 2.0
 #: the cubic through a step's ends is trusted to this share of its own departure from a straight line; in long steps of
 #: order 8 it is off by a tenth of that
 TRUST = 0.2
-#: where it says that something may happen, the step is searched in so many pieces
-PIECES = 8
+#: where it says that something may happen, the step is searched in stretches of at most this share; they are halved
+#: where the cubic through a stretch's ends misses its middle by more than this share of its departure, and of the
+#: distance from which the mode change is reached (what lies behind it may be thousands of times larger), and while the
+#: ball travels more than its clearance, of which the gap may tell nothing
+WIDEST, FAITHFUL = 0.25, 0.05
+#: to this share: even the rate of a gap jumps where a ball passes the centre of its socket
+SHORTEST = 2.0**-13
+#: by more than a cubic, of this departure, may be lower between the quarters of its halves
+DIP = 0.05
 
 
 @kernel
@@ -51,15 +62,38 @@ def turning(h, w, n, c):
 
 
 @kernel
+def halfway(d0, d1, r0, r1):
+    """Hermite's cubic in the middle, from its values and rates (per length of the stretch) at both ends."""
+    return 0.5 * (d0 + d1) + 0.125 * (r0 - r1)
+
+
+@kernel
+def lowest(d0, d1, r0, r1):
+    """The least of Hermite's cubic at the quarters."""
+    first = (54.0 * d0 + 10.0 * d1 + 9.0 * r0 - 3.0 * r1) / 64.0
+    last = (10.0 * d0 + 54.0 * d1 + 3.0 * r0 - 9.0 * r1) / 64.0
+    return min(halfway(d0, d1, r0, r1), min(first, last))
+
+
+@kernel
+def departure(d0, d1, r0, r1):
+    """How far Hermite's cubic departs from a straight line."""
+    return abs(r0 - (d1 - d0)) + abs(r1 - (d1 - d0))
+
+
+@kernel
+def apart(a, b):
+    """Distance of two points."""
+    between = sub(a, b)
+    return np.sqrt(dot(between, between))
+
+
+@kernel
 def waving(h, w, n, c, step):
     """Whether the distance to the mode change may fall below zero inside the step, by the cubic through its ends."""
     o, s = watch(h, c), side(n, c)
     d0, d1, r0, r1 = s * w[o + GAP0], s * w[o + GAP1], -s * w[o + RATE0] * step, -s * w[o + RATE1] * step
-    # Hermite's cubic at the quarters
-    first = (54.0 * d0 + 10.0 * d1 + 9.0 * r0 - 3.0 * r1) / 64.0
-    middle = 0.5 * (d0 + d1) + 0.125 * (r0 - r1)
-    last = (10.0 * d0 + 54.0 * d1 + 3.0 * r0 - 9.0 * r1) / 64.0
-    return min(first, min(middle, last)) < TRUST * (abs(r0 - (d1 - d0)) + abs(r1 - (d1 - d0)))
+    return lowest(d0, d1, r0, r1) < TRUST * departure(d0, d1, r0, r1)
 
 
 def compose(peek: Callable) -> Callable:
@@ -125,27 +159,55 @@ def compose(peek: Callable) -> Callable:
             top = turning_point(h, f, w, n, step, c, -1.0, low, high)
             value, _ = look(h, f, w, n, step, top, c)
             return crossing(h, f, w, n, step, c, top, high) if value > zero else low
-        if falling and rising and start > zero:
+        if falling and rising:
             bottom = turning_point(h, f, w, n, step, c, 1.0, low, high)
             value, _ = look(h, f, w, n, step, bottom, c)
             if value < -zero:
-                return crossing(h, f, w, n, step, c, low, bottom)
+                return crossing(h, f, w, n, step, c, low, bottom) if start > zero else low
         return NEVER
 
     @kernel
+    def search(h, f, w, n, step, c):
+        """First mode change in the step, stretch by stretch: 0 at once, NEVER not at all."""
+        zero, room = zero_gap(h, f, w, c), clearance(h, f, c)
+        here = touch(h, c) + TOUCH_OFFSET
+        d0, r0 = look(h, f, w, n, step, 0.0, c)
+        p0 = at(w, here)
+        d1, r1 = look(h, f, w, n, step, WIDEST, c)
+        p1 = at(w, here)
+        low, high = 0.0, WIDEST
+        while True:
+            width, middle = high - low, 0.5 * (low + high)
+            d, r = look(h, f, w, n, step, middle, c)
+            p = at(w, here)
+            half, missed = 0.5 * width, abs(d - halfway(d0, d1, width * r0, width * r1))
+            least = min(lowest(d0, d, half * r0, half * r), lowest(d, d1, half * r, half * r1))
+            bend = departure(d0, d1, width * r0, width * r1)
+            if not min(least, min(d, d1)) > missed + DIP * bend:
+                near = FAITHFUL * min(bend, max(d0, max(d, d1))) + zero
+                known = missed <= near and apart(p0, p) + apart(p, p1) <= room
+                if width > SHORTEST and not known:
+                    high, d1, r1, p1 = middle, d, r, p
+                    continue
+                theta = within(h, f, w, n, step, c, low, middle, d0, r0 < 0.0, d, r >= 0.0)
+                if theta == NEVER:
+                    theta = within(h, f, w, n, step, c, middle, high, d, r < 0.0, d1, r1 >= 0.0)
+                if theta != NEVER:
+                    return theta
+            if high >= 1.0:
+                return NEVER
+            low, d0, r0, p0 = high, d1, r1, p1
+            high = min(low + min(2.0 * width, WIDEST), 1.0)
+            d1, r1 = look(h, f, w, n, step, high, c)
+            p1 = at(w, here)
+
+    @kernel
     def find(h, f, w, n, step, c):
+        if waving(h, w, n, c, step):
+            return search(h, f, w, n, step, c)
         o, s = watch(h, c), side(n, c)
-        pieces = PIECES if waving(h, w, n, c, step) else 1
-        low, start, falling = 0.0, s * w[o + GAP0], s * w[o + RATE0] > 0.0
-        for k in range(1, pieces + 1):
-            high, end, rising = k / pieces, s * w[o + GAP1], s * w[o + RATE1] <= 0.0
-            if k < pieces:
-                end, rate = look(h, f, w, n, step, high, c)
-                rising = rate >= 0.0
-            theta = within(h, f, w, n, step, c, low, high, start, falling, end, rising)
-            if theta != NEVER:
-                return theta
-            low, start, falling = high, end, not rising
-        return NEVER
+        start, falling = s * w[o + GAP0], s * w[o + RATE0] > 0.0
+        end, rising = s * w[o + GAP1], s * w[o + RATE1] <= 0.0
+        return within(h, f, w, n, step, c, 0.0, 1.0, start, falling, end, rising)
 
     return find

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pipeline.dynamics.integrate import crossings
-from pipeline.dynamics.integrate.crossings import NEVER, turning, waving, zero_gap
+from pipeline.dynamics.integrate.crossings import NEVER, clearance, turning, waving, zero_gap
 from pipeline.dynamics.integrate.state import (
     CLOSING,
     CULPRIT,
@@ -36,6 +36,7 @@ from pipeline.dynamics.integrate.state import (
     SPEED,
     STATUS,
     STEEPLY,
+    STEPPED_OVER,
     STUCK_EVENT,
     TIME,
     TREND0,
@@ -64,6 +65,11 @@ from pipeline.dynamics.vectors import kernel
 
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
+#: what a contact does in a small share of a step is not where the dense output of the whole step has it;
+#: the step is then repeated, at most so often, with this share of its length or more
+MOST_SHORTENED, SHORTER = 8, 0.1
+#: a contact that begins deeper than this share of its clearance, and so many tolerances, has been stepped over
+DEEP, ERRORS = 1e-6, 100.0
 
 
 @kernel
@@ -114,6 +120,13 @@ def switch(h, w, n, events, c, t):
         begun[DURATION] = t - begun[EVENT_TIME]
 
 
+@kernel
+def give_up(n, status, c):
+    """What settle returns when contact c ends the run."""
+    n[STATUS], n[CULPRIT] = status, c
+    return -1
+
+
 def make_settle(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any, regimes: Callable
 ) -> Callable:
@@ -132,24 +145,30 @@ def make_settle(
     find = crossings.compose(peek)
 
     @kernel
+    def repeat(h, f, w, n, step):
+        """Make the step again with another length, loops closed at its end; False when it cannot be done."""
+        n[EVALUATIONS] += 1
+        if not attempt(h, f, w, n, step):
+            return False
+        t, slope = w[h[CONTROL] + TIME] + step, h[SLOPES] + h[NY] * last
+        evaluate(h, f, w, n, t, h[Y_NEW], slope)
+        used = project(h, f, w, n, t, h[Y_NEW], slope, 1e-3 * w[h[CONTROL] + RTOL] * w[h[CONTROL] + LENGTH])
+        n[EVALUATIONS] += max(used, 0)
+        return used >= 0
+
+    @kernel
     def end_at(h, f, w, n, step, c):
-        """Repeat the step so that it ends on the event; its length, or -1 when it cannot be done."""
-        o, slope = h[CONTROL], h[SLOPES] + h[NY] * last
+        """Repeat the step so that it ends on the event: its length, or -1 when that fails, and whether it is there."""
         for _ in range(3):
-            n[EVALUATIONS] += 1
-            if not attempt(h, f, w, n, step):
-                return -1.0
-            t = w[o + TIME] + step
-            evaluate(h, f, w, n, t, h[Y_NEW], slope)
-            used = project(h, f, w, n, t, h[Y_NEW], slope, 1e-3 * w[o + RTOL] * w[o + LENGTH])
-            if used < 0:
-                return -1.0
-            n[EVALUATIONS] += used
+            if not repeat(h, f, w, n, step):
+                return -1.0, False
             gap, rate = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
-            if abs(gap) <= zero_gap(h, f, w, c) or not abs(gap) < 0.1 * abs(rate) * step:
-                return step
+            if abs(gap) <= zero_gap(h, f, w, c):
+                return step, True
+            if not abs(gap) < 0.1 * abs(rate) * step:
+                return step, False
             step += gap / rate
-        return step
+        return step, True
 
     @kernel
     def first_event(h, f, w, n, step):
@@ -175,28 +194,34 @@ def make_settle(
             w[h[Y_NEW] + k] = w[h[Y] + k]
         evaluate(h, f, w, n, t, h[Y_NEW], h[SLOPES] + h[NY] * last)
         n[EVALUATIONS] += 1
-        w[watch(h, c) + RATE1] = w[touch(h, c) + RATE]
+        o, now = h[CONTROL], touch(h, c)
+        if w[now + GAP] < -DEEP * clearance(h, f, c) - ERRORS * w[o + RTOL] * w[o + LENGTH] and n[n[MODE] + c] == 0:
+            return give_up(n, STEPPED_OVER, c)
+        w[watch(h, c) + RATE1] = w[now + RATE]
         switch(h, w, n, events, c, t)
-        if n[IMMEDIATE] > MOST_IMMEDIATE:
-            n[STATUS], n[CULPRIT] = STUCK_EVENT, c
-            return -1
-        return 1
+        return give_up(n, STUCK_EVENT, c) if n[IMMEDIATE] > MOST_IMMEDIATE else 1
 
     @kernel
     def settle(h, f, w, n, step, t_new, events):
         t = w[h[CONTROL] + TIME]
-        remember_end(h, w)
-        which, first, ready = first_event(h, f, w, n, step)
-        if which < 0:
-            n[IMMEDIATE] = 0
-            return 0, trace(h, f, w, n, step, ready, events), t_new, step
-        if first * step <= 1e-15 * max(abs(t), step):
-            return at_once(h, f, w, n, which, events), True, t, step
+        for shortened in range(MOST_SHORTENED + 1):
+            remember_end(h, w)
+            which, first, ready = first_event(h, f, w, n, step)
+            if which < 0:
+                n[IMMEDIATE] = 0
+                return 0, trace(h, f, w, n, step, ready, events), t_new, step
+            if first * step <= 1e-15 * max(abs(t), step):
+                return at_once(h, f, w, n, which, events), True, t, step
+            length, there = end_at(h, f, w, n, first * step, which)
+            if length < 0.0:
+                return give_up(n, LOST_CLOSURE, which), ready, t_new, step
+            if there or shortened == MOST_SHORTENED:
+                break
+            step *= min(0.5, max(SHORTER, 2.0 * first))
+            t_new = t + step
+            if not repeat(h, f, w, n, step):
+                return give_up(n, LOST_CLOSURE, which), ready, t_new, step
         n[IMMEDIATE] = 0
-        length = end_at(h, f, w, n, first * step, which)
-        if length < 0.0:
-            n[STATUS], n[CULPRIT] = LOST_CLOSURE, which
-            return -1, ready, t_new, step
         remember_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
         trace(h, f, w, n, length, True, events)

@@ -9,6 +9,8 @@ from pipeline.dynamics.integrate.engine import Engine
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
+#: events per step from which on they are named as the cause
+OFTEN = 0.05
 #: integrators with Newton iterations
 IMPLICIT = ("generalized-alpha", "radau")
 
@@ -27,7 +29,7 @@ def text(engine: Engine) -> str:
         unsolvable = "the equations cannot be solved here: the motion has grown beyond bounds"
     reasons = {
         state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
-        + _why_so_many(n, control),
+        + _why_so_many(engine, n, control),
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than the integrator can follow ({where})",
         state.NO_START: f"the equations are singular here ({where})",
@@ -35,7 +37,10 @@ def text(engine: Engine) -> str:
         + too_long,
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
-        state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time",
+        state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time: a smaller rtol tells these "
+        "times apart, a softer contact or more damping parts them",
+        state.STEPPED_OVER: f"the contact of joint {culprit} began unseen within a step: a smaller rtol or a shorter "
+        "step finds it",
         state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
         f"({where}): give it another motion{_other_integrator(engine)}",
         state.LOST_CLOSURE: unsolvable + too_long,
@@ -49,11 +54,28 @@ def _other_integrator(engine: Engine) -> str:
     return f"; or it moves on and {name} does not get over the pose: try dop853" if name in IMPLICIT else ""
 
 
-def _why_so_many(n: np.ndarray, control: np.ndarray) -> str:
-    """What used the evaluations up."""
-    if n[state.STIFF_STEPS] > STIFF_SHARE * max(1, n[state.STEPS]):
-        return f"{stiffness(n, control)}; choose an implicit integrator, or a larger v_static"
-    return "contacts may be collapsing in time, or the tolerance is too tight"
+def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
+    """What used the evaluations up, and what helps."""
+    steps, rejected, events = (int(n[k]) for k in (state.STEPS, state.REJECTED, state.N_EVENTS))
+    used = f"{steps} steps and {rejected} rejected ones, {events} events"
+    done = (control[state.TIME] - engine.start) / control[state.SPAN]
+    more = f"at this pace the whole run takes {n[state.EVALUATIONS] / done:.1g} evaluations" if done > 0.0 else ""
+    explicit = engine.built.method.stability is not None
+    steepest = f"rates up to {control[state.STEEPEST]:.2g} 1/s" if explicit and control[state.STEEPEST] > 0.0 else ""
+    if n[state.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
+        return f"{used}; {stiffness(n, control)}; choose an implicit integrator (radau), or a larger v_static"
+    return "; ".join(filter(None, [used, steepest, more, _remedy(steps, rejected, events)]))
+
+
+def _remedy(steps: int, rejected: int, events: int) -> str:
+    """What helps by what there was most of."""
+    if events > OFTEN * steps:
+        return (
+            "contacts begin and end all the time: soften or damp them, end the run earlier, or allow more evaluations"
+        )
+    if rejected > steps:
+        return "most steps are rejected, as where forces set in steeply: try radau, or a looser rtol"
+    return "a looser rtol, radau where contacts or friction are stiff, or more evaluations"
 
 
 def stiffness(n: np.ndarray, control: np.ndarray) -> str:
