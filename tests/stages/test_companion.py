@@ -6,11 +6,16 @@ import multiprocessing
 import subprocess
 import sys
 import threading
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from pathlib import Path
 
 import pytest
 
+from pipeline.core.artifacts.store import Store
+from pipeline.core.workflow import cores, schedule
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.progress import Monitor
+from pipeline.core.workflow.task import Task
 from pipeline.dynamics.assembly import companion, fuse
 from pipeline.dynamics.assembly.generated import bring, claimed, compiled, take
 
@@ -43,7 +48,8 @@ def files(tmp_path: Path) -> list[Path]:
 @pytest.fixture(autouse=True)
 def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever machine this is."""
-    monkeypatch.setattr(companion, "cores", lambda: 2)
+    monkeypatch.setattr(cores, "cores", lambda: 2)
+    monkeypatch.setattr(cores, "_told", None)
 
 
 def nothing(path: Path) -> None:
@@ -133,15 +139,34 @@ def test_there_is_one_companion_for_a_folder(files: list[Path], monkeypatch: pyt
 def test_one_file_and_one_core_need_no_companion(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     with companion.companion(files[:1]) as process:
         assert process is None
-    monkeypatch.setattr(companion, "cores", lambda: 1)
+    monkeypatch.setattr(cores, "cores", lambda: 1)
     assert not companion.wanted()
 
 
 def test_workers_have_no_companion() -> None:
-    """Each core has a worker already."""
+    """Each core has a worker already, unless theirs is the only task that can run."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert not pool.submit(companion.wanted).result()
     assert companion.wanted()
+    cores.tell(others_idle=False)
+    assert not companion.wanted()
+    cores.tell(others_idle=True)
+    assert companion.wanted()
+
+
+@pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])
+def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, scenes: list[str], idle: bool) -> None:
+    tasks = [Task("simulate", name, "stages.s4_simulate:run", {"scene": name}, "") for name in scenes]
+    heard: list[bool] = []
+
+    class Pool:
+        def submit(self, *given: object) -> Future[None]:
+            heard.append(bool(given[-1]))
+            return Future()
+
+    common = (Store(tmp_path), Sources(root), None)
+    schedule._submit(schedule._Plan(tasks), {}, Pool(), 4, common, Monitor())  # type: ignore[arg-type]
+    assert heard == [idle] * len(scenes)
 
 
 def test_code_that_cannot_be_kept_is_compiled_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

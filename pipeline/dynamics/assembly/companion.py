@@ -7,7 +7,6 @@ process compiles what is not there, and reports what cannot be compiled.
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -18,6 +17,7 @@ from pathlib import Path
 
 from numba import config
 
+from pipeline.core.workflow.cores import free
 from pipeline.dynamics.assembly.generated import claimed, take
 
 # started by a command, since multiprocessing would run the user's script again in the child
@@ -46,16 +46,10 @@ def companion(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None]:
 
 
 def wanted() -> bool:
-    """Whether a second process is of use: not where others work already, and not on a single core."""
-    worker = multiprocessing.parent_process() is not None
+    """Whether a second process is of use, and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)
-    return startable and not worker and not config.DISABLE_JIT and cores() > 1
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return startable and not config.DISABLE_JIT and free()
 
 
 def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:
