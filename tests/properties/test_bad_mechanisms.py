@@ -180,3 +180,29 @@ def test_a_start_in_a_singular_pose_is_refused_with_time_joint_and_condition() -
     assert caught.value.exit_code == 3
     for part in ("t = 0 s", "singular", "condition number", "joints"):
         assert part in str(caught.value), part
+
+
+@pytest.mark.parametrize("frame", ["ground.pin0", "stand.bolt"])
+@pytest.mark.parametrize("kind, value", [("point-force", "force"), ("point-torque", "torque")])
+def test_a_load_on_what_does_not_move(frame: str, kind: str, value: str) -> None:
+    """The ground, and a body that is fixed to it."""
+    table = four_bar()
+    table["body"]["stand"] = {**deepcopy(table["body"]["beam1"]), "frames": {"bolt": {"position": (0.0, 0.1, 0.0)}}}
+    table["joint"]["weld"] = {"type": "fixed", "between": ("ground.pin0", "stand.bolt")}
+    table["load"] = {"push": {"type": kind, "frame": frame, value: (1.0, 0.0, 0.0)}}
+    error = refusal(table)
+    assert error.place == "[load.push]"
+    assert frame in error.problem
+    assert "does nothing" in error.problem
+    assert error.remedy
+    table["load"]["push"]["frame"] = "rod0.top"
+    with pytest.raises(AssertionError, match="as far as the kernels"):
+        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+
+
+def test_a_spring_may_end_on_the_ground() -> None:
+    table = four_bar()
+    ends = {"between": ("ground.pin0", "beam1.left"), "stiffness": 10.0, "free_length": 0.1}
+    table["load"] = {"tie": {"type": "spring-damper", **ends}}
+    with pytest.raises(AssertionError, match="as far as the kernels"):
+        engine_of(Scene.model_validate(table), {}, lambda share, text: None)

@@ -3,7 +3,6 @@ their inputs are there."""
 
 from __future__ import annotations
 
-import os
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.core.artifacts.store import Record, Store
 from pipeline.core.errors import FlexclearError, ResourceError
+from pipeline.core.workflow import cores
 from pipeline.core.workflow.execute import Progress, execute, find, key_of
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
@@ -84,7 +84,7 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     _settle_fresh(plan, store, sources)
     if plan.waiting:
         monitor.start(len(plan.waiting))
-        width = min(jobs or cores(), _width(plan.waiting))
+        width = min(jobs or cores.cores(), _width(plan.waiting))
         if width == 1:
             _alone(plan, store, sources, monitor)
         else:
@@ -92,11 +92,6 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         monitor.end()
     failures = {id(f): f for f in plan.failed.values()}
     return Outcome(plan.done, tuple(failures.values()))
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _width(tasks: list[Task]) -> int:
@@ -162,6 +157,7 @@ def _submit(
     made for another scene, are done.
     """
     store, sources, reports = common
+    others_idle = not running and len(plan.ready()) == 1
     for task in sorted(plan.ready(), key=lambda t: t.exclusive):
         alone = any(other.task.exclusive for other in running.values())
         if len(running) >= width or alone or (task.exclusive and running):
@@ -177,7 +173,8 @@ def _submit(
             _note(plan, task, record)
             monitor.finish(name, failed=False)
             continue
-        future = pool.submit(_work, task, inputs, name, store.root, sources.root, sources.memo, reports)
+        where = (store.root, sources.root, sources.memo)
+        future = pool.submit(_work, task, inputs, name, where, reports, others_idle)
         running[future] = _Running(task, key, name)
 
 
@@ -237,9 +234,16 @@ def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
 
 
 def _work(
-    task: Task, inputs: Mapping[str, Record], name: str, root: Path, source: Path, memo: Path | None, reports: Any
+    task: Task,
+    inputs: Mapping[str, Record],
+    name: str,
+    where: tuple[Path, Path, Path | None],
+    reports: Any,
+    others_idle: bool,
 ) -> Record | Failure:
     """In a worker: the same as in `_alone`, with progress sent home."""
+    root, source, memo = where
+    cores.tell(others_idle)
 
     def progress(fraction: float | None, text: str) -> None:
         reports.put((name, fraction, text))

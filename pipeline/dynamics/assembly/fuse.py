@@ -8,27 +8,25 @@ share those which are alike.
 
 from __future__ import annotations
 
-import fcntl
 import hashlib
-import importlib.util
-import itertools
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import llvmlite
 import numba
 import numpy as np
-from numba.core.bytecode import FunctionIdentity
 
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.workflow.fingerprint import Sources, imported
+from pipeline.dynamics.assembly.companion import companion
+from pipeline.dynamics.assembly.generated import bring, compiled
 from pipeline.dynamics.assembly.numbers import Kinds
 from pipeline.dynamics.assembly.sources import sources
 from pipeline.dynamics.integrate.method import Scheme
@@ -43,6 +41,8 @@ WORDS = {
     "observe": "recorded quantities",
     "advance": "integrator",
 }
+#: what this process compiles first and a companion last: the others have kernels in common, compiled once by a process
+OURS = "advance"
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 
 
@@ -92,13 +92,14 @@ class Entry:
 
 def entry(kinds: Kinds, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     """The compiled functions for these kinds; `tell` hears of what has to be compiled."""
-    began, modules = time.monotonic(), {}
-    for name, source in sources(kinds, scheme).items():
-        full = f"flexclear_{name}_{digest(source)}"
-        if full not in sys.modules:
-            _fetch(full, source, partial(_announce, tell, WORDS[name], began))
-        modules[name] = sys.modules[full]
-    return Entry(modules)
+    folder, began = _folder(tell), time.monotonic()
+    files = {name: _file(folder, name, source) for name, source in sources(kinds, scheme).items()}
+    names = {path: name for name, path in files.items() if path.stem not in sys.modules}
+    ours_first = sorted(names, key=lambda path: names[path] != OURS)
+    ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
+    with companion(ours_last):
+        bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
+    return Entry({name: sys.modules[path.stem] for name, path in files.items()})
 
 
 def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
@@ -107,55 +108,32 @@ def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
     tell(f"compiling for this kind of mechanism (once; later runs fetch it from disk): {what}{so_far}")
 
 
-def _fetch(name: str, source: str, tell: Callable[[], None]) -> None:
-    """Import a generated file; its function is compiled as that is done, or fetched from disk."""
-    path = _folder() / f"{name}.py"
-    if not path.exists():
-        _write(path, source)
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    sys.modules[name] = module = importlib.util.module_from_spec(spec)  # what is on disk refers to it
-    compiled = any((path.parent / "__pycache__").glob(f"{name}.*.nbc"))
-    if not compiled:
-        tell()
-    _number_apart()
-    try:
-        with nullcontext() if compiled else _alone(path):
-            spec.loader.exec_module(module)
-    except BaseException:  # interrupted, or no room on the disk: not to be taken for whole later
-        del sys.modules[name]
-        raise
-
-
-@contextmanager
-def _alone(path: Path) -> Iterator[None]:
-    """Held while a file may be compiled: of two processes the second waits for the first's code."""
-    with path.with_suffix(".lock").open("w") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        yield
-
-
-def _number_apart() -> None:
-    """Let Numba's names be those of no other process.
-
-    It names the code of a function by its qualified name and a counter of the process. Files that
-    two processes compiled would share names for different code, and a third process that loads
-    both would mix them up (numba issue 10486); so the counter starts anywhere.
-    """
-    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big") << 16)
-
-
-def _folder() -> Path:
+def _folder(tell: Callable[[str], None]) -> Path:
+    """The folder of compiled kernels; where it cannot be written, one that lasts as long as this process."""
     folder = kernel_root()
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        problem = "" if os.access(folder, os.W_OK) else "not writable"
+    except OSError as error:
+        problem = error.strerror or str(error)
+    if problem:
+        tell(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
+        return Path(_temporary().name)
     return folder
 
 
-def _write(path: Path, source: str) -> None:
-    temporary = path.with_suffix(f".{os.getpid()}.tmp")
-    temporary.write_text(source)
-    os.replace(temporary, path)
+@cache
+def _temporary() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="flexclear_kernels_")
+
+
+def _file(folder: Path, name: str, source: str) -> Path:
+    path = folder / f"flexclear_{name}_{digest(source)}.py"
+    if not path.exists():
+        temporary = path.with_suffix(f".{os.getpid()}.tmp")
+        temporary.write_text(source)
+        os.replace(temporary, path)
+    return path
 
 
 @cache

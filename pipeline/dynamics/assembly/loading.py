@@ -101,6 +101,8 @@ def _sites(system: System, layout: Layout, name: str, row: Row) -> tuple[int, in
     found = [find_frame(system.frames, frame, place) for frame in frames]
     if len(found) == 2 and system.link_of[found[0].body] == system.link_of[found[1].body]:
         raise InputError(place, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
+    if len(found) == 1 and system.link_of[found[0].body] == 0:
+        raise InputError(place, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
     sites = [layout.site(system.site(frame)) for frame in frames]
     return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])
 

@@ -80,8 +80,8 @@ def _singular_values(engine: Engine, trajectory: Trajectory, seen: dict[str, np.
 def _passes(engine: Engine, trajectory: Trajectory, values: np.ndarray) -> list[Pass]:
     """Poses between two rows in which singular values of the closures pass through zero.
 
-    A singular value has no sign, but u^T J v with the singular vectors u, v of the row before has one, and keeps
-    it unless it passes through zero.
+    A singular value has no sign, but with U S V^T = J the orthogonal factor U V^T has: it turns slowly, whatever
+    the sizes of the singular values, and is reflected along those that pass through zero.
     """
     least = values[:, -1]
     lowest = np.r_[True, least[1:] <= least[:-1]] & np.r_[least[:-1] <= least[1:], True]
@@ -97,9 +97,9 @@ def _pass_before(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k:
     from scipy.optimize import minimize_scalar  # slow to import, and most runs pass nothing
 
     jacobian = _between(engine, trajectory, regular, k)
-    U, _, Vt = np.linalg.svd(jacobian(0.0), full_matrices=False)
-    B = U.T @ jacobian(1.0) @ Vt.T
-    lost = int(np.sum(np.linalg.eigvalsh(0.5 * (B + B.T)) < 0.0))
+    (U, _, Vt), (U1, _, Vt1) = (np.linalg.svd(jacobian(share), full_matrices=False) for share in (0.0, 1.0))
+    turn = U.T @ U1 @ Vt1 @ Vt.T
+    lost = int(np.sum(np.linalg.eigvalsh(0.5 * (turn + turn.T)) < 0.0))
     if not lost:
         return None
 
