@@ -24,7 +24,7 @@ LOADS: dict[str, Any] = {
     "coil": {"type": "joint-spring", "joint": "U", "coordinate": "first", "stiffness": 30.0, "damping": 0.01},
     "rub": {"type": "joint-friction", "joint": "U", "coordinate": "second", "viscous": 0.02},
 }  # fmt: skip
-#: parallel to rod.bottom, whose z is along the rod, so that the joint's axes are at right angles whichever frame is first
+#: parallel to rod.bottom, whose z is along the rod, so that the joint's axes are square whichever frame is first
 CROSS = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
 
 
