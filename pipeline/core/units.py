@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from functools import cache
 
 import numpy as np
@@ -72,7 +73,7 @@ UNITS: dict[str, tuple[float, str]] = {
 }
 
 #: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
-LARGEST = 1e40
+LARGEST = 1e50
 #: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are told apart by them
 _EXPONENTS: dict[str, Exponents] = {
     "number": (0, 0, 0, 0),
@@ -160,8 +161,33 @@ def quantity(value: object, dimension: str) -> float:
     """SI value of a bare number or a string like ``"20.5 mm"``.
 
     Raises ValueError, in words, when the text is no quantity, the unit is unknown, the unit
-    belongs to another dimension, or the number is not finite.
+    belongs to another dimension, or the number is not finite, too large or too small.
     """
+    return _computable(_read(value, dimension), value)
+
+
+def components(values: Iterable[object], dimension: str) -> list[float]:
+    """SI values of the entries of one vector or matrix; ValueError as of `quantity`, for the largest of them.
+
+    The others may be as small as they are: a rotation leaves 1e-17 of an entry that is zero, two leave 1e-34.
+    """
+    given = list(values)
+    found = [_read(value, dimension) for value in given]
+    if found:
+        largest = max(range(len(found)), key=lambda k: abs(found[k]))
+        _computable(found[largest], given[largest])
+    return found
+
+
+def _computable(number: float, written: object) -> float:
+    if number != 0.0 and not 1.0 / LARGEST <= abs(number) <= LARGEST:
+        raise ValueError(
+            f"{written!r} is beyond what can be computed with: {1.0 / LARGEST:g} to {LARGEST:g} in SI units"
+        )
+    return number
+
+
+def _read(value: object, dimension: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
     if isinstance(value, str):
@@ -177,8 +203,6 @@ def quantity(value: object, dimension: str) -> float:
         result = float(value)
     if not math.isfinite(result):
         raise ValueError(f"{value!r} is not a finite number")
-    if result != 0.0 and not 1.0 / LARGEST <= abs(result) <= LARGEST:
-        raise ValueError(f"{value!r} is beyond what can be computed with: {1.0 / LARGEST:g} to {LARGEST:g} in SI units")
     return result
 
 

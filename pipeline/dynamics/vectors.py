@@ -192,6 +192,13 @@ def from_quaternion(w, x, y, z):
 
 
 @kernel
+def about_z(angle):
+    """Rotation matrix of a turn about z [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+
+
+@kernel
 def quaternion_rate(a, q, u, rate):
     """Rate of the quaternion stored from q at the angular velocity stored from u, parent axes."""
     e, x, y, z = a[q], a[q + 1], a[q + 2], a[q + 3]

@@ -41,7 +41,6 @@ def test_a_vibration_let_loose_swings_as_its_frequency_and_shape_say(number: int
     assert np.abs(stopped).max() < 1e-3 * speed * np.abs(w).max()
 
 
-@pytest.mark.slow
 def test_the_four_legs_spin_freely_and_nothing_else_does() -> None:
     """A leg turns about the line through its two balls; its flexible rod follows without bending."""
     scene = load_scene(TREE / "scenes" / "sps4" / "far_cb.toml")

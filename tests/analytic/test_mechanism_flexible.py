@@ -94,7 +94,6 @@ def test_ideal_joints_energy_ledger_closes(scene: str) -> None:
     assert dataset.constraint_error.max() <= 1e-10
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scene", ["far_csj_free", "far_csj_fixed", "far_csj_cb"])
 def test_clearance_energy_ledger_closes(scene: str) -> None:
     dataset = run(f"sps4/{scene}")

@@ -19,8 +19,6 @@ from tests.paper.material import everything
 
 TREE = Path(pipeline.__file__).parent.parent
 ARTIFACTS = {"run", "tight", "post", "ensemble", "modes", "fine-modes", "bundle", "timing"}
-#: their layout takes seconds, and the module that draws them is also tested through others
-SIMILAR = {"fig11": "fig12", "fig13": "fig12", "fig14": "fig16", "fig15": "fig16"}
 
 
 @pytest.fixture(autouse=True)
@@ -54,9 +52,7 @@ def test_needs_are_literal_and_name_scenes_and_artifacts_that_exist(name):
         )
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.slow if name in SIMILAR else ()) for name in figures.NAMES]
-)
+@pytest.mark.parametrize("name", figures.NAMES)
 def test_makes_the_files_of_its_name(name):
     found = made(name)
     suffixes = {"csv", "md"} if name.startswith("table") else {"png", "svg"}

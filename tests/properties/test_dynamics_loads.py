@@ -93,7 +93,6 @@ def test_every_load_is_tried_here() -> None:
     assert {part["type"] for part in LOADS.values()} == set(loads.NAMES) - {"gravity"}
 
 
-@pytest.mark.slow
 def test_the_energy_is_accounted_for() -> None:
     dataset = run()
     exchanged = float(np.abs(dataset.load_work).max() + dataset.dissipated.max() + dataset.kinetic.max())
@@ -103,7 +102,6 @@ def test_the_energy_is_accounted_for() -> None:
     assert np.all(np.diff(dataset.dissipated) > 0.0)
 
 
-@pytest.mark.slow
 def test_powers_are_rates_of_what_loads_do() -> None:
     """Work, losses and stored energy change at the sum of all powers; trapezoids over 4 ms tell it to a percent."""
     dataset = run()
@@ -114,7 +112,6 @@ def test_powers_are_rates_of_what_loads_do() -> None:
     assert by_trapezoid == pytest.approx(change, abs=0.01 * np.abs(change).max())
 
 
-@pytest.mark.slow
 def test_springs_pull_by_their_law_along_their_line() -> None:
     dataset = run()
     ends = dataset.frame_position.sel(frame=["base.hook", "b.end"]).values
@@ -131,7 +128,6 @@ def test_springs_pull_by_their_law_along_their_line() -> None:
     assert np.abs(spring.load_moment.values).max() < 1e-13
 
 
-@pytest.mark.slow
 def test_joint_loads_follow_their_coordinates() -> None:
     dataset = run()
     coil, rail, rub = (dataset.sel(load=name) for name in ("coil", "rail", "rub"))
@@ -151,7 +147,6 @@ def test_joint_loads_follow_their_coordinates() -> None:
     assert rub.load_power.values[fast] == pytest.approx(known, rel=1e-12)
 
 
-@pytest.mark.slow
 def test_a_scene_with_loads_turned_and_shifted_moves_just_as_it_did() -> None:
     here, there = run(), simulate(in_the_world(loaded(TURN, SHIFT), TURN))
     # rtol 1e-11 over some hundred steps, which differ: a vector's largest component depends on the axes
@@ -163,7 +158,6 @@ def test_a_scene_with_loads_turned_and_shifted_moves_just_as_it_did() -> None:
         assert there[name].values == pytest.approx(here[name].values, abs=1e-7 * np.abs(here[name].values).max()), name
 
 
-@pytest.mark.slow
 def test_forces_and_loads_change_momentum_and_nothing_else_does() -> None:
     """Newton for the free body: what is recorded of loads and accelerations is one motion."""
     dataset = run()

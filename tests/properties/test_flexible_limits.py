@@ -44,7 +44,6 @@ def platform(found: xr.Dataset) -> np.ndarray:
     return found.position.sel(body="platform").values
 
 
-@pytest.mark.slow
 def test_a_rod_of_growing_stiffness_becomes_rigid_as_one_over_e() -> None:
     """Displacements under given loads go as 1/E, and so do the vibrations that the drive's start excites."""
     rigid = platform(stroke("sps4/ideal"))

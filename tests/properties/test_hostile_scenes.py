@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from pydantic import TypeAdapter, ValidationError
 
+from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
+from pipeline.core.scene.fields import Inertia, Position
 from pipeline.core.scene.load import load_scene
 from pipeline.core.units import UNITS, quantity, unit
 from pipeline.dynamics.assembly.closing import assembled
@@ -159,6 +163,33 @@ law = "0.31 m"
 )
 def test_products_of_units_are_understood(text: str, dimension: str, value: float) -> None:
     assert quantity(text, dimension) == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize("moments", [(0.0, 1e-5, 1e-5), (1e-5, 1e-5, 2e-5), (1e-5, 2e-5, 2.5e-5)])
+def test_an_inertia_that_was_turned_elsewhere_is_read(moments: tuple[float, ...]) -> None:
+    """Turning leaves roundings: entries of 1e-53, zero moments below zero, sides that differ in the last digits."""
+    read = TypeAdapter(Inertia).validate_python
+    random = np.random.default_rng(0)
+    for _ in range(50):
+        turn = rotation_vector_to_matrix(random.normal(size=3))
+        quarter = rotation_vector_to_matrix(0.5 * np.pi * random.integers(-1, 2, size=3))
+        for R in (turn, quarter, quarter @ quarter):
+            given = (R @ (np.diag(moments) @ R.T)) * (1.0 + 1e-16 * random.normal(size=(3, 3)))
+            found = np.array(read(given.tolist()))
+            assert np.array_equal(found, found.T)
+            assert np.abs(found - given).max() <= 1e-15 * max(moments)
+    with pytest.raises(ValidationError, match="symmetric"):
+        read((given + 1e-9 * max(moments) * np.eye(3, k=1)).tolist())
+    with pytest.raises(ValidationError, match="belong to no body"):
+        read([-1e-9 * max(moments), *moments[1:]])
+
+
+def test_a_vectors_size_counts_and_not_its_components() -> None:
+    """What turning leaves of a zero is no mistake; a vector that is too small as a whole is one."""
+    assert TypeAdapter(Position).validate_python(["0.3 m", 1.8e-17 * 1.8e-17 * 1.8e-17, 0.0]) == (0.3, 5.832e-51, 0.0)
+    for vector in ([1e-60, 0.0, 1e-70], [0.0, 1e60, 1.0]):
+        with pytest.raises(ValidationError, match="beyond what can be computed with"):
+            TypeAdapter(Position).validate_python(vector)
 
 
 def test_listed_units_are_the_products_that_they_look_like(monkeypatch: pytest.MonkeyPatch) -> None:

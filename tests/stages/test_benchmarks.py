@@ -59,7 +59,6 @@ def test_the_dense_system_is_symmetric_and_has_the_unknowns_that_its_derivation_
     assert np.allclose(system.matrix, system.matrix.T, rtol=0.0, atol=1e-15)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", UNKNOWNS)
 def test_the_dense_system_gives_the_start_accelerations_of_the_engine(name: str):
     """Flexible rod and clearance included: two formulations of the same equations."""
@@ -132,7 +131,6 @@ def test_equal_error_means_worse_in_neither_quantity():
     assert not Error(1.5, 1.0, 1.0).within(Error(1.0, 2.0, 1.0))
 
 
-@pytest.mark.slow
 def test_evaluations_in_contact_are_of_states_that_press():
     """What is timed as contact has a normal force, what is timed as free has none."""
     engine = mechanism("csj").engine()
@@ -142,7 +140,6 @@ def test_evaluations_in_contact_are_of_states_that_press():
         assert (force > 0.0) == (label == "in contact")
 
 
-@pytest.mark.slow
 def test_the_chain_of_four_bars_moves_like_the_benchmark_problem():
     """IFToMM benchmark A02, N = 2, at 0.1 s: an independent solution for its one angle (0.1019174629455971 rad)."""
     run = dynamics.simulate(growth.four_bars(2), {}, silent).isel(time=-1)
@@ -189,14 +186,15 @@ def test_the_peer_converges_to_our_run(case: peer.Case):
     here = original.with_scene(case.title, case.edit(original.scene))
     reference = accuracy.converged(here, "platform", here.scene.time.end)
     errors = []
-    for step in (2e-5, 5e-6):
+    for step in (1e-4, 5e-6):
         samples = solve(here, "platform", next(iter(METHODS)), step).samples
         assert samples is not None
         errors.append(reference.error(samples))
-    # 0.5 m/s at most; impacts that no step ends on leave the method of second order with about the first
+    # 0.5 m/s at most; impacts that no step ends on leave the method of second order with about the first: a twentieth,
+    # which where impacts fall between steps scatters by a factor of four (steps of 1e-5 s are worse than of 2e-5 s)
     assert errors[1].relative < 5e-3
-    assert errors[1].velocity < 0.7 * errors[0].velocity
-    assert errors[1].position < 0.7 * errors[0].position
+    assert errors[1].velocity < 0.2 * errors[0].velocity
+    assert errors[1].position < 0.2 * errors[0].position
 
 
 def test_the_peer_s_model_refuses_what_it_would_leave_out():

@@ -44,13 +44,13 @@ CASES = [
     ("sps4/frequencies/fixed_square", "mesh rod"),
     ("sps4/frequencies/fixed_square", "modes rod"),
     ("sps4/frequencies/fixed_square", "bundle rod"),
-    pytest.param("sps4/ideal", "simulate", marks=pytest.mark.slow),
+    ("sps4/ideal", "simulate"),
     pytest.param("checks/spindle", "simulate", marks=pytest.mark.slow),
     pytest.param("checks/universal_shaft", "simulate", marks=pytest.mark.slow),
     pytest.param("checks/oscillator", "simulate", marks=pytest.mark.slow),
-    pytest.param("sps4/csj", "simulate", marks=pytest.mark.slow),
-    pytest.param("sps4/csj", "post", marks=pytest.mark.slow),
-    pytest.param("sps4/far_csj_cb", "simulate", marks=pytest.mark.slow),
+    ("sps4/csj", "simulate"),
+    ("sps4/csj", "post"),
+    ("sps4/far_csj_cb", "simulate"),
 ]
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
 from pipeline.core.algebra import axes_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
-from pipeline.core.units import a, quantity
+from pipeline.core.units import a, components, quantity
 
 
 def _scalar(dimension: str) -> Any:
@@ -27,7 +28,7 @@ def _vector(dimension: str) -> Any:
     def read(value: Any) -> tuple[float, ...]:
         if not isinstance(value, (list, tuple)) or len(value) != 3:
             raise ValueError(f"expected three components [x, y, z], each {a(dimension)}")
-        return tuple(quantity(component, dimension) for component in value)
+        return tuple(components(value, dimension))
 
     item = {"type": ["number", "string"]}
     return Annotated[
@@ -79,28 +80,30 @@ else:
     RotationVector = _vector("angle")
 
 
+#: what computing an inertia elsewhere, such as by turning it, may leave of symmetry and of a zero moment
+_ROUNDING = 1e-12
+
+
 def _inertia(value: Any) -> list[list[float]]:
     """``[Ixx, Iyy, Izz]`` or a full 3x3 matrix, as three rows [kg m^2]."""
-    given = [_components(row) for row in value] if isinstance(value, (list, tuple)) else []
-    if [len(row) for row in given] == [1, 1, 1]:
-        rows = np.diag([row[0] for row in given])
-    elif [len(row) for row in given] == [3, 3, 3]:
-        rows = np.array(given)
-    else:
+    given = [
+        row if isinstance(row, (list, tuple)) else [row] for row in (value if isinstance(value, (list, tuple)) else [])
+    ]
+    lengths = [len(row) for row in given]
+    if lengths not in ([1, 1, 1], [3, 3, 3]):
         raise ValueError("an inertia is [Ixx, Iyy, Izz] or a 3x3 matrix, about the centre of mass")
-    if not np.allclose(rows, rows.T, rtol=1e-12, atol=0.0):
+    entries = np.array(components(chain.from_iterable(given), "inertia"))
+    rows = np.diag(entries) if lengths == [1, 1, 1] else entries.reshape(3, 3)
+    if np.abs(rows - rows.T).max() > _ROUNDING * np.abs(rows).max():
         raise ValueError("an inertia matrix is symmetric")
+    rows = 0.5 * (rows + rows.T)
     moments = np.linalg.eigvalsh(rows)
-    if moments[0] < 0.0 or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
+    if moments[0] < -_ROUNDING * moments[2] or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise ValueError(
             f"principal moments {moments.tolist()} kg m^2 belong to no body: "
             "each is >= 0 and at most the sum of the others"
         )
     return rows.tolist()
-
-
-def _components(row: Any) -> list[float]:
-    return [quantity(x, "inertia") for x in (row if isinstance(row, (list, tuple)) else [row])]
 
 
 Inertia = Annotated[

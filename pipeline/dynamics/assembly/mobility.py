@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
+from pipeline.dynamics.assembly import weightless
 from pipeline.dynamics.assembly.closing import close, settled
 from pipeline.dynamics.assembly.constraints import constraints, demands, freedoms, outboard_place
 from pipeline.dynamics.assembly.merge import Placement
@@ -63,7 +64,8 @@ class Mobility:
 def analyse(built: Tables) -> Mobility:
     """Mobility of an assembled system.
 
-    Raises InputError for a mechanism that cannot move at all and for drives that contradict each other.
+    Raises InputError for a mechanism that cannot move at all, drives that contradict each other and motions that no
+    mass resists.
     """
     poses, singular = [link.start for link in built.system.links], ""
     J, known = jacobians(built, poses)
@@ -76,6 +78,7 @@ def analyse(built: Tables) -> Mobility:
     found = Mobility(built.layout.nv, len(J), rank, _undetermined(built, J, rank, poses), singular)
     _refuse_locked(built, found)
     _refuse_contradiction(built, J, known, rank)
+    weightless.refuse(built, poses, _columns(built, poses), J, rank)
     return found
 
 

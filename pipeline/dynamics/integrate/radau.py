@@ -44,6 +44,7 @@ from pipeline.dynamics.tables import (
     GROUPS,
     MAGNITUDE,
     MEMORY,
+    NQ,
     NY,
     OK,
     SLOPES,
@@ -135,14 +136,19 @@ def mix(h, w, matrix, source, target):
 
 @kernel
 def predict(h, w, step):
-    """Stages from the polynomial of the step before, or none."""
+    """Stages from the polynomial of the step before; without one, places move on with their rates at the start.
+
+    Not speeds, whose rates at the start may be far from those of a stiff step. Places must: at rest where a contact
+    begins the first iterate would not touch, and the force, seen by the second one only, would look like divergence.
+    """
     length, o, size = w[index(h[MEMORY] + OLD_STEP)], old(h), h[NY]
     for i in range(3):
         x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
         for c in range(size):
             rise = (w[index(o + 3 * size + c)] * x + w[index(o + 2 * size + c)]) * x + w[index(o + size + c)]
             ahead = w[index(o + c)] + rise * x - w[index(h[Y] + c)]
-            w[index(stage_vector(h, Z, i) + c)] = ahead if length > 0.0 else 0.0
+            along = C[i] * step * w[index(h[SLOPES] + c)] if c < h[NQ] else 0.0
+            w[index(stage_vector(h, Z, i) + c)] = ahead if length > 0.0 else along
     mix(h, w, T_INVERSE, Z, TRANSFORMED)
 
 

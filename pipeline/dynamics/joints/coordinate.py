@@ -45,3 +45,8 @@ class Coordinate:
 
 ROTATION = Coordinate("rotation", True)
 TRANSLATION = Coordinate("translation", False)
+
+
+def angle_about_z(R: np.ndarray) -> float:
+    """Angle [rad] in (-pi, pi] of the turn about z that R is, or is nearest to."""
+    return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))

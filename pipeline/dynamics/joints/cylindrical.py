@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import ROTATION, TRANSLATION
+from pipeline.dynamics.joints.coordinate import ROTATION, TRANSLATION, angle_about_z
 from pipeline.dynamics.tables import (
     J_ACCELERATION,
     J_ALPHA,
     J_COLUMNS,
     J_OMEGA,
     J_POSITION,
+    J_ROTATION,
     J_VELOCITY,
 )
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.vectors import about_z, kernel, put9
 
 
 @kernel
@@ -21,8 +22,7 @@ def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x radians about z, then metres along z (see `spherical.motion`)."""
     for k in range(J_COLUMNS + 12):
         w[joint + k] = 0.0
-    cosine, sine = np.cos(w[x]), np.sin(w[x])
-    w[joint], w[joint + 1], w[joint + 3], w[joint + 4], w[joint + 8] = cosine, -sine, sine, cosine, 1.0
+    put9(w, joint + J_ROTATION, about_z(w[x]))
     w[joint + J_POSITION + 2] = w[x + 1]
     w[joint + J_OMEGA + 2], w[joint + J_VELOCITY + 2] = w[u], w[u + 1]
     w[joint + J_ALPHA + 2], w[joint + J_ACCELERATION + 2] = w[du], w[du + 1]
@@ -42,4 +42,4 @@ class Cylindrical:
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Angle about z [rad] in (-pi, pi], displacement along z [m], shape (2,)."""
-        return np.array([np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]), p[2]])
+        return np.array([angle_about_z(R), p[2]])

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import ROTATION, Coordinate
+from pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z
 from pipeline.dynamics.tables import (
     J_ACCELERATION,
     J_ALPHA,
     J_COLUMNS,
     J_OMEGA,
     J_POSITION,
+    J_ROTATION,
     J_VELOCITY,
 )
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.vectors import about_z, kernel, put9
 
 
 @kernel
@@ -21,8 +22,7 @@ def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x metres along x and y of F, radians about z (see `spherical.motion`)."""
     for k in range(J_COLUMNS + 18):
         w[joint + k] = 0.0
-    cosine, sine = np.cos(w[x + 2]), np.sin(w[x + 2])
-    w[joint], w[joint + 1], w[joint + 3], w[joint + 4], w[joint + 8] = cosine, -sine, sine, cosine, 1.0
+    put9(w, joint + J_ROTATION, about_z(w[x + 2]))
     for k in range(2):
         w[joint + J_POSITION + k] = w[x + k]
         w[joint + J_VELOCITY + k] = w[u + k]
@@ -46,4 +46,4 @@ class Planar:
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Displacements along x and y [m], angle about z [rad] in (-pi, pi], shape (3,)."""
-        return np.array([p[0], p[1], np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])])
+        return np.array([p[0], p[1], angle_about_z(R)])

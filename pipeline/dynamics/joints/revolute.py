@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import ROTATION
-from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.joints.coordinate import ROTATION, angle_about_z
+from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA, J_ROTATION
+from pipeline.dynamics.vectors import about_z, kernel, put9
 
 
 @kernel
@@ -14,8 +14,7 @@ def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x radians about z (see `spherical.motion`)."""
     for k in range(J_COLUMNS + 6):
         w[joint + k] = 0.0
-    cosine, sine = np.cos(w[x]), np.sin(w[x])
-    w[joint], w[joint + 1], w[joint + 3], w[joint + 4], w[joint + 8] = cosine, -sine, sine, cosine, 1.0
+    put9(w, joint + J_ROTATION, about_z(w[x]))
     w[joint + J_OMEGA + 2] = w[u]
     w[joint + J_ALPHA + 2] = w[du]
     w[joint + J_COLUMNS + 2] = 1.0
@@ -34,4 +33,4 @@ class Revolute:
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
         """Angle about z [rad] in (-pi, pi], shape (1,)."""
-        return np.array([np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])])
+        return np.array([angle_about_z(R)])
