@@ -185,7 +185,6 @@ def test_a_start_in_a_singular_pose_is_refused_with_time_joint_and_condition() -
         assert part in str(caught.value), part
 
 
-<<<<<<< HEAD
 @pytest.mark.parametrize("frame", ["ground.pin0", "stand.bolt"])
 @pytest.mark.parametrize("kind, value", [("point-force", "force"), ("point-torque", "torque")])
 def test_a_load_on_what_does_not_move(frame: str, kind: str, value: str) -> None:
@@ -210,7 +209,8 @@ def test_a_spring_may_end_on_the_ground() -> None:
     table["load"] = {"tie": {"type": "spring-damper", **ends}}
     with pytest.raises(AssertionError, match="as far as the kernels"):
         engine_of(Scene.model_validate(table), {}, lambda share, text: None)
-=======
+
+
 def thin_rod(kind: str, turn: tuple[float, float, float]) -> Table:
     """A rod along its frame's x, without inertia about it, turned with all that it has."""
     R = rotation_vector_to_matrix(np.array(turn))
@@ -231,4 +231,3 @@ def test_a_motion_that_no_mass_resists(turn: tuple[float, float, float]) -> None
         assert "nothing resists a motion of rod" in error.problem
     with pytest.raises(AssertionError, match="as far as the kernels"):  # about z it has some
         engine_of(Scene.model_validate(thin_rod("revolute", turn)), {}, lambda share, text: None)
->>>>>>> slow
