@@ -31,7 +31,7 @@ from pipeline.dynamics.integrate.state import (
 )
 from pipeline.dynamics.integrate.stepper import FAILED, finite, scaled_norm, set_magnitudes
 from pipeline.dynamics.integrate.straddle import steer
-from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
+from pipeline.dynamics.tables import CONTROL, EVALUATION, MAGNITUDE, N_GROUPS, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
 from pipeline.dynamics.vectors import index, kernel
 
 # the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
@@ -95,8 +95,10 @@ def compose(
     def judge(h, f, w, n, step):
         """Error norm of the step to Y_NEW, 1 at the tolerance."""
         set_magnitudes(h, f, w, h[Y_NEW])
-        norm = error(h, f, w, n, step)
-        return STRICTER * norm if closed(h, n) else norm
+        if closed(h, n):
+            for g in range(h[N_GROUPS]):
+                w[index(h[MAGNITUDE] + g)] /= STRICTER
+        return error(h, f, w, n, step)
 
     @kernel
     def seen_order(h, w, step, norm):
