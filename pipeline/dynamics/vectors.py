@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from pipeline.dynamics.lowering import KernelCompiler
+
 # No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and C
 # took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
 kernel = njit(
@@ -18,6 +20,7 @@ kernel = njit(
     _nrt=False,
     no_cfunc_wrapper=True,
     no_cpython_wrapper=True,
+    pipeline_class=KernelCompiler,
 )
 
 
