@@ -1,0 +1,66 @@
+"""Kernels are optimised and assembled with the function that Python calls, and nowhere else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from numba import njit
+from numba.core.codegen import CPUCodeLibrary
+
+from pipeline.dynamics.lowering import Part
+from pipeline.dynamics.vectors import kernel
+
+
+def tower() -> tuple[Callable, Callable, Callable]:
+    """Kernels that have never been compiled, each calling the one before."""
+
+    @kernel
+    def low(x):
+        return 2.0 * x
+
+    @kernel
+    def middle(x):
+        return low(x) + low(x + 1.0)
+
+    @kernel
+    def high(x):
+        return middle(x) * low(x)
+
+    return low, middle, high
+
+
+def test_what_python_calls_is_optimised_once_however_deep_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    low, middle, high = tower()
+    optimised: list[str] = []
+    optimise = CPUCodeLibrary._optimize_final_module
+
+    def listen(library: CPUCodeLibrary) -> None:
+        optimised.append(library.name)
+        optimise(library)
+
+    monkeypatch.setattr(CPUCodeLibrary, "_optimize_final_module", listen)
+
+    @njit
+    def called(x):
+        return high(x) - middle(x)
+
+    assert called(3.0) == 14.0 * 6.0 - 14.0
+    assert [name for name in optimised if "tower" in name] == []
+    assert len([name for name in optimised if "called" in name]) == 1
+    libraries = [next(iter(k.overloads.values())).library for k in (low, middle, high)]  # type: ignore[attr-defined]
+    assert all(isinstance(library, Part) for library in libraries)
+
+
+def test_kernels_serve_several_functions() -> None:
+    low, middle, _ = tower()
+
+    @njit
+    def one(x):
+        return middle(x)
+
+    @njit
+    def other(x):
+        return middle(x) - low(x)
+
+    assert (one(1.0), other(1.0), one(2.0)) == (6.0, 4.0, 10.0)
