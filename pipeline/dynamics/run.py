@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -49,18 +50,25 @@ def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     return prepare(tabulate(build(scene, bundles)), progress)
 
 
-def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
-    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands."""
+def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, Callable[[], Engine]]:
+    """The engine of a run, its actuators driven as their paths demand, and the maker of one with an implicit method."""
     driven, given = scene, dict[str, Pieces]()
     if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
         from pipeline.dynamics.inverse import actuated
 
         driven, given = actuated(scene, bundles, progress)
-    engine = prepare(tabulate(build(driven, bundles), given), progress)
+
+    def made(wanted: Scene) -> Engine:
+        return prepare(tabulate(build(wanted, bundles), given), progress)
+
+    return made(driven), cache(lambda: made(implicit(driven)))
+
+
+def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
+    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands."""
+    engine, other = engines(scene, bundles, progress)
     start, residual = consistent_start(engine)
-    engine, trajectory, switched = follow(
-        engine, start, progress, lambda: prepare(tabulate(build(implicit(driven), bundles), given), progress)
-    )
+    engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
     require_closed(engine.built, trajectory, seen)
     return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
 
 from pipeline import dynamics
+from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.post import derive
@@ -16,6 +18,7 @@ from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
 
 END, APART, MEMBERS = 0.3, 1e-6, 4
+ALONG_X = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
 
 
 def scene() -> Scene:
@@ -62,3 +65,50 @@ def test_statistics_of_the_members_are_in_the_post_artifact() -> None:
     assert float(post.contact_time_share_mean.sel(contact="contact")) > 0.0
     speed = members().velocity.sel(body="ball", axis="z").values
     assert post.velocity_mean.sel(kept="ball", axis="z").values == pytest.approx(speed.mean(axis=0), abs=1e-12)
+
+
+def carried(**path: Any) -> Scene:
+    """A ball in the socket of a block that swings along a rail on a path, for which the rail's force is asked."""
+    swing = {"type": "harmonic", "amplitude": 0.01, "frequency": 10.0}
+    return Scene.model_validate(
+        {
+            "title": "carried ball",
+            "time": {"end": 0.06},
+            "output": {"interval": 1e-3},
+            "ensemble": {"members": 2, "perturbation": 1e-9},
+            "body": {
+                "ground": {"type": "ground", "frames": {"rail": ALONG_X}},
+                "block": {"type": "rigid", "mass": 1.0, "inertia": [1e-3] * 3, "frames": {"rail": ALONG_X, "cup": {}}},
+                "ball": {"type": "rigid", "mass": 0.1, "inertia": [1e-5] * 3, "frames": {"centre": {}}},
+            },
+            "joint": {
+                "rail": {"type": "prismatic", "between": ["ground.rail", "block.rail"]},
+                "cup": {
+                    "type": "clearance-spherical",
+                    "between": ["block.cup", "ball.centre"],
+                    "clearance": 1e-3,
+                    "ball_radius": 0.01,
+                    "normal": {"law": "lankarani-nikravesh", "restitution": 0.9, "stiffness": 1e9},
+                },
+            },
+            "drive": {"path": {"frame": "block.cup", "position": {"x": swing}} | path},
+        }
+    )
+
+
+def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
+    """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
+    asked = carried(actuators=["rail"])
+    known, members = dynamics.simulate(asked, {}, _quiet), dynamics.ensemble(asked, {}, _quiet)
+    closings = known.event_kind.values == 1
+    assert 2 <= closings.sum() < 20
+    assert members.impact_count.values.tolist() == [[closings.sum()]] * 2
+    peak = float(np.nanmax(known.event_peak_force.values[closings]))
+    assert members.peak_force.values == pytest.approx(np.full((2, 1), peak), rel=1e-3)
+
+
+def test_members_whose_actuators_cannot_do_it_are_refused_like_the_run() -> None:
+    asked = carried(actuators=["rail.spin"])
+    for made in (dynamics.simulate, dynamics.ensemble):
+        with pytest.raises(InputError, match="spin"):
+            made(asked, {}, _quiet)

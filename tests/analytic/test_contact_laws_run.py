@@ -7,8 +7,11 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from pydantic import TypeAdapter
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.scene.solver import Solver
+from pipeline.dynamics.record.ledger import usual
 from tests.analytic.mechanism_runs import Overrides, impacts, run
 from tests.reference import contact_solutions as exact
 
@@ -151,6 +154,20 @@ def test_a_ledger_that_does_not_close_is_no_result() -> None:
     coarse = (("solver.rtol", 1e-3), ("solver.ledger_tolerance", 1e-9))
     with pytest.raises(SolverError, match="ledger of energy does not close"):
         run(BOUNCE, coarse)
+
+
+@pytest.mark.parametrize(
+    "solver, share",
+    [
+        ({}, 1e-4),
+        ({"rtol": 5e-9}, 5e-4),
+        ({"rtol": 1e-4}, 1e-3),
+        ({"integrator": "generalized-alpha"}, 1e-3),
+        ({"step": 1e-5}, 1.0),
+    ],
+)
+def test_the_ledger_must_close_as_well_as_the_steps_are_asked_to_be(solver: dict[str, object], share: float) -> None:
+    assert usual(TypeAdapter(Solver).validate_python(solver)) == pytest.approx(share, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -56,26 +56,29 @@ def _other_integrator(engine: Engine) -> str:
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
     """What used the evaluations up, and what helps."""
+    name, done = engine.built.system.scene.solver.integrator, control[state.TIME] - engine.start
     steps, rejected, events = (int(n[k]) for k in (state.STEPS, state.REJECTED, state.N_EVENTS))
-    used = f"{steps} steps and {rejected} rejected ones, {events} events"
-    done = (control[state.TIME] - engine.start) / control[state.SPAN]
-    more = f"at this pace the whole run takes {n[state.EVALUATIONS] / done:.1g} evaluations" if done > 0.0 else ""
-    explicit = engine.built.method.stability is not None
-    steepest = f"rates up to {control[state.STEEPEST]:.2g} 1/s" if explicit and control[state.STEEPEST] > 0.0 else ""
+    told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
     if n[state.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
-        return f"{used}; {stiffness(n, control)}; choose an implicit integrator (radau), or a larger v_static"
-    return "; ".join(filter(None, [used, steepest, more, _remedy(steps, rejected, events)]))
+        return f"{told[0]}; {stiffness(n, control)}; choose an implicit integrator (radau), or a larger v_static"
+    if control[state.STEEPEST] > 0.0:
+        told.append(f"rates up to {control[state.STEEPEST]:.2g} 1/s")
+    if done > 0.0:
+        whole = n[state.EVALUATIONS] * control[state.SPAN] / done
+        told.append(f"at this pace the whole run takes {whole:.1g} evaluations")
+    return "; ".join([*told, _remedy(steps, rejected, events, name)])
 
 
-def _remedy(steps: int, rejected: int, events: int) -> str:
+def _remedy(steps: int, rejected: int, events: int, name: str) -> str:
     """What helps by what there was most of."""
+    implicit = "" if name in IMPLICIT else ", radau where contacts or friction are stiff,"
     if events > OFTEN * steps:
         return (
             "contacts begin and end all the time: soften or damp them, end the run earlier, or allow more evaluations"
         )
     if rejected > steps:
-        return "most steps are rejected, as where forces set in steeply: try radau, or a looser rtol"
-    return "a looser rtol, radau where contacts or friction are stiff, or more evaluations"
+        return f"most steps are rejected, as where forces set in steeply: a looser rtol{implicit} or more evaluations"
+    return f"a looser rtol{implicit} or more evaluations"
 
 
 def stiffness(n: np.ndarray, control: np.ndarray) -> str:

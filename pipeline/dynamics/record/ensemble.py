@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import xarray as xr
@@ -24,8 +23,8 @@ from pipeline.dynamics.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.record.dataset import attributes
 from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
-from pipeline.dynamics.run import engine_of, observed
-from pipeline.dynamics.switching import follow, implicit
+from pipeline.dynamics.run import engines, observed
+from pipeline.dynamics.switching import follow
 from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
 
 
@@ -36,13 +35,12 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         raise InputError(
             "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
         )
-    engine = engine_of(scene, bundles, progress)
+    engine, other = engines(scene, bundles, progress)
     names = _bodies(engine, wanted)
     start, _ = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
     random = np.random.default_rng(wanted.seed)
     members, reasons = [], []
-    other = cache(lambda: engine_of(implicit(scene), bundles, progress))
     for k in range(wanted.members):
         offsets = random.normal(size=(len(scene.contacts()), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
