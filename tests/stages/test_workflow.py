@@ -99,10 +99,10 @@ def test_a_killed_run_is_simply_run_again(project: Project):
 
 @pytest.mark.parametrize("scenes", [["tiny/ideal"], ["tiny/ideal", "tiny/contact"]], ids=["alone", "workers"])
 def test_an_interrupt_ends_everything_with_130(project: Project, scenes: list[str]):
-    process = project.start("run", *scenes, SECONDS="60")
+    process = project.start("run", *scenes, SECONDS="120")
     _wait_for(lambda: (project.folder / "calls").exists())
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=20)
+    _, err = process.communicate(timeout=40)
     assert process.returncode == 130
     assert "interrupted" in err
     assert "Traceback" not in err
@@ -203,8 +203,8 @@ def test_progress_goes_to_stderr_only(project: Project):
 
 
 def _wait_for(condition: Callable[[], bool]) -> None:
-    """Until something has happened in another process; ten seconds are ample."""
-    end = time.monotonic() + 10.0
+    """Until something has happened in another process, which on a busy machine takes its time to start."""
+    end = time.monotonic() + 60.0
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.02)
