@@ -233,7 +233,7 @@ def test_contacts_beyond_the_horizon_do_not_count():
 def test_the_page_says_what_each_digit_costs():
     found, *_ = study()
     text = page.markdown((page.Studied("a/scene", found, ("| a table |",), {"Error": "x/y.png"}),), "docs/accuracy.md")
-    assert "flexclear cost a/scene --page docs/accuracy.md" in text
+    assert "flexclear cost a/scene \\\n        --page docs/accuracy.md" in text
     assert "0.001 takes rk4, step 0.001 s (50 evaluations)" in text
     assert "1e-09 cannot be had" in text
     assert "![Error of a/scene](x/y.png)" in text

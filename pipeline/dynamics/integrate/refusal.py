@@ -22,19 +22,21 @@ def text(engine: Engine) -> str:
     contacts = [name for name, *_ in engine.built.system.contacts]
     culprit = contacts[n[state.CULPRIT]] if contacts else ""
     fixed = f"{control[state.FIXED]:.2g} s"
-    too_long = f"; or the fixed step of {fixed} is too long for it" if control[state.FIXED] else ""
-    unsolvable = f"the loops cannot be kept closed: a singular pose in which they can go on in several ways ({where})"
+    too_long = f"the fixed step of {fixed} is too long for it, or " if control[state.FIXED] else ""
+    unsolvable = (
+        f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
+    )
     unsolvable += _other_integrator(engine)
     if not engine.built.system.closures:
-        unsolvable = "the equations cannot be solved here: the motion has grown beyond bounds"
+        unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
     reasons = {
         state.CAP_REACHED: f"the limit of {n[state.CAP]} evaluations is used up ([solver.evaluations]); "
         + _why_so_many(engine, n, control),
         state.STEP_TOO_SMALL: f"the step shrank to {control[state.STEP]:.2g} s: the motion is singular here, "
         f"or stiffer than the integrator can follow ({where})",
         state.NO_START: f"the equations are singular here ({where})",
-        state.NOT_A_NUMBER: "the right-hand side is not a number here: a force or a law overflows or divides by zero"
-        + too_long,
+        state.NOT_A_NUMBER: f"the right-hand side is not a number here: {too_long}a force or a law overflows or "
+        "divides by zero",
         state.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
         state.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time: a smaller rtol tells these "
@@ -43,7 +45,7 @@ def text(engine: Engine) -> str:
         "step finds it",
         state.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
         f"({where}): give it another motion{_other_integrator(engine)}",
-        state.LOST_CLOSURE: unsolvable + too_long,
+        state.LOST_CLOSURE: unsolvable,
     }
     return f"at t = {control[state.TIME]:.6g} s: {reasons[int(n[state.STATUS])]}"
 

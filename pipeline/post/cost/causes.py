@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from textwrap import fill
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,8 @@ CAUSES = {
 }
 #: what is told of an error that is infinite
 OTHER = "other impacts"
+#: letters that fit beside a bar
+LETTERS = 52
 COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
 
 
@@ -83,13 +86,15 @@ def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dic
 
 
 def _bar(ax: Axes, row: int, causes: Mapping[str, float]) -> None:
-    known = {cause: e for cause, e in causes.items() if np.isfinite(e) and e > 0.0}
+    infinite = [cause for cause, e in causes.items() if np.isinf(e)]
+    known = dict.fromkeys(infinite, 1.0) or {cause: e for cause, e in causes.items() if e > 0.0}
     total, left = sum(known.values()), 0.0
     for color, cause in zip(COLORS, CAUSES, strict=True):
         if cause in known:
             ax.barh(row, known[cause] / total, left=left, color=color, label=cause, height=0.7)
             left += known[cause] / total
     first = sorted(known, key=lambda cause: -known[cause])[:2]
-    text = ", ".join([f"{cause}: {OTHER}" for cause, e in causes.items() if np.isinf(e)])
-    text = text or ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
+    text = ", ".join(f"{cause} {known[cause]:.1e}" for cause in first)
+    if infinite:
+        text = fill(f"{OTHER} by {', '.join(infinite)}", LETTERS)
     ax.text(1.02, row, text or "no error to be seen", va="center", fontsize=7.5, color=INK)

@@ -13,8 +13,12 @@ from pipeline.post.cost.price import TARGETS, Choice, cheapest
 
 INTRODUCTION = """# What accuracy costs
 
-Made by `flexclear cost {scenes} --page {page}` from the datasets
-`results/cost/<scene>/cost.nc`; nothing on this page is typed in. Errors are the largest differences from a reference
+Made from the datasets `results/cost/<scene>/cost.nc` by
+
+    flexclear cost {scenes} \\
+        --page {page}
+
+Nothing on this page is typed in. Errors are the largest differences from a reference
 run over the whole run, or up to the horizon beyond which the motion of the scene cannot be predicted point by point;
 each is a share of the quantity's own size. Times are processor seconds of warm runs on one core of the machine that
 made the page: their ratios carry over to others, their values do not.

@@ -15,8 +15,8 @@ RESAMPLES = 2000
 SEED = 7
 #: what is asked of a chaotic run, by contact, and its unit
 STATISTICS = {"peak_force": "N", "impact_count": "1", "contact_time_share": "1"}
-#: the smallest part of an ensemble of which a spread is told
-FEWEST = 4
+#: the smallest part of an ensemble of which a spread is told: resamples of fewer say little
+FEWEST = 8
 LOOKS = (("#0072B2", "o"), ("#E69F00", "s"), ("#009E73", "^"), ("#D55E00", "v"))
 
 
