@@ -122,7 +122,7 @@ def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
     total = len(content.facts)
     grouped: dict[tuple[str, str], list[str]] = {}
     for place, (text, scenes) in content.assumptions.items():
-        where = "all" if len(scenes) == total else ", ".join(scene.rpartition("/")[2] for scene in scenes)
+        where = "all" if len(scenes) == total else ", ".join(scene.partition("/")[2] or scene for scene in scenes)
         grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(place.partition(" (")[0])
     return [(", ".join(f"`{place}`" for place in places), text, where) for (text, where), places in grouped.items()]
 
