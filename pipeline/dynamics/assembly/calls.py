@@ -37,6 +37,16 @@ array = carray
 
 
 @intrinsic
+def flat(typingctx: Any, array: Any) -> Any:
+    """Where the entries of an array are."""
+
+    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+        return context.make_array(signature.args[0])(context, builder, values[0]).data
+
+    return types.CPointer(array.dtype)(array), generate
+
+
+@intrinsic
 def call(typingctx: Any, address: Any, arguments: Any) -> Any:
     """Integer that the C function at `address` returns for a tuple; of its arrays it gets the first entries' places."""
 
@@ -45,8 +55,6 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
         given = []
         for k, kind in enumerate(arguments.types):
             value = builder.extract_value(packed, k)
-            if isinstance(kind, types.Array):
-                value = context.make_array(kind)(context, builder, value).data
             given.append(value)
         function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
         return builder.call(builder.inttoptr(where, function.as_pointer()), given)
@@ -75,9 +83,9 @@ if config.DISABLE_JIT:  # for debugging: the same calls between functions of Pyt
 
         return number
 
-    def array(pointer, length):
-        """It is one already."""
-        return pointer
+    def flat(array):
+        """Itself."""
+        return array
 
 
 @kernel

@@ -219,8 +219,6 @@ right_hand_side = equations.compose(
 
 @calls.exported("evaluate")
 def evaluate(h, f, w, n, t, y, dy):
-    h, f = calls.array(h, calls.SOME), calls.array(f, calls.SOME)
-    w, n = calls.array(w, calls.SOME), calls.array(n, calls.SOME)
     right_hand_side(h, f, w, n, t, y, dy)
     return 0
 """
@@ -229,8 +227,6 @@ _PROJECT = """correct = projecting.compose(calls.evaluate, joint_motion, closure
 
 @calls.exported("project")
 def project(h, f, w, n, t, y, dy, tolerance):
-    h, f = calls.array(h, calls.SOME), calls.array(f, calls.SOME)
-    w, n = calls.array(w, calls.SOME), calls.array(n, calls.SOME)
     return correct(h, f, w, n, t, y, dy, tolerance)
 """
 _DISPLACE = """displaced = displacing.compose(joint_motion)
@@ -238,7 +234,7 @@ _DISPLACE = """displaced = displacing.compose(joint_motion)
 
 @calls.exported("displace")
 def displace(h, w, y, displacement, out, total):
-    displaced(calls.array(h, calls.SOME), calls.array(w, calls.SOME), y, displacement, out, total)
+    displaced(h, w, y, displacement, out, total)
     return 0
 """
 _OBSERVE = """kinematics = motion.compose(joint_motion, port, inboard)
@@ -254,6 +250,7 @@ observer = observing.compose(
 
 @njit(types.void(*calls.ARRAYS, calls.TABLE, calls.WHOLE_TABLE, types.float64, calls.TABLE), cache=True, nogil=True)
 def observe(h, f, w, n, rows, pieces, tolerance, out):
+    h, f, w, n = calls.flat(h), calls.flat(f), calls.flat(w), calls.flat(n)
     observer(h, f, w, n, rows, pieces, tolerance, out)
 """
 # one function for both tasks: each would be an object of its own to fetch
@@ -266,6 +263,7 @@ _ADVANCE = """step = stepper.compose(calls.evaluate, project, calls.displace, ME
     nogil=True,
 )
 def advance(h, f, w, n, t, repeat, outputs, rows, events):
+    h, f, w, n = calls.flat(h), calls.flat(f), calls.flat(w), calls.flat(n)
     if repeat < 0:
         step(h, f, w, n, outputs, rows, events)
     for _ in range(repeat):
