@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 #: header of h: sizes
 SIZES = (
@@ -176,31 +176,31 @@ EVALUATION, ACTIVE, MODE, STATE = range(4)
 @kernel
 def link(h, i, field):
     """A field of link i."""
-    return h[index(h[LINKS] + 8 * i + field)]
+    return h[h[LINKS] + 8 * i + field]
 
 
 @kernel
 def flex(h, k, field):
     """A field of flexible body k."""
-    return h[index(h[FLEXES] + 8 * k + field)]
+    return h[h[FLEXES] + 8 * k + field]
 
 
 @kernel
 def port(h, k, field):
     """A field of port k."""
-    return h[index(h[PORTS] + 3 * k + field)]
+    return h[h[PORTS] + 3 * k + field]
 
 
 @kernel
 def closure(h, c, field):
     """A field of closure c."""
-    return h[index(h[CLOSURES] + 11 * c + field)]
+    return h[h[CLOSURES] + 11 * c + field]
 
 
 @kernel
 def contact(h, c, field):
     """A field of contact c."""
-    return h[index(h[CONTACTS] + 6 * c + field)]
+    return h[h[CONTACTS] + 6 * c + field]
 
 
 @kernel
@@ -212,13 +212,13 @@ def contact_numbers(h, c):
 @kernel
 def site_link(h, s):
     """Link of site s."""
-    return h[index(h[SITES] + 2 * s)]
+    return h[h[SITES] + 2 * s]
 
 
 @kernel
 def site_port(h, s):
     """Port of site s, or -1."""
-    return h[index(h[SITES] + 2 * s + 1)]
+    return h[h[SITES] + 2 * s + 1]
 
 
 @kernel

@@ -53,7 +53,7 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, packed = values
         given = []
-        for k, kind in enumerate(arguments.types):
+        for k in range(len(arguments.types)):
             value = builder.extract_value(packed, k)
             given.append(value)
         function = ir.FunctionType(ir.IntType(64), [value.type for value in given])

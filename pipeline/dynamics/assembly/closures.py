@@ -71,7 +71,7 @@ from pipeline.dynamics.tables import (
     column,
     site_frame,
 )
-from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, dot6, index, kernel, put, scale, sub
+from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, dot6, kernel, put, scale, sub
 
 #: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
 SINGULAR_PIVOT = 1e-13
@@ -92,22 +92,22 @@ def rows(h, w, c):
     first = closure(h, c, ROW0)
     for k in range(first, first + closure(h, c, N_ROWS)):
         o, declared = h[ROWS] + 6 * k, h[CLOSURE_ROWS] + 3 * k
-        along = axis(A, h[index(declared + 1)])
-        if h[index(declared)] == 0:
+        along = axis(A, h[declared + 1])
+        if h[declared] == 0:
             put(w, o, cross(p_b, along))
             put(w, o + 3, along)
-            w[index(h[RESIDUAL] + k)] = dot(along, r)
-            w[index(h[RESIDUAL_RATE] + k)] = dot(along, slide)
-            w[index(h[GAMMA] + k)] = -dot(along, bias)
+            w[h[RESIDUAL] + k] = dot(along, r)
+            w[h[RESIDUAL_RATE] + k] = dot(along, slide)
+            w[h[GAMMA] + k] = -dot(along, bias)
         else:
-            against = axis(B, h[index(declared + 2)])
+            against = axis(B, h[declared + 2])
             about = cross(against, along)
             swing = add(cross(cross(omega_b, against), along), cross(against, cross(omega_a, along)))
             put(w, o, about)
             put(w, o + 3, (0.0, 0.0, 0.0))
-            w[index(h[RESIDUAL] + k)] = dot(along, against)
-            w[index(h[RESIDUAL_RATE] + k)] = dot(turning, about)
-            w[index(h[GAMMA] + k)] = -dot(turning_rate, about) - dot(turning, swing)
+            w[h[RESIDUAL] + k] = dot(along, against)
+            w[h[RESIDUAL_RATE] + k] = dot(turning, about)
+            w[h[GAMMA] + k] = -dot(turning_rate, about) - dot(turning, swing)
 
 
 @kernel
@@ -115,15 +115,15 @@ def jacobian(h, w, c):
     """J^T of closure c on its support: slot after slot, the rows of the closure side by side."""
     start, size, count = h[JACOBIAN] + closure(h, c, JACOBIAN0), closure(h, c, N_SUPPORT), closure(h, c, N_KEPT)
     for k in range(start, start + size * count):
-        w[index(k)] = 0.0
+        w[k] = 0.0
     first, wrenches = h[ENTRIES] + 3 * closure(h, c, ENTRY0), h[ROWS] + 6 * closure(h, c, ROW0)
     for e in range(first, first + 3 * closure(h, c, N_ENTRIES), 3):
-        col, sign = column(h, h[index(e + 1)]), float(h[index(e + 2)])
+        col, sign = column(h, h[e + 1]), float(h[e + 2])
         angular, linear = scale(sign, at(w, col)), scale(sign, at(w, col + 3))
-        slot = start + count * h[index(e)]
+        slot = start + count * h[e]
         for k in range(count):
             o = wrenches + 6 * k
-            w[index(slot + k)] += dot(angular, at(w, o)) + dot(linear, at(w, o + 3))
+            w[slot + k] += dot(angular, at(w, o)) + dot(linear, at(w, o + 3))
 
 
 @kernel
@@ -132,35 +132,35 @@ def spread(h, w, c):
     size, support, count = closure(h, c, N_SUPPORT), h[SUPPORT] + closure(h, c, SUPPORT0), closure(h, c, N_KEPT)
     J, S = h[JACOBIAN] + closure(h, c, JACOBIAN0), h[SPREAD] + closure(h, c, JACOBIAN0)
     for a in range(size):
-        i = h[index(support + a)]
-        first, row, mine = h[index(h[ENVELOPE] + 2 * i)], base(h, h[ENVELOPE], h[MASS], i), S + count * a
+        i = h[support + a]
+        first, row, mine = h[h[ENVELOPE] + 2 * i], base(h, h[ENVELOPE], h[MASS], i), S + count * a
         for r in range(count):
-            w[index(mine + r)] = w[index(J + count * a + r)]
+            w[mine + r] = w[J + count * a + r]
         for b in range(a):
-            k = h[index(support + b)]
+            k = h[support + b]
             if k >= first:
-                l_ik, other = w[index(row + k)], S + count * b
+                l_ik, other = w[row + k], S + count * b
                 for r in range(count):
-                    w[index(mine + r)] -= l_ik * w[index(other + r)]
-        inverse = 1.0 / w[index(row + i)]
+                    w[mine + r] -= l_ik * w[other + r]
+        inverse = 1.0 / w[row + i]
         for r in range(count):
-            w[index(mine + r)] *= inverse
+            w[mine + r] *= inverse
 
 
 @kernel
 def couple(h, w, p):
     """The block of J M^-1 J^T between the closures of pair p, added to zeros."""
     o = h[CLOSURE_PAIRS] + 4 * p
-    a, b, common = h[index(o)], h[index(o + 1)], h[COMMON] + 2 * h[index(o + 2)]
+    a, b, common = h[o], h[o + 1], h[COMMON] + 2 * h[o + 2]
     A, B = h[SPREAD] + closure(h, a, JACOBIAN0), h[SPREAD] + closure(h, b, JACOBIAN0)
     rows_a, rows_b = closure(h, a, N_KEPT), closure(h, b, N_KEPT)
     row0, col0 = closure(h, b, KEPT0), closure(h, a, KEPT0)
-    for k in range(common, common + 2 * h[index(o + 3)], 2):
-        left, right = A + rows_a * h[index(k)], B + rows_b * h[index(k + 1)]
+    for k in range(common, common + 2 * h[o + 3], 2):
+        left, right = A + rows_a * h[k], B + rows_b * h[k + 1]
         for r in range(rows_b):
-            value, row = w[index(right + r)], base(h, h[CLOSURE_ENVELOPE], h[SCHUR], row0 + r) + col0
+            value, row = w[right + r], base(h, h[CLOSURE_ENVELOPE], h[SCHUR], row0 + r) + col0
             for s in range(r + 1 if a == b else rows_a):
-                w[index(row + s)] += value * w[index(left + s)]
+                w[row + s] += value * w[left + s]
 
 
 @kernel
@@ -171,15 +171,15 @@ def prepare(h, w, n):
         jacobian(h, w, c)
         spread(h, w, c)
     for k in range(h[SCHUR], h[SCHUR] + h[SCHUR_SIZE]):
-        w[index(k)] = 0.0
+        w[k] = 0.0
     for p in range(h[N_CLOSURE_PAIRS]):
         couple(h, w, p)
     for r in range(h[N_KEPT_ROWS]):
-        size = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)]
-        w[index(h[ROW_SCALE] + h[N_CLOSURE_ROWS] + r)] = size
+        size = w[base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r]
+        w[h[ROW_SCALE] + h[N_CLOSURE_ROWS] + r] = size
     ratio = factor(h, h[CLOSURE_ENVELOPE], w, h[SCHUR], h[N_KEPT_ROWS], SINGULAR_PIVOT)
     pivot = independence(h, w) if ratio > SINGULAR_PIVOT else 0.0
-    w[index(h[PIVOT] + LAST_PIVOT)] = pivot
+    w[h[PIVOT] + LAST_PIVOT] = pivot
     n[EVALUATION] = OK if pivot > SINGULAR_PIVOT else SINGULAR
 
 
@@ -188,9 +188,9 @@ def independence(h, w):
     """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
     least = 1.0
     for r in range(h[N_KEPT_ROWS]):
-        pivot = w[index(base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r)] ** 2
+        pivot = w[base(h, h[CLOSURE_ENVELOPE], h[SCHUR], r) + r] ** 2
         o = h[ROW_SCALE] + r
-        least = min(least, pivot / max(w[index(o)], w[index(o + h[N_CLOSURE_ROWS])]))
+        least = min(least, pivot / max(w[o], w[o + h[N_CLOSURE_ROWS]]))
     return least
 
 
@@ -203,8 +203,8 @@ def add_spread(h, w, y, weight):
         for a in range(closure(h, c, N_SUPPORT)):
             total = 0.0
             for r in range(count):
-                total += w[index(S + count * a + r)] * w[index(first + r)]
-            w[index(y + h[index(support + a)])] += weight * total
+                total += w[S + count * a + r] * w[first + r]
+            w[y + h[support + a]] += weight * total
 
 
 @kernel
@@ -213,7 +213,7 @@ def gather_rows(h, w, values):
     for c in range(h[N_CLOSURES]):
         row, kept = values + closure(h, c, ROW0), h[MULTIPLIER] + closure(h, c, KEPT0)
         for k in range(closure(h, c, N_KEPT)):
-            w[index(kept + k)] = w[index(row + k)]
+            w[kept + k] = w[row + k]
 
 
 @kernel
@@ -234,9 +234,9 @@ def close(h, w, n):
         count, support = closure(h, c, N_KEPT), h[SUPPORT] + closure(h, c, SUPPORT0)
         S, first = h[SPREAD] + closure(h, c, JACOBIAN0), h[MULTIPLIER] + closure(h, c, KEPT0)
         for a in range(closure(h, c, N_SUPPORT)):
-            force = w[index(h[FORCE] + h[index(support + a)])]
+            force = w[h[FORCE] + h[support + a]]
             for r in range(count):
-                w[index(first + r)] -= w[index(S + count * a + r)] * force
+                w[first + r] -= w[S + count * a + r] * force
     solve(h, w)
     add_spread(h, w, h[FORCE], 1.0)
 
@@ -246,10 +246,10 @@ def known_forces(h, w):
     """Take the closures' share out of the forces that the drives must supply."""
     for e in range(h[N_KNOWN_ENTRIES]):
         o = h[KNOWN_ENTRIES] + 4 * e
-        c, d, col, sign = h[index(o)], h[index(o + 1)], column(h, h[index(o + 2)]), h[index(o + 3)]
+        c, d, col, sign = h[o], h[o + 1], column(h, h[o + 2]), h[o + 3]
         wrenches, first = h[ROWS] + 6 * closure(h, c, ROW0), h[MULTIPLIER] + closure(h, c, KEPT0)
         for k in range(closure(h, c, N_KEPT)):
-            w[index(h[DRIVE_FORCE] + d)] -= sign * dot6(w, wrenches + 6 * k, w, col) * w[index(first + k)]
+            w[h[DRIVE_FORCE] + d] -= sign * dot6(w, wrenches + 6 * k, w, col) * w[first + k]
 
 
 @kernel
@@ -261,6 +261,6 @@ def correction(h, w, residual, step):
     gather_rows(h, w, residual)
     solve(h, w)
     for k in range(h[NV]):
-        w[index(step + k)] = 0.0
+        w[step + k] = 0.0
     add_spread(h, w, step, -1.0)
     backward(h, h[ENVELOPE], w, h[MASS], h[NV], step)

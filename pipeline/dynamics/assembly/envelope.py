@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 @kernel
 def base(h, e, a, i):
     """Place in w of column 0 of row i (which may lie before the row's first entry)."""
-    return a + h[index(e + 2 * i + 1)] - h[index(e + 2 * i)]
+    return a + h[e + 2 * i + 1] - h[e + 2 * i]
 
 
 @kernel
@@ -28,22 +28,22 @@ def factor(h, e, w, a, n, threshold):
     """
     worst = 1.0
     for i in range(n):
-        first, row = h[index(e + 2 * i)], base(h, e, a, i)
-        diagonal = w[index(row + i)]
+        first, row = h[e + 2 * i], base(h, e, a, i)
+        diagonal = w[row + i]
         for j in range(first, i):
             other = base(h, e, a, j)
-            total = w[index(row + j)]
-            for k in range(max(first, h[index(e + 2 * j)]), j):
-                total -= w[index(row + k)] * w[index(other + k)]
-            w[index(row + j)] = total / w[index(other + j)]
+            total = w[row + j]
+            for k in range(max(first, h[e + 2 * j]), j):
+                total -= w[row + k] * w[other + k]
+            w[row + j] = total / w[other + j]
         pivot = diagonal
         for k in range(first, i):
-            pivot -= w[index(row + k)] * w[index(row + k)]
+            pivot -= w[row + k] * w[row + k]
         ratio = pivot / diagonal
         if not ratio > threshold:
             return ratio
         worst = min(worst, ratio)
-        w[index(row + i)] = np.sqrt(pivot)
+        w[row + i] = np.sqrt(pivot)
     return worst
 
 
@@ -52,10 +52,10 @@ def forward(h, e, w, a, n, b):
     """L^-1 applied to the vector in w from place b."""
     for i in range(n):
         row = base(h, e, a, i)
-        total = w[index(b + i)]
-        for k in range(h[index(e + 2 * i)], i):
-            total -= w[index(row + k)] * w[index(b + k)]
-        w[index(b + i)] = total / w[index(row + i)]
+        total = w[b + i]
+        for k in range(h[e + 2 * i], i):
+            total -= w[row + k] * w[b + k]
+        w[b + i] = total / w[row + i]
 
 
 @kernel
@@ -63,7 +63,7 @@ def backward(h, e, w, a, n, b):
     """L^-T applied to the vector in w from place b."""
     for i in range(n - 1, -1, -1):
         row = base(h, e, a, i)
-        value = w[index(b + i)] / w[index(row + i)]
-        w[index(b + i)] = value
-        for k in range(h[index(e + 2 * i)], i):
-            w[index(b + k)] -= w[index(row + k)] * value
+        value = w[b + i] / w[row + i]
+        w[b + i] = value
+        for k in range(h[e + 2 * i], i):
+            w[b + k] -= w[row + k] * value

@@ -58,7 +58,7 @@ from pipeline.dynamics.tables import (
     port,
     wrench,
 )
-from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot6, index, kernel, put, scale, turn_symmetric
+from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot6, kernel, put, scale, turn_symmetric
 
 #: pivots of M below this share of their diagonal mean a coordinate that moves no mass
 MASSLESS_PIVOT = 1e-15
@@ -121,12 +121,12 @@ def gather(h, w, i):
     first = link(h, i, C0)
     for k in range(first, first + link(h, i, N_SPEEDS)):
         carry(h, w, i, k)
-        w[index(h[BIAS] + k)] = dot6(w, column(h, k), w, o)
+        w[h[BIAS] + k] = dot6(w, column(h, k), w, o)
     up, parent = wrench(h, link(h, i, PARENT)), h[INERTIA] + INERTIA_SIZE * link(h, i, PARENT)
     accumulate(w, up, at(w, o))
     accumulate(w, up + 3, at(w, o + 3))
     for e in range(INERTIA_SIZE):
-        w[index(parent + e)] += w[index(h[INERTIA] + INERTIA_SIZE * i + e)]
+        w[parent + e] += w[h[INERTIA] + INERTIA_SIZE * i + e]
 
 
 @kernel
@@ -142,7 +142,7 @@ def gather_port(h, w, i):
         carry(h, w, i, k)
         accumulate(w, momentum(h, c0 + j), at(w, momentum(h, k)))
         accumulate(w, momentum(h, c0 + j) + 3, at(w, momentum(h, k) + 3))
-        w[index(h[MODAL_BIAS] + c0 + j)] += dot6(w, column(h, k), w, wrench(h, i))
+        w[h[MODAL_BIAS] + c0 + j] += dot6(w, column(h, k), w, wrench(h, i))
 
 
 @kernel
@@ -151,7 +151,7 @@ def modal_forces(h, w):
     for b in range(h[N_FLEX]):
         c0 = flex(h, b, FLEX_C0)
         for j in range(c0, c0 + flex(h, b, N_MODES)):
-            w[index(h[BIAS] + j)] = w[index(h[MODAL_BIAS] + j)]
+            w[h[BIAS] + j] = w[h[MODAL_BIAS] + j]
 
 
 @kernel
@@ -160,18 +160,18 @@ def assemble_mass(h, w):
     o = h[PAIRS]
     for p in range(h[N_PAIRS]):
         e = o + 3 * p
-        w[index(h[MASS] + h[index(e + 2)])] += dot6(w, momentum(h, h[index(e)]), w, column(h, h[index(e + 1)]))
+        w[h[MASS] + h[e + 2]] += dot6(w, momentum(h, h[e]), w, column(h, h[e + 1]))
 
 
 @kernel
 def drive_forces(h, w):
     """Forces that the prescribed coordinates need: their rows of the equations of motion."""
     for d in range(h[N_DRIVES]):
-        w[index(h[DRIVE_FORCE] + d)] = w[index(h[BIAS] + h[NV] + d)]
+        w[h[DRIVE_FORCE] + d] = w[h[BIAS] + h[NV] + d]
     for p in range(h[N_KNOWN_PAIRS]):
         e = h[KNOWN_PAIRS] + 4 * p
-        entry = dot6(w, momentum(h, h[index(e)]), w, column(h, h[index(e + 1)]))
-        w[index(h[DRIVE_FORCE] + h[index(e + 2)])] += entry * w[index(h[DU] + h[index(e + 3)])]
+        entry = dot6(w, momentum(h, h[e]), w, column(h, h[e + 1]))
+        w[h[DRIVE_FORCE] + h[e + 2]] += entry * w[h[DU] + h[e + 3]]
 
 
 def flexible_inertia(inertia: Callable, mass_matrix: Callable) -> Callable:
@@ -202,27 +202,27 @@ def compose(
     @kernel
     def spread_state(h, w, y):
         for k in range(h[NQ]):
-            w[index(h[X] + k)] = w[index(y + k)]
+            w[h[X] + k] = w[y + k]
         for k in range(h[NV]):
-            w[index(h[U] + k)] = w[index(y + h[NQ] + k)]
-            w[index(h[DU] + k)] = 0.0
+            w[h[U] + k] = w[y + h[NQ] + k]
+            w[h[DU] + k] = 0.0
         for k in range(h[N_TURNS]):
-            w[index(h[TURN] + k)] = w[index(y + h[NQ] + h[NV] + h[N_LEDGER] - h[N_TURNS] + k)]
+            w[h[TURN] + k] = w[y + h[NQ] + h[NV] + h[N_LEDGER] - h[N_TURNS] + k]
 
     @kernel
     def forces(h, f, w, n):
         """Inertia, contacts, then the tree from its leaves to the ground."""
         for k in range(h[MASS], h[MASS] + h[MASS_SIZE]):
-            w[index(k)] = 0.0
+            w[k] = 0.0
         for e in range(6):
-            w[index(wrench(h, 0) + e)] = 0.0
+            w[wrench(h, 0) + e] = 0.0
         for i in range(1, h[N_LINKS]):
             if link(h, i, FLEX) < 0:
                 rigid_inertia(h, f, w, i)
         flexible(h, f, w)
         contacts(h, f, w, n)
         for k in range(INERTIA_SIZE * h[N_LINKS]):
-            w[index(h[INERTIA] + k)] = w[index(h[OWN] + k)]
+            w[h[INERTIA] + k] = w[h[OWN] + k]
         for i in range(h[N_LINKS] - 1, 0, -1):
             port_load(h, w, i)
             gather(h, w, i)
@@ -233,14 +233,14 @@ def compose(
         """Positions' rates, accelerations, and the ledger's powers."""
         power = 0.0
         for d in range(h[N_DRIVES]):
-            power += w[index(h[DRIVE_FORCE] + d)] * w[index(h[U] + h[NV] + d)]
-        w[index(h[LEDGER_RATE] + DRIVE_WORK)] = power
+            power += w[h[DRIVE_FORCE] + d] * w[h[U] + h[NV] + d]
+        w[h[LEDGER_RATE] + DRIVE_WORK] = power
         for k in range(h[NQ]):
-            w[index(dy + k)] = w[index(h[POSITION_RATE] + k)]
+            w[dy + k] = w[h[POSITION_RATE] + k]
         for k in range(h[NV]):
-            w[index(dy + h[NQ] + k)] = w[index(h[DU] + k)]
+            w[dy + h[NQ] + k] = w[h[DU] + k]
         for k in range(h[N_LEDGER]):
-            w[index(dy + h[NQ] + h[NV] + k)] = w[index(h[LEDGER_RATE] + k)]
+            w[dy + h[NQ] + h[NV] + k] = w[h[LEDGER_RATE] + k]
 
     @kernel
     def evaluate(h, f, w, n, t, y, dy):
@@ -249,7 +249,7 @@ def compose(
         spread_state(h, w, y)
         known_motion(h, f, w, n, t)
         for k in range(h[N_LEDGER]):
-            w[index(h[LEDGER_RATE] + k)] = 0.0
+            w[h[LEDGER_RATE] + k] = 0.0
         kinematics(h, f, w)
         forces(h, f, w, n)
         assemble_mass(h, w)
@@ -258,12 +258,12 @@ def compose(
             n[EVALUATION] = NOT_POSITIVE
             return
         for k in range(h[NV]):
-            w[index(h[FORCE] + k)] = -w[index(h[BIAS] + k)]
+            w[h[FORCE] + k] = -w[h[BIAS] + k]
         forward(h, h[ENVELOPE], w, h[MASS], h[NV], h[FORCE])
         close(h, w, n)
         backward(h, h[ENVELOPE], w, h[MASS], h[NV], h[FORCE])
         for k in range(h[NV]):
-            w[index(h[DU] + k)] = w[index(h[FORCE] + k)]
+            w[h[DU] + k] = w[h[FORCE] + k]
         drive_forces(h, w)
         known_forces(h, w)
         rates(h, w, dy)

@@ -18,7 +18,7 @@ from pipeline.dynamics.tables import (
     U,
     X,
 )
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 @kernel
@@ -33,16 +33,16 @@ def compose(harmonics: Callable) -> Callable:
     def laws(h, f, w, n, t):
         """Value, rate and second rate of every law, from its piece in force."""
         for k in range(h[N_LAWS]):
-            piece = n[index(n[ACTIVE] + k)]
+            piece = n[n[ACTIVE] + k]
             o = h[PIECES] + PIECE_SIZE * piece
-            s = t - f[index(o)]
-            x, v, a = f[index(o + PIECE_SIZE - 1)], 0.0, 0.0
+            s = t - f[o]
+            x, v, a = f[o + PIECE_SIZE - 1], 0.0, 0.0
             for c in range(PIECE_SIZE - 2, 0, -1):
                 a = a * s + 2.0 * v
                 v = v * s + x
-                x = x * s + f[index(o + c)]
+                x = x * s + f[o + c]
             law = h[LAW] + LAW_SIZE * k
-            w[index(law)], w[index(law + 1)], w[index(law + 2)] = x, v, a
+            w[law], w[law + 1], w[law + 2] = x, v, a
             harmonics(h, f, w, law, piece, s)
 
     @kernel
@@ -51,8 +51,8 @@ def compose(harmonics: Callable) -> Callable:
         laws(h, f, w, n, t)
         for d in range(h[N_DRIVES]):
             law = h[LAW] + LAW_SIZE * d
-            w[index(h[X] + h[NQ] + d)] = w[index(law)]
-            w[index(h[U] + h[NV] + d)] = w[index(law + 1)]
-            w[index(h[DU] + h[NV] + d)] = w[index(law + 2)]
+            w[h[X] + h[NQ] + d] = w[law]
+            w[h[U] + h[NV] + d] = w[law + 1]
+            w[h[DU] + h[NV] + d] = w[law + 2]
 
     return known_motion

@@ -51,7 +51,6 @@ from pipeline.dynamics.vectors import (
     congruence,
     cross,
     dot,
-    index,
     kernel,
     put,
     scale,
@@ -70,7 +69,7 @@ def straight(h, f, w, k, j, vector):
 @kernel
 def plain(f, data, n, j):
     """Int rho S_j of the linear shape of mode j."""
-    return (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])
+    return (f[data + j], f[data + n + j], f[data + 2 * n + j])
 
 
 @dataclass(frozen=True)
@@ -93,16 +92,16 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         P = h[MODAL]
         V = P + 9 * n
         for e in range(9 * n):
-            w[index(P + e)] = f[index(data + 3 * n + e)]
-            w[index(V + e)] = 0.0
+            w[P + e] = f[data + 3 * n + e]
+            w[V + e] = 0.0
         first, count = flex(h, k, MOMENT0), flex(h, k, N_MOMENTS)
         where, values = h[MOMENTS] + 2 * first, h[MOMENT_VALUES] + first
         for e in range(count):
-            row, i, value = h[index(where + 2 * e)], h[index(where + 2 * e + 1)], f[index(values + e)]
-            w[index(P + row)] += value * w[index(x + i)]
-            w[index(V + row)] += value * w[index(u + i)]
+            row, i, value = h[where + 2 * e], h[where + 2 * e + 1], f[values + e]
+            w[P + row] += value * w[x + i]
+            w[V + row] += value * w[u + i]
         for j in range(n):
-            w[index(P + j)] += second_moment(h, f, w, k, j, x)
+            w[P + j] += second_moment(h, f, w, k, j, x)
 
     @kernel
     def shape(h, f, w, k, j):
@@ -119,18 +118,18 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         c, v = at(f, numbers + 1), (0.0, 0.0, 0.0)
         for j in range(n):
             straight, bent = plain(f, data, n, j), shape(h, f, w, k, j)
-            c = add(c, scale(0.5 * w[index(x + j)], add(straight, bent)))
-            v = add(v, scale(w[index(u + j)], bent))
+            c = add(c, scale(0.5 * w[x + j], add(straight, bent)))
+            v = add(v, scale(w[u + j], bent))
         for a in range(3):
             for b in range(3):
-                both, rate = f[index(numbers + 4 + 3 * a + b)], 0.0
+                both, rate = f[numbers + 4 + 3 * a + b], 0.0
                 row, mirrored = P + (3 * a + b) * n, data + 3 * n + (3 * b + a) * n
                 for j in range(n):
                     # int r_a r_b = int X_a X_b + int X_b S_a q + int r_a S_b q
-                    both += (f[index(mirrored + j)] + w[index(row + j)]) * w[index(x + j)]
-                    rate += w[index(row + j)] * w[index(u + j)]
-                w[index(Q + 3 * a + b)] = both
-                w[index(Q + RATE + 3 * a + b)] = rate
+                    both += (f[mirrored + j] + w[row + j]) * w[x + j]
+                    rate += w[row + j] * w[u + j]
+                w[Q + 3 * a + b] = both
+                w[Q + RATE + 3 * a + b] = rate
         return c, v
 
     @kernel
@@ -144,13 +143,11 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         for j in range(n):
             C = shape(h, f, w, k, j)
             angular = spin(w, P, n, j)
-            centrifugal = x * y * (w[index(P + n + j)] + w[index(P + 3 * n + j)]) + x * z * (
-                w[index(P + 2 * n + j)] + w[index(P + 6 * n + j)]
-            )
-            centrifugal += y * z * (w[index(P + 5 * n + j)] + w[index(P + 7 * n + j)])
-            centrifugal -= xx * w[index(P + j)] + yy * w[index(P + 4 * n + j)] + zz * w[index(P + 8 * n + j)]
+            centrifugal = x * y * (w[P + n + j] + w[P + 3 * n + j]) + x * z * (w[P + 2 * n + j] + w[P + 6 * n + j])
+            centrifugal += y * z * (w[P + 5 * n + j] + w[P + 7 * n + j])
+            centrifugal -= xx * w[P + j] + yy * w[P + 4 * n + j] + zz * w[P + 8 * n + j]
             coriolis = 2.0 * dot(spin(w, V, n, j), omega)
-            w[index(h[MODAL_BIAS] + c0 + j)] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
+            w[h[MODAL_BIAS] + c0 + j] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
             linear = turn(R, C)
             o = momentum(h, c0 + j)
             put(w, o, add(turn(R, angular), cross(p, linear)))
@@ -167,7 +164,7 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         i, n, u = flex(h, k, FLEX_LINK), flex(h, k, N_MODES), h[U] + flex(h, k, FLEX_C0)
         invariants(h, f, w, k)
         first, first_rate = sums(h, f, w, k)
-        mass = f[index(h[FLEX_NUMBERS] + 13 * k)]
+        mass = f[h[FLEX_NUMBERS] + 13 * k]
         frame, Q = link_frame(h, i), h[SCRATCH]
         R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
         J = tensor(w, Q)
@@ -178,7 +175,7 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         force = add(force, cross(omega, add(cross(omega, first), scale(2.0, first_rate))))
         for j in range(n):
             # a point that bending draws in is accelerated also at constant modal rates
-            force = add(force, (w[index(u + j)] * first_moment(h, f, w, k, j, u), 0.0, 0.0))
+            force = add(force, (w[u + j] * first_moment(h, f, w, k, j, u), 0.0, 0.0))
         moment = add(cross(first, a), turn_symmetric(J, alpha))
         moment = add(moment, cross(omega, turn_symmetric(J, omega)))
         # 2 int rho r x (omega x rdot) = 2 (tr(D) omega - D^T omega)
@@ -201,8 +198,8 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for j in range(n):
-            force = add(force, scale(w[index(du + j)], shape(h, f, w, k, j)))
-            moment = add(moment, scale(w[index(du + j)], spin(w, P, n, j)))
+            force = add(force, scale(w[du + j], shape(h, f, w, k, j)))
+            moment = add(moment, scale(w[du + j], spin(w, P, n, j)))
         force = turn(R, force)
         accumulate(w, wrench(h, i), add(turn(R, moment), cross(p, force)))
         accumulate(w, wrench(h, i) + 3, force)
@@ -216,15 +213,15 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         frame, P = link_frame(h, flex(h, k, FLEX_LINK)), h[MODAL]
         R = at9(w, frame + AXES)
         omega, v = turn_back(R, at(w, frame + OMEGA)), turn_back(R, at(w, frame + VELOCITY))
-        kinetic = 0.5 * f[index(h[FLEX_NUMBERS] + 13 * k)] * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
+        kinetic = 0.5 * f[h[FLEX_NUMBERS] + 13 * k] * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
         kinetic += 0.5 * dot(omega, turn_symmetric(tensor(w, h[SCRATCH]), omega))
         elastic, M = 0.0, data + 12 * n
         K = M + n * n
         for i in range(n):
-            kinetic += dot(omega, spin(w, P, n, i)) * w[index(u + i)]
-            elastic += 0.5 * f[index(K + i)] * w[index(x + i)] ** 2
+            kinetic += dot(omega, spin(w, P, n, i)) * w[u + i]
+            elastic += 0.5 * f[K + i] * w[x + i] ** 2
             for j in range(n):
-                kinetic += 0.5 * f[index(M + i * n + j)] * w[index(u + i)] * w[index(u + j)]
+                kinetic += 0.5 * f[M + i * n + j] * w[u + i] * w[u + j]
         return kinetic, elastic
 
     return Kernels(inertia, mass_matrix, modal_inertia, energies)

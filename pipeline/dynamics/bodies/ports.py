@@ -44,7 +44,6 @@ from pipeline.dynamics.vectors import (
     at9,
     cross,
     exponential,
-    index,
     kernel,
     product,
     put,
@@ -61,7 +60,7 @@ from pipeline.dynamics.vectors import (
 @kernel
 def _shape(f, first, n, j):
     """Column j of a 3 x n shape stored from `first`."""
-    return (f[index(first + j)], f[index(first + n + j)], f[index(first + 2 * n + j)])
+    return (f[first + j], f[first + n + j], f[first + 2 * n + j])
 
 
 def compose(shortening: Callable) -> tuple[Callable, Callable]:
@@ -83,11 +82,11 @@ def compose(shortening: Callable) -> tuple[Callable, Callable]:
         for j in range(n):
             phi, psi, drawn = _shape(f, move, n, j), _shape(f, spin, n, j), shortening(h, f, w, p, j, x)
             bent = (phi[0] + drawn, phi[1], phi[2])
-            s = add(s, scale(w[index(x + j)], (phi[0] + 0.5 * drawn, phi[1], phi[2])))
-            s_rate, s_acc = add(s_rate, scale(w[index(u + j)], bent)), add(s_acc, scale(w[index(du + j)], bent))
-            s_acc = add(s_acc, (w[index(u + j)] * shortening(h, f, w, p, j, u), 0.0, 0.0))
-            theta, theta_rate = add(theta, scale(w[index(x + j)], psi)), add(theta_rate, scale(w[index(u + j)], psi))
-            theta_acc = add(theta_acc, scale(w[index(du + j)], psi))
+            s = add(s, scale(w[x + j], (phi[0] + 0.5 * drawn, phi[1], phi[2])))
+            s_rate, s_acc = add(s_rate, scale(w[u + j], bent)), add(s_acc, scale(w[du + j], bent))
+            s_acc = add(s_acc, (w[u + j] * shortening(h, f, w, p, j, u), 0.0, 0.0))
+            theta, theta_rate = add(theta, scale(w[x + j], psi)), add(theta_rate, scale(w[u + j], psi))
+            theta_acc = add(theta_acc, scale(w[du + j], psi))
         numbers = h[PORT_NUMBERS] + 12 * p
         local = add(at(f, numbers), s)
         turned = product(exponential(theta), at9(f, numbers + 3))
@@ -133,7 +132,7 @@ def compose(shortening: Callable) -> tuple[Callable, Callable]:
         moves, first, c0 = flex(h, k, FLEX_INBOARD), port(h, p, PORT_COLUMN), flex(h, k, FLEX_C0)
         for j in range(flex(h, k, N_MODES)):
             for e in range(6):
-                w[index(column(h, first + j) + e)] = w[index(column(h, c0 + j) + e)] if moves else 0.0
+                w[column(h, first + j) + e] = w[column(h, c0 + j) + e] if moves else 0.0
         modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
 
     @kernel
@@ -161,7 +160,7 @@ def compose(shortening: Callable) -> tuple[Callable, Callable]:
         c0 = flex(h, k, FLEX_C0)
         for j in range(flex(h, k, N_MODES)):
             for e in range(6):
-                w[index(column(h, c0 + j) + e)] = 0.0
+                w[column(h, c0 + j) + e] = 0.0
         modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c0)
         return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
 

@@ -16,7 +16,7 @@ International Journal for Numerical Methods in Engineering 32, 1833-1850.
 from __future__ import annotations
 
 from pipeline.dynamics.tables import DATA0, FLEX_DATA, N_MODES, PORT_DATA, PORT_FLEX, PORT_SHAPES, flex, port
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 @kernel
@@ -24,7 +24,7 @@ def _form(f, w, o, n, vector):
     """A row of a form, from place o, times a vector in w."""
     total = 0.0
     for i in range(n):
-        total += f[index(o + i)] * w[index(vector + i)]
+        total += f[o + i] * w[vector + i]
     return total
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from pipeline.dynamics.integrate import lu
 from pipeline.dynamics.integrate.state import PARAMETER
 from pipeline.dynamics.tables import CONTROL, MEMORY, NQ, NV, NY
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 # memory: step of the stored accelerations, step of the factors, whether the Jacobian holds, step before;
 # then rates (old, new, old for this step's length), displacement, residual, correction, pivots,
@@ -59,7 +59,7 @@ def matrix(h, k):
 @kernel
 def constants(h, w):
     """alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
-    r = w[index(h[CONTROL] + PARAMETER)]
+    r = w[h[CONTROL] + PARAMETER]
     alpha_m, alpha_f = (2.0 * r - 1.0) / (r + 1.0), r / (r + 1.0)
     gamma = 0.5 - alpha_m + alpha_f
     return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
@@ -86,12 +86,12 @@ def factorise(h, w, step):
     for i in range(m):
         weight = 1.0 - alpha_f if i < nv else 0.5
         for k in range(m):
-            change = reach(h, w, step, k) * w[index(by_state + m * i + k)]
+            change = reach(h, w, step, k) * w[by_state + m * i + k]
             if k < nv:
-                change += beta * step * step * w[index(by_position + m * i + k)]
-            w[index(S + m * i + k)] = -weight * change
-        w[index(S + (m + 1) * i)] += diagonal(h, w, i)
-    w[index(h[MEMORY] + LU_STEP)] = step
+                change += beta * step * step * w[by_position + m * i + k]
+            w[S + m * i + k] = -weight * change
+        w[S + (m + 1) * i] += diagonal(h, w, i)
+    w[h[MEMORY] + LU_STEP] = step
     return lu.factor(w, S, vector(h, PIVOTS), m)
 
 

@@ -28,7 +28,7 @@ from pipeline.dynamics.tables import (
     flex,
     link,
 )
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 def compose(joint_motion: Callable) -> Callable:
@@ -43,24 +43,24 @@ def compose(joint_motion: Callable) -> Callable:
         for k in range(h[N_FLEX]):
             q, c = flex(h, k, FLEX_Q0), flex(h, k, FLEX_C0)
             for j in range(flex(h, k, N_MODES)):
-                w[index(h[POSITION_RATE] + q + j)] = w[index(h[U] + c + j)]
+                w[h[POSITION_RATE] + q + j] = w[h[U] + c + j]
 
     @kernel
     def displace(h, w, y, displacement, out, total):
         x, rate = h[X], h[POSITION_RATE]
         for k in range(h[NV]):
-            w[index(h[U] + k)] = w[index(displacement + k)]
+            w[h[U] + k] = w[displacement + k]
         for k in range(h[NQ]):
-            w[index(x + k)] = w[index(y + k)]
-            w[index(total + k)] = 0.0
+            w[x + k] = w[y + k]
+            w[total + k] = 0.0
         for stage in range(4):
             rates(h, w)
             weight = (1.0 if stage in (0, 3) else 2.0) / 6.0
             reach = 0.5 if stage < 2 else 1.0
             for k in range(h[NQ]):
-                w[index(total + k)] += weight * w[index(rate + k)]
-                w[index(x + k)] = w[index(y + k)] + reach * w[index(rate + k)]
+                w[total + k] += weight * w[rate + k]
+                w[x + k] = w[y + k] + reach * w[rate + k]
         for k in range(h[NQ]):
-            w[index(out + k)] = w[index(y + k)] + w[index(total + k)]
+            w[out + k] = w[y + k] + w[total + k]
 
     return displace

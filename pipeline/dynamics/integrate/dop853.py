@@ -15,7 +15,7 @@ from pipeline.dynamics.integrate.dop853_coefficients import E3, E5, ERROR_ORDER,
 from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
 from pipeline.dynamics.integrate.stages import slope
 from pipeline.dynamics.tables import DENSE, GROUPS, MAGNITUDE, NY, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 @kernel
@@ -26,9 +26,9 @@ def error(h, f, w, n, step):
     for c in range(size):
         a = b = 0.0
         for j in range(STAGES):
-            a += E5[j] * w[index(k + j * size + c)]
-            b += E3[j] * w[index(k + j * size + c)]
-        s = 1.0 / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]
+            a += E5[j] * w[k + j * size + c]
+            b += E3[j] * w[k + j * size + c]
+        s = 1.0 / w[h[MAGNITUDE] + h[h[GROUPS] + c]]
         five += (a * s) ** 2
         three += (b * s) ** 2
     if five == 0.0 and three == 0.0:
@@ -42,13 +42,13 @@ def interpolate(h, w, theta, out):
     size, F = h[NY], h[DENSE]
     s = 1.0 - theta
     for c in range(size):
-        v = w[index(F + 6 * size + c)] * theta
-        v = (v + w[index(F + 5 * size + c)]) * s
-        v = (v + w[index(F + 4 * size + c)]) * theta
-        v = (v + w[index(F + 3 * size + c)]) * s
-        v = (v + w[index(F + 2 * size + c)]) * theta
-        v = (v + w[index(F + size + c)]) * s
-        w[index(out + c)] = w[index(F + 7 * size + c)] + (v + w[index(F + c)]) * theta
+        v = w[F + 6 * size + c] * theta
+        v = (v + w[F + 5 * size + c]) * s
+        v = (v + w[F + 4 * size + c]) * theta
+        v = (v + w[F + 3 * size + c]) * s
+        v = (v + w[F + 2 * size + c]) * theta
+        v = (v + w[F + size + c]) * s
+        w[out + c] = w[F + 7 * size + c] + (v + w[F + c]) * theta
 
 
 def compose(evaluate: Callable, displace: Callable) -> tuple:
@@ -63,16 +63,16 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
             stage(h, f, w, n, step, i)
         first, last = slope(h, 0), slope(h, STAGES)
         for c in range(size):
-            delta = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
-            w[index(F + c)] = delta
-            w[index(F + size + c)] = step * w[index(first + c)] - delta
-            w[index(F + 2 * size + c)] = 2.0 * delta - step * (w[index(last + c)] + w[index(first + c)])
+            delta = w[h[Y_NEW] + c] - w[h[Y] + c]
+            w[F + c] = delta
+            w[F + size + c] = step * w[first + c] - delta
+            w[F + 2 * size + c] = 2.0 * delta - step * (w[last + c] + w[first + c])
             for d in range(4):
                 total = 0.0
                 for j in range(EXTENDED):
-                    total += D[d, j] * w[index(first + j * size + c)]
-                w[index(F + (3 + d) * size + c)] = step * total
-            w[index(F + 7 * size + c)] = w[index(h[Y] + c)]
+                    total += D[d, j] * w[first + j * size + c]
+                w[F + (3 + d) * size + c] = step * total
+            w[F + 7 * size + c] = w[h[Y] + c]
 
     return begin_afresh, attempt, error, extend, keep_nothing
 

@@ -15,7 +15,7 @@ from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothin
 from pipeline.dynamics.integrate.stages import slope
 from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
 from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 STAGES, ERROR_ORDER = 6, 4
 A = np.zeros((STAGES, STAGES))
@@ -46,7 +46,7 @@ def weighted(h, w, weights, c):
     """Weighted sum of the slopes of state variable c."""
     total = 0.0
     for j in range(STAGES + 1):
-        total += weights[j] * w[index(h[SLOPES] + h[NY] * j + c)]
+        total += weights[j] * w[h[SLOPES] + h[NY] * j + c]
     return total
 
 
@@ -55,7 +55,7 @@ def error(h, f, w, n, step):
     """Norm of the local error, 1 at the tolerance; MAGNITUDE holds each group's scale."""
     total = 0.0
     for c in range(h[NY]):
-        total += (step * weighted(h, w, E, c) / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+        total += (step * weighted(h, w, E, c) / w[h[MAGNITUDE] + h[h[GROUPS] + c]]) ** 2
     return np.sqrt(total / h[NY])
 
 
@@ -64,13 +64,13 @@ def extend(h, f, w, n, step):
     """Prepare the dense output of the step to Y_NEW."""
     size, F = h[NY], h[DENSE]
     for c in range(size):
-        delta = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
-        bend = step * w[index(h[SLOPES] + c)] - delta
-        w[index(F + c)] = w[index(h[Y] + c)]
-        w[index(F + size + c)] = delta
-        w[index(F + 2 * size + c)] = bend
-        w[index(F + 3 * size + c)] = delta - step * w[index(slope(h, STAGES) + c)] - bend
-        w[index(F + 4 * size + c)] = step * weighted(h, w, D, c)
+        delta = w[h[Y_NEW] + c] - w[h[Y] + c]
+        bend = step * w[h[SLOPES] + c] - delta
+        w[F + c] = w[h[Y] + c]
+        w[F + size + c] = delta
+        w[F + 2 * size + c] = bend
+        w[F + 3 * size + c] = delta - step * w[slope(h, STAGES) + c] - bend
+        w[F + 4 * size + c] = step * weighted(h, w, D, c)
 
 
 @kernel
@@ -78,9 +78,9 @@ def interpolate(h, w, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
     size, F, s = h[NY], h[DENSE], 1.0 - theta
     for c in range(size):
-        v = w[index(F + 3 * size + c)] + s * w[index(F + 4 * size + c)]
-        v = w[index(F + size + c)] + s * (w[index(F + 2 * size + c)] + theta * v)
-        w[index(out + c)] = w[index(F + c)] + theta * v
+        v = w[F + 3 * size + c] + s * w[F + 4 * size + c]
+        v = w[F + size + c] + s * (w[F + 2 * size + c] + theta * v)
+        w[out + c] = w[F + c] + theta * v
 
 
 def compose(evaluate: Callable, displace: Callable) -> tuple:
@@ -92,7 +92,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
         """A step with the slope at its end, which the error estimate needs."""
         if not advance(h, f, w, n, step):
             return False
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope(h, STAGES))
+        evaluate(h, f, w, n, w[h[CONTROL] + TIME] + step, h[Y_NEW], slope(h, STAGES))
         n[EVALUATIONS] += 1
         return n[EVALUATION] == OK
 

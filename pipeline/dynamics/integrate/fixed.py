@@ -22,7 +22,7 @@ from pipeline.dynamics.integrate.state import (
 from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
 from pipeline.dynamics.integrate.straddle import steer
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 def compose(
@@ -36,13 +36,13 @@ def compose(
     def first_step(h, f, w, n):
         """Slope at the start of a segment; False when the equations have no solution here."""
         c, slope = h[CONTROL], h[SLOPES]
-        evaluate(h, f, w, n, w[index(c + TIME)], h[Y], slope)
+        evaluate(h, f, w, n, w[c + TIME], h[Y], slope)
         n[EVALUATIONS] += 1
         if n[EVALUATION] != OK or not finite(h, w, slope):
             n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == OK else NO_START
             return False
         start_watch(h, w)
-        w[index(c + STEP)] = w[index(c + FIXED)]
+        w[c + STEP] = w[c + FIXED]
         n[FRESH] = 0
         begin(h, f, w, n)
         return True
@@ -70,12 +70,12 @@ def compose(
     @kernel
     def next_step(h, w, n, step, norm):
         """All steps are alike."""
-        return w[index(h[CONTROL] + FIXED)]
+        return w[h[CONTROL] + FIXED]
 
     @kernel
     def lay(h, w, t):
         """Length of the step to try from t: as given, unless a singular pose is ahead."""
-        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap, 1.0)
+        return steer(h, w, t, w[h[CONTROL] + STEP], gap, 1.0)
 
     good = judge if method.stability is None else judge_with_scales
     return first_step, good, after_rejection, next_step, lay, straddle.compose(evaluate)

@@ -57,7 +57,7 @@ from pipeline.dynamics.tables import (
     Y_STAGE,
     Y,
 )
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 # rows of SLOPES beside those of `alpha_newton`: where the step ends, and how many there are
 LAST, ROWS = 2, 5
@@ -68,28 +68,28 @@ def keep(h, f, w, n, step):
     """The end of an accepted step is the start of the next."""
     o = h[MEMORY]
     for k in range(h[NV]):
-        w[index(vector(h, OLD) + k)] = w[index(vector(h, NEW) + k)]
+        w[vector(h, OLD) + k] = w[vector(h, NEW) + k]
     for c in range(h[NY]):
-        w[index(before(h) + c)] = w[index(h[SLOPES] + c)]
-    w[index(o + A_STEP)] = w[index(o + STEP_BEFORE)] = step
+        w[before(h) + c] = w[h[SLOPES] + c]
+    w[o + A_STEP] = w[o + STEP_BEFORE] = step
 
 
 @kernel
 def error(h, f, w, n, step):
     """Norm of the local error, 1 at the tolerance."""
     size, first, earlier = h[NY], h[SLOPES], before(h)
-    est, length = first + size * ESTIMATE, w[index(h[MEMORY] + STEP_BEFORE)]
+    est, length = first + size * ESTIMATE, w[h[MEMORY] + STEP_BEFORE]
     for c in range(size):
-        f0, f1 = w[index(first + c)], w[index(first + size * ITERATE + c)]
-        bend = ((f1 - f0) / step - (f0 - w[index(earlier + c)]) / length) / (step + length)
+        f0, f1 = w[first + c], w[first + size * ITERATE + c]
+        bend = ((f1 - f0) / step - (f0 - w[earlier + c]) / length) / (step + length)
         integral = 0.5 * step * (f0 + f1) - step**3 / 6.0 * bend
-        w[index(est + c)] = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)] - integral
+        w[est + c] = w[h[Y_NEW] + c] - w[h[Y] + c] - integral
     for k in range(rates(h)):
-        w[index(est + h[NQ] + k)] *= diagonal(h, w, k)
+        w[est + h[NQ] + k] *= diagonal(h, w, k)
     solve(h, w, est + h[NQ])
     total = 0.0
     for c in range(size):
-        total += (w[index(est + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+        total += (w[est + c] / w[h[MAGNITUDE] + h[h[GROUPS] + c]]) ** 2
     return np.sqrt(total / size)
 
 
@@ -101,20 +101,20 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
     def begin(h, f, w, n):
         """Accelerations at their own time, from a look ahead along the tangent."""
         alpha_m, alpha_f, _, _ = constants(h, w)
-        o, size, first, step = h[MEMORY], h[NY], h[SLOPES], w[index(h[CONTROL] + STEP)]
+        o, size, first, step = h[MEMORY], h[NY], h[SLOPES], w[h[CONTROL] + STEP]
         ahead = first + size * ITERATE
         for c in range(size):
-            w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + step * w[index(first + c)]
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_STAGE], ahead)
+            w[h[Y_STAGE] + c] = w[h[Y] + c] + step * w[first + c]
+        evaluate(h, f, w, n, w[h[CONTROL] + TIME] + step, h[Y_STAGE], ahead)
         n[EVALUATIONS] += 1
         seen = n[EVALUATION] == OK and finite(h, w, ahead)
         for c in range(size):
-            change = w[index(ahead + c)] - w[index(first + c)] if seen else 0.0
-            w[index(before(h) + c)] = w[index(first + c)] - change
+            change = w[ahead + c] - w[first + c] if seen else 0.0
+            w[before(h) + c] = w[first + c] - change
             if h[NQ] <= c < h[NQ] + h[NV]:
-                w[index(vector(h, OLD) + c - h[NQ])] = w[index(first + c)] + (alpha_m - alpha_f) * change
-        w[index(o + A_STEP)] = w[index(o + STEP_BEFORE)] = step
-        w[index(o + VALID)] = 0.0
+                w[vector(h, OLD) + c - h[NQ]] = w[first + c] + (alpha_m - alpha_f) * change
+        w[o + A_STEP] = w[o + STEP_BEFORE] = step
+        w[o + VALID] = 0.0
         n[EVALUATION] = OK
 
     @kernel

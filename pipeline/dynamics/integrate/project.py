@@ -30,7 +30,7 @@ from pipeline.dynamics.tables import (
     flex,
     link,
 )
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 ITERATIONS = 8
 #: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)
@@ -44,8 +44,8 @@ def largest(w, first, count):
     """Largest magnitude of a stretch of w; NaN counts as infinite."""
     result = 0.0
     for k in range(first, first + count):
-        if not abs(w[index(k)]) <= result:
-            result = abs(w[index(k)]) if w[index(k)] == w[index(k)] else 1e300
+        if not abs(w[k]) <= result:
+            result = abs(w[k]) if w[k] == w[k] else 1e300
     return result
 
 
@@ -62,16 +62,16 @@ def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) ->
     def move(h, w, y, step):
         """Add to the positions of y the change that a small displacement of the coordinates means."""
         for k in range(h[NV]):
-            w[index(h[U] + k)] = w[index(step + k)]
+            w[h[U] + k] = w[step + k]
         for i in range(1, h[N_LINKS]):
             q, c = link(h, i, Q0), link(h, i, C0)
             joint_motion(link(h, i, JOINT_KIND), w, h[X] + q, h[U] + c, h[DU] + c, h[JOINT], h[POSITION_RATE] + q)
         for k in range(h[N_FLEX]):
             q, c = flex(h, k, FLEX_Q0), flex(h, k, FLEX_C0)
             for j in range(flex(h, k, N_MODES)):
-                w[index(h[POSITION_RATE] + q + j)] = w[index(step + c + j)]
+                w[h[POSITION_RATE] + q + j] = w[step + c + j]
         for k in range(h[NQ]):
-            w[index(y + k)] += w[index(h[POSITION_RATE] + k)]
+            w[y + k] += w[h[POSITION_RATE] + k]
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
@@ -82,7 +82,7 @@ def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) ->
         residual says little about the error behind it, nothing is changed.
         """
         rows, step, used = h[N_CLOSURE_ROWS], h[CORRECTION], 0
-        if w[index(h[PIVOT] + LAST_PIVOT)] < BLIND:
+        if w[h[PIVOT] + LAST_PIVOT] < BLIND:
             return 0
         for _ in range(ITERATIONS):
             worst = max(largest(w, h[RESIDUAL], rows), largest(w, h[RESIDUAL_RATE], rows))
@@ -90,7 +90,7 @@ def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) ->
                 return used
             correction(h, w, h[RESIDUAL_RATE], step)
             for k in range(h[NV]):
-                w[index(y + h[NQ] + k)] += w[index(step + k)]
+                w[y + h[NQ] + k] += w[step + k]
             correction(h, w, h[RESIDUAL], step)
             move(h, w, y, step)
             evaluate(h, f, w, n, t, y, dy)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from pipeline.dynamics.integrate import lu
 from pipeline.dynamics.tables import MEMORY, NY
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 #: eigenvalues of the inverse of the Butcher matrix: a real one and MU_REST +- i MU_IMAG
 MU_REAL = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
@@ -57,13 +57,13 @@ def factorise(h, w, step):
     pivots = factors(h, 3)
     for i in range(m):
         for k in range(m):
-            entry, o = w[index(jacobian_entry(h, i, k))], m * i + k
-            w[index(real + o)] = w[index(rest + o)] = -entry
-            w[index(rest + m * m + o)] = 0.0
-        w[index(real + (m + 1) * i)] += MU_REAL / step
-        w[index(rest + (m + 1) * i)] += MU_REST / step
-        w[index(rest + m * m + (m + 1) * i)] = MU_IMAG / step
-    w[index(h[MEMORY] + LU_STEP)] = step
+            entry, o = w[jacobian_entry(h, i, k)], m * i + k
+            w[real + o] = w[rest + o] = -entry
+            w[rest + m * m + o] = 0.0
+        w[real + (m + 1) * i] += MU_REAL / step
+        w[rest + (m + 1) * i] += MU_REST / step
+        w[rest + m * m + (m + 1) * i] = MU_IMAG / step
+    w[h[MEMORY] + LU_STEP] = step
     return lu.factor(w, real, pivots, m) and lu.factor_complex(w, rest, pivots + m, m)
 
 

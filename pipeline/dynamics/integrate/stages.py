@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 @kernel
@@ -26,14 +26,14 @@ def compose(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> 
         """Slope of stage i from those of all earlier ones."""
         size, y, stage_y = h[NY], h[Y], h[Y_STAGE]
         for c in range(size):
-            w[index(stage_y + c)] = w[index(y + c)]
+            w[stage_y + c] = w[y + c]
         for j in range(i):
             weight = step * A[i, j]
             if weight != 0.0:
                 k = slope(h, j)
                 for c in range(size):
-                    w[index(stage_y + c)] += weight * w[index(k + c)]
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + C[i] * step, stage_y, slope(h, i))
+                    w[stage_y + c] += weight * w[k + c]
+        evaluate(h, f, w, n, w[h[CONTROL] + TIME] + C[i] * step, stage_y, slope(h, i))
         n[EVALUATIONS] += 1
 
     @kernel
@@ -45,14 +45,14 @@ def compose(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> 
             if n[EVALUATION] != OK:
                 return False
         for c in range(size):
-            w[index(h[Y_NEW] + c)] = 0.0
+            w[h[Y_NEW] + c] = 0.0
         for j in range(count):
             if B[j] != 0.0:
                 k = slope(h, j)
                 for c in range(size):
-                    w[index(h[Y_NEW] + c)] += B[j] * w[index(k + c)]
+                    w[h[Y_NEW] + c] += B[j] * w[k + c]
         for c in range(size):
-            w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + step * w[index(h[Y_NEW] + c)]
+            w[h[Y_NEW] + c] = w[h[Y] + c] + step * w[h[Y_NEW] + c]
         return True
 
     return stage, attempt

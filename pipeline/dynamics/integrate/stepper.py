@@ -71,7 +71,7 @@ from pipeline.dynamics.tables import (
     Y_STAGE,
     Y,
 )
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 #: what settle returns for an event after which integration starts afresh; another positive number only records it
 RESTART = 1
@@ -93,12 +93,12 @@ def set_magnitudes(h, f, w, y):
     """
     m, o = h[MAGNITUDE], h[Y]
     for g in range(h[N_GROUPS]):
-        w[index(m + g)] = 0.0
+        w[m + g] = 0.0
     for c in range(h[NY]):
-        g = m + h[index(h[GROUPS] + c)]
-        w[index(g)] += 0.5 * (w[index(y + c)] ** 2 + w[index(o + c)] ** 2)
+        g = m + h[h[GROUPS] + c]
+        w[g] += 0.5 * (w[y + c] ** 2 + w[o + c] ** 2)
     for g in range(h[N_GROUPS]):
-        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + np.sqrt(w[index(m + g)]))
+        w[m + g] = w[h[CONTROL] + RTOL] * (f[h[FLOORS] + g] + np.sqrt(w[m + g]))
 
 
 @kernel
@@ -106,7 +106,7 @@ def scaled_norm(h, w, a):
     """Root mean square of the stretch of w from a, in units of the magnitudes."""
     total = 0.0
     for c in range(h[NY]):
-        total += (w[index(a + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+        total += (w[a + c] / w[h[MAGNITUDE] + h[h[GROUPS] + c]]) ** 2
     return np.sqrt(total / h[NY])
 
 
@@ -115,7 +115,7 @@ def finite(h, w, a):
     """Whether the stretch of w from a holds numbers only."""
     result = True
     for c in range(h[NY]):
-        result &= abs(w[index(a + c)]) <= 1e300
+        result &= abs(w[a + c]) <= 1e300
     return result
 
 
@@ -166,15 +166,15 @@ def compose(
     def must_stop(h, w, n, outputs, rows, events):
         """Whether to return now, with the reason in n[STATUS]."""
         c, waiting = h[CONTROL], outputs.shape[0] - n[NEXT_OUTPUT]
-        if w[index(c + TIME)] >= w[index(c + END)]:
+        if w[c + TIME] >= w[c + END]:
             n[STATUS] = SEGMENT_END
         elif n[EVALUATIONS] >= n[CAP]:
             n[STATUS] = CAP_REACHED
         elif n[EVALUATIONS] >= n[BUDGET]:
             n[STATUS] = PAUSED
-        elif w[index(c + BLIND_STEPS)] > MOST_BLIND:
+        elif w[c + BLIND_STEPS] > MOST_BLIND:
             n[STATUS] = AT_SINGULAR
-        elif w[index(h[PIVOT] + LAST_PIVOT)] < w[index(h[PIVOT] + WANTED_PIVOT)]:
+        elif w[h[PIVOT] + LAST_PIVOT] < w[h[PIVOT] + WANTED_PIVOT]:
             n[STATUS] = WORN_ROWS
         elif (
             n[N_RECORDED] + waiting + ROOM > rows.shape[0]
@@ -188,7 +188,7 @@ def compose(
     @kernel
     def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
         """Snapshots at the output times up to t_end, from the dense output."""
-        t = w[index(h[CONTROL] + TIME)]
+        t = w[h[CONTROL] + TIME]
         while n[NEXT_OUTPUT] < outputs.shape[0] and outputs[n[NEXT_OUTPUT]] <= t_end:
             wanted = outputs[n[NEXT_OUTPUT]]
             if wanted > t:
@@ -211,10 +211,10 @@ def compose(
         if not (finite(h, w, slope) and finite(h, w, h[Y_NEW])):
             n[EVALUATION] = NOT_FINITE
             return False
-        w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
-        w[index(c + RATE_DRIFT)] = max(w[index(c + RATE_DRIFT)], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
-        share = TIGHTLY if near(h, w, t_new) else w[index(c + RTOL)]
-        used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[index(c + LENGTH)])
+        w[c + DRIFT] = max(w[c + DRIFT], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
+        w[c + RATE_DRIFT] = max(w[c + RATE_DRIFT], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
+        share = TIGHTLY if near(h, w, t_new) else w[c + RTOL]
+        used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[c + LENGTH])
         note(h, w)
         if used > 0:
             n[EVALUATIONS] += used
@@ -244,9 +244,9 @@ def compose(
         slope = h[SLOPES]
         final = slope + h[NY] * last
         for k in range(h[NY]):
-            w[index(h[Y] + k)] = w[index(h[Y_NEW] + k)]
-            w[index(slope + k)] = w[index(final + k)]
-        w[index(h[CONTROL] + TIME)] = t_new
+            w[h[Y] + k] = w[h[Y_NEW] + k]
+            w[slope + k] = w[final + k]
+        w[h[CONTROL] + TIME] = t_new
         keep_scales(h, w)
 
     @kernel
@@ -254,23 +254,23 @@ def compose(
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
         c = h[CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
-            t = w[index(c + TIME)]
+            t = w[c + TIME]
             if n[FRESH]:
                 if not first_step(h, f, w, n):
                     return
                 note(h, w)
                 forget(h, w, t)
             step = lay(h, w, t)
-            final = t + 1.0001 * step >= w[index(c + END)]
+            final = t + 1.0001 * step >= w[c + END]
             if final:
-                step = w[index(c + END)] - t
-            if not step > SMALLEST_STEP * max(abs(t), w[index(c + SPAN)]):
+                step = w[c + END] - t
+            if not step > SMALLEST_STEP * max(abs(t), w[c + SPAN]):
                 if n[EVALUATION] == NOT_FINITE:
                     n[STATUS] = NOT_A_NUMBER
                 else:
                     n[STATUS] = LOST_CLOSURE if n[EVALUATION] != OK else STEP_TOO_SMALL
                 return
-            t_new = w[index(c + END)] if final else t + step
+            t_new = w[c + END] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
             if norm > allowed(h, w):
                 n[REJECTED] += 1
@@ -283,7 +283,7 @@ def compose(
             if happened < 0:
                 return
             n[STEPS] += 1
-            straddling = w[index(c + STRADDLING)] > 0.0
+            straddling = w[c + STRADDLING] > 0.0
             if straddling:
                 snapshot(h, w, n, rows, t, h[Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)

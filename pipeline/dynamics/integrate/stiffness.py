@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.dynamics.integrate.state import FIXED, STEEPEST, STIFF_STEPS
 from pipeline.dynamics.tables import CONTROL, GROUPS, MAGNITUDE, NQ, NV, NY, SLOPES, Y_NEW, Y_STAGE
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 #: changes of state below this share of the tolerance are rounding, from which no rate can be told
 FELT = 1e-2
@@ -22,8 +22,8 @@ def difference(h, w, first, count, a, b):
     """Norm of the difference of two states or slopes at places a and b of w, variables `first` on, by tolerance."""
     total = 0.0
     for k in range(first, first + count):
-        change = w[index(a + k)] - w[index(b + k)]
-        total += (change / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + k)])]) ** 2
+        change = w[a + k] - w[b + k]
+        total += (change / w[h[MAGNITUDE] + h[h[GROUPS] + k]]) ** 2
     return np.sqrt(total)
 
 
@@ -61,8 +61,8 @@ def detect(method: Any) -> Callable:
     @kernel
     def feel(h, w, n, step):
         rate, c = steepness(h, w, last), h[CONTROL]
-        w[index(c + STEEPEST)] = max(w[index(c + STEEPEST)], rate)
-        share = 1.0 if w[index(c + FIXED)] > 0.0 else SWINGING
+        w[c + STEEPEST] = max(w[c + STEEPEST], rate)
+        share = 1.0 if w[c + FIXED] > 0.0 else SWINGING
         if rate * step > share * reach:
             n[STIFF_STEPS] += 1
 

@@ -27,7 +27,7 @@ from pipeline.dynamics.integrate.state import (
     STRADDLING,
 )
 from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 NEVER = 1e300
 #: a step before the straddling one ends so much nearer than the straddling one needs
@@ -46,17 +46,17 @@ A_LITTLE = 1e-4
 @kernel
 def note(h, w):
     """Remember how independent the closure rows are in the state just evaluated."""
-    w[index(h[CONTROL] + SIGMA)] = np.sqrt(max(w[index(h[PIVOT] + LAST_PIVOT)], 0.0))
+    w[h[CONTROL] + SIGMA] = np.sqrt(max(w[h[PIVOT] + LAST_PIVOT], 0.0))
 
 
 @kernel
 def forget(h, w, t):
     """Begin anew at time t, with no singular pose in sight."""
     c = h[CONTROL]
-    w[index(c + PAST_SIGMA)], w[index(c + PAST_TIME)] = w[index(c + SIGMA)], t
-    w[index(c + PASS_TIME)], w[index(c + STRADDLING)] = NEVER, 0.0
-    blind = w[index(c + SIGMA)] > 0.0 and w[index(c + SIGMA)] ** 2 < BLIND
-    w[index(c + BLIND_STEPS)] = w[index(c + BLIND_STEPS)] + 1.0 if blind else 0.0
+    w[c + PAST_SIGMA], w[c + PAST_TIME] = w[c + SIGMA], t
+    w[c + PASS_TIME], w[c + STRADDLING] = NEVER, 0.0
+    blind = w[c + SIGMA] > 0.0 and w[c + SIGMA] ** 2 < BLIND
+    w[c + BLIND_STEPS] = w[c + BLIND_STEPS] + 1.0 if blind else 0.0
 
 
 @kernel
@@ -78,24 +78,24 @@ def compose(evaluate: Callable) -> Callable:
         Roughly from both ends; when that is near, from the slope at t, by one evaluation a little earlier.
         """
         c = h[CONTROL]
-        sigma, past, span = w[index(c + SIGMA)], w[index(c + PAST_SIGMA)], t - w[index(c + PAST_TIME)]
-        straddled = w[index(c + STRADDLING)] > 0.0
+        sigma, past, span = w[c + SIGMA], w[c + PAST_SIGMA], t - w[c + PAST_TIME]
+        straddled = w[c + STRADDLING] > 0.0
         forget(h, w, t)
         if straddled or not sigma < past:
             return
         rough = sigma * span / (past - sigma)
-        if rough > CLOSELY * max(span, w[index(c + STEP)]):
+        if rough > CLOSELY * max(span, w[c + STEP]):
             return
         back = A_LITTLE * min(span, rough)
         for k in range(h[NY]):
-            w[index(h[Y_STAGE] + k)] = w[index(h[Y] + k)] - back * w[index(h[SLOPES] + k)]
+            w[h[Y_STAGE] + k] = w[h[Y] + k] - back * w[h[SLOPES] + k]
         evaluate(h, f, w, n, t - back, h[Y_STAGE], h[Y_NEW])
         n[EVALUATIONS] += 1
         note(h, w)
-        fall = w[index(c + SIGMA)] - sigma
-        w[index(c + SIGMA)] = sigma
+        fall = w[c + SIGMA] - sigma
+        w[c + SIGMA] = sigma
         if n[EVALUATION] == OK and fall > 0.0:
-            w[index(c + PASS_TIME)] = t + zero_ahead(sigma, fall / back, past, span)
+            w[c + PASS_TIME] = t + zero_ahead(sigma, fall / back, past, span)
 
     return foresee
 
@@ -107,10 +107,10 @@ def steer(h, w, t, step, gap, stretch):
     stretch: how much longer than `step` it may be for that.
     """
     c = h[CONTROL]
-    ahead = w[index(c + PASS_TIME)] - t
-    w[index(c + STRADDLING)] = 0.0
+    ahead = w[c + PASS_TIME] - t
+    w[c + STRADDLING] = 0.0
     if ahead <= stretch * gap * step:
-        w[index(c + STRADDLING)] = 1.0
+        w[c + STRADDLING] = 1.0
         return ahead / gap
     return min(step, max(ahead - MARGIN * gap * step, 0.0))
 
@@ -119,17 +119,17 @@ def steer(h, w, t, step, gap, stretch):
 def plan(h, w, step, following):
     """The step to try next; one that was cut short for a singular pose says little about how long it may be."""
     planned = h[CONTROL] + STEP
-    least = w[index(planned)] if step < CUT * w[index(planned)] else 0.0
-    w[index(planned)] = max(following, least)
+    least = w[planned] if step < CUT * w[planned] else 0.0
+    w[planned] = max(following, least)
 
 
 @kernel
 def allowed(h, w):
     """Largest error norm with which the present step is accepted."""
-    return BLURRED if w[index(h[CONTROL] + STRADDLING)] > 0.0 else 1.0
+    return BLURRED if w[h[CONTROL] + STRADDLING] > 0.0 else 1.0
 
 
 @kernel
 def near(h, w, t):
     """Whether a singular pose is so near that the closures must be closed to rounding."""
-    return w[index(h[CONTROL] + PASS_TIME)] - t < CLOSELY * w[index(h[CONTROL] + STEP)]
+    return w[h[CONTROL] + PASS_TIME] - t < CLOSELY * w[h[CONTROL] + STEP]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.dynamics.loads.fields import LOAD_KINDS
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.vectors import kernel
 
 
 def compose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
@@ -22,8 +22,8 @@ def compose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
     @kernel
     def loads(h, f, w):
         o = h[LOAD_KINDS] + 2 * first
-        begin = h[index(o)]
-        for k in range(begin, begin + h[index(o + 1)]):
+        begin = h[o]
+        for k in range(begin, begin + h[o + 1]):
             head(h, f, w, k)
         tail(h, f, w)
 

@@ -33,7 +33,7 @@ from pipeline.dynamics.tables import (
     site_port,
     wrench,
 )
-from pipeline.dynamics.vectors import accumulate, add, at, at9, axis, cross, dot, index, kernel, put, scale, sub
+from pipeline.dynamics.vectors import accumulate, add, at, at9, axis, cross, dot, kernel, put, scale, sub
 
 LOADS, LOAD_KINDS, LOAD_NUMBERS, LOAD_SLOT = (
     place(name) for name in ("LOADS", "LOAD_KINDS", "LOAD_NUMBERS", "LOAD_SLOT")
@@ -51,19 +51,19 @@ ZERO = (0.0, 0.0, 0.0)
 @kernel
 def field(h, k, which):
     """A field of load k."""
-    return h[index(h[LOADS] + WIDTH * k + which)]
+    return h[h[LOADS] + WIDTH * k + which]
 
 
 @kernel
 def number(h, f, k, which):
     """A number of load k."""
-    return f[index(h[LOAD_NUMBERS] + NUMBERS * k + which)]
+    return f[h[LOAD_NUMBERS] + NUMBERS * k + which]
 
 
 @kernel
 def law(h, w, k, which):
     """Present value of a law of load k."""
-    return w[index(h[LAW] + LAW_SIZE * (field(h, k, LAW0) + which))]
+    return w[h[LAW] + LAW_SIZE * (field(h, k, LAW0) + which)]
 
 
 @kernel
@@ -78,7 +78,7 @@ def push(h, w, s, moment, force):
         bias, first = h[MODAL_BIAS] + flex(h, b, FLEX_C0), port(h, p, PORT_COLUMN)
         for j in range(flex(h, b, N_MODES)):
             o = column(h, first + j)
-            w[index(bias + j)] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)
+            w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)
 
 
 @kernel
@@ -87,11 +87,11 @@ def act(h, w, k, moment, force, value, rate, stored, power, loss):
     o = h[LOAD] + LOAD_SIZE * k
     put(w, o + FORCE, force)
     put(w, o + MOMENT, moment)
-    w[index(o + VALUE)], w[index(o + RATE)], w[index(o + STORED)] = value, rate, stored
-    w[index(o + POWER)], w[index(o + LOSS)] = power, loss
+    w[o + VALUE], w[o + RATE], w[o + STORED] = value, rate, stored
+    w[o + POWER], w[o + LOSS] = power, loss
     ledger = h[LEDGER_RATE] + h[LOAD_SLOT]
-    w[index(ledger)] += power
-    w[index(ledger + 1)] += loss
+    w[ledger] += power
+    w[ledger + 1] += loss
     push(h, w, field(h, k, B), moment, force)
     if field(h, k, A) >= 0:
         push(h, w, field(h, k, A), scale(-1.0, moment), scale(-1.0, force))
@@ -118,5 +118,5 @@ def measure(h, w, k):
 def unwound(h, w, k, angle, rate):
     """The angle of load k with the full turns that it has made; its state follows the rate."""
     turn = field(h, k, TURNS)
-    w[index(h[LEDGER_RATE] + h[LOAD_SLOT] + 2 + turn)] = rate
-    return angle + 2.0 * np.pi * np.round((w[index(h[TURN] + turn)] - angle) / (2.0 * np.pi))
+    w[h[LEDGER_RATE] + h[LOAD_SLOT] + 2 + turn] = rate
+    return angle + 2.0 * np.pi * np.round((w[h[TURN] + turn] - angle) / (2.0 * np.pi))
