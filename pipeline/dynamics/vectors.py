@@ -1,27 +1,13 @@
 """Vector and rotation algebra for compiled kernels, on tuples that live in registers.
 
-A vector is ``(x, y, z)``, a matrix its nine entries row by row. `kernel` is the decorator of
-every compiled function: IEEE division (no exceptions), fused multiply-add and reordered sums
-allowed, NaN and infinity honoured.
+A vector is ``(x, y, z)``, a matrix its nine entries row by row.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from pipeline.dynamics.lowering import KernelCompiler
-
-# No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and C
-# took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
-kernel = njit(
-    error_model="numpy",
-    fastmath={"contract", "reassoc", "nsz"},
-    _nrt=False,
-    no_cfunc_wrapper=True,
-    no_cpython_wrapper=True,
-    pipeline_class=KernelCompiler,
-)
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -6,7 +6,7 @@ Matrices are stored row by row, complex ones as a real and an imaginary matrix. 
 
 from __future__ import annotations
 
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel

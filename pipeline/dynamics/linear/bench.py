@@ -11,13 +11,13 @@ import xarray as xr
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly import initial, selection
-from pipeline.dynamics.assembly.numbers import tabulate
-from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.integrate import singular
-from pipeline.dynamics.integrate.engine import Engine, Progress, observe, prepare
-from pipeline.dynamics.tables import MODE, OK, PIECE_SIZE
+from pipeline.dynamics.model import initial, selection
+from pipeline.dynamics.model.mechanism import build
+from pipeline.dynamics.model.model import tabulate
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine, Progress, observe, prepare
 
 #: impact rate that a contact is given: at rest the hysteresis of an impact long past has no say
 NO_IMPACT = 1e300
@@ -43,7 +43,7 @@ class Bench:
     @property
     def contacts(self) -> int:
         """Number of clearance joints."""
-        return self.engine.built.packed.sizes["N_CONTACTS"]
+        return self.engine.built.packed.size(m.N_CONTACTS)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def hold(
     """
     driven, given = scene, dict[str, Pieces]()
     if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
-        from pipeline.dynamics.inverse import actuated
+        from pipeline.dynamics.run.inverse import actuated
 
         driven, given = actuated(scene, bundles, progress)
     built = tabulate(build(driven, bundles), given)
@@ -96,10 +96,10 @@ def hold(
             raise InputError(f"drive '{name}'", "there is no such drive", remedy)
         k = built.system.drives.index(name)
         last[k, 0] = sense(engine)[k] * value
-    engine.n[engine.n[MODE] : engine.n[MODE] + packed.sizes["N_CONTACTS"]] = 1
-    engine.view("LATCHED", packed.sizes["N_CONTACTS"])[:] = NO_IMPACT
+    engine.n[engine.n[m.MODE] : engine.n[m.MODE] + packed.size(m.N_CONTACTS)] = 1
+    engine.view(m.LATCHED, packed.size(m.N_CONTACTS))[:] = NO_IMPACT
     first[:, 1] = 0.0
-    bench = Bench(scene, engine, at, first, np.zeros(packed.sizes["N_TURNS"]))
+    bench = Bench(scene, engine, at, first, np.zeros(packed.size(m.N_TURNS)))
     set_drives(bench, first)
     state = initial.start_state(built)
     q = carry(bench, closed(bench, state[: built.layout.nq]), last[:, 0])
@@ -120,17 +120,17 @@ def drive_state(engine: Engine, time: float) -> np.ndarray:
     # the laws say so on their way to any evaluation; the pose does not matter
     engine.evaluate(initial.start_state(engine.built), time)
     nq, nv, known = engine.built.layout.nq, engine.built.layout.nv, engine.built.layout.known
-    return np.stack([engine.view("X", nq + known)[nq:], engine.view("U", nv + known)[nv:]], axis=1)
+    return np.stack([engine.view(m.X, nq + known)[nq:], engine.view(m.U, nv + known)[nv:]], axis=1)
 
 
 def set_drives(bench: Bench, drives: np.ndarray) -> None:
     """Replace every drive's law by the straight one through a position, with a speed, at the bench's time."""
     packed = bench.engine.built.packed
-    for (first, count), (position, speed) in zip(packed.table("LAWS"), drives, strict=False):
-        straight = np.zeros(PIECE_SIZE)
-        straight[:3] = bench.time, position, speed
-        packed.table("PIECES")[first : first + count] = straight
-        selection.view(packed, bench.engine.h, "PIECE_HARMONICS")[first : first + count, 1] = 0
+    for (first, count), (position, speed) in zip(packed.table(m.LAWS), drives, strict=False):
+        straight = np.zeros(1, dtype=m.row_type(m.PIECES))
+        straight["start"], straight["coefficients"][:, :2] = bench.time, (position, speed)
+        packed.table(m.PIECES)[first : first + count] = straight
+        packed.table(m.PIECE_HARMONICS, bench.engine.h)["n_harmonics"][first : first + count] = 0
     bench.engine.select_pieces(bench.time)
 
 
@@ -156,7 +156,7 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarray:
     """State vector with positions q and speeds v (at rest when None)."""
-    y = np.zeros(bench.engine.built.packed.sizes["NY"])
+    y = np.zeros(bench.engine.built.packed.size(m.NY))
     nq, nv = bench.engine.built.layout.nq, bench.engine.built.layout.nv
     y[:nq] = q
     if v is not None:
@@ -175,13 +175,11 @@ def seen(bench: Bench, states: np.ndarray) -> dict[str, np.ndarray]:
 def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
     """Positions with the loops closed, loads following their angles; SolverError when that fails."""
     found = seen(bench, state(bench, q)[None, :])
-    if found["status"][0, 0] != OK:
+    if found["status"][0, 0] != m.OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
     if len(bench.turns):
-        from pipeline.dynamics.loads.fields import TURNS, VALUE
-
-        turn = bench.engine.built.packed.table("LOADS")[:, TURNS]
-        bench.turns[turn[turn >= 0]] = found["load"][0].reshape(len(turn), -1)[turn >= 0, VALUE]
+        turn = bench.engine.built.packed.table(m.LOADS)["turns"]
+        bench.turns[turn[turn >= 0]] = m.named(m.LOAD, found["load"][0])["value"][turn >= 0]
     return found["state"][0, : len(q)].copy()
 
 
@@ -195,12 +193,12 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
-    sizes, nv = engine.built.packed.sizes, engine.built.layout.nv
+    packed, nv = engine.built.packed, engine.built.layout.nv
     return Balance(
-        engine.view("BIAS", nv).copy(),
+        engine.view(m.BIAS, nv).copy(),
         _mass(engine),
-        engine.rows("JACOBIAN"),
-        engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"])[selection.kept_places(engine.built, engine.h)],
+        engine.rows(m.JACOBIAN),
+        engine.view(m.RESIDUAL_RATE, packed.size(m.N_CLOSURE_ROWS))[selection.kept_places(engine.built, engine.h)],
     )
 
 
@@ -208,7 +206,7 @@ def _mass(engine: Engine) -> np.ndarray:
     """M = L L^T from the factor that the last evaluation left in its envelope."""
     packed = engine.built.packed
     L = np.zeros((engine.built.layout.nv,) * 2)
-    entries = engine.view("MASS", packed.sizes["MASS_SIZE"])
-    for i, (first, start) in enumerate(packed.table("ENVELOPE")):
+    entries = engine.view(m.MASS, packed.size(m.MASS_SIZE))
+    for i, (first, start) in enumerate(packed.table(m.ENVELOPE)):
         L[i, first : i + 1] = entries[start : start + i + 1 - first]
     return L @ L.T

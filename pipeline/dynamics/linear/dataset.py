@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
-from pipeline.dynamics.integrate import state as slots
-from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import NO_IMPACT, Bench, seen, state
 from pipeline.dynamics.linear.settle import Settled
 from pipeline.dynamics.linear.shares import by_body
@@ -17,7 +16,8 @@ from pipeline.dynamics.linear.vibrations import Vibrations
 from pipeline.dynamics.record.dataset import attributes, dataset
 from pipeline.dynamics.record.frames import frame_velocities
 from pipeline.dynamics.record.motion import link_motions
-from pipeline.dynamics.run import Run
+from pipeline.dynamics.run.run import Run
+from pipeline.dynamics.run.trajectory import Trajectory
 
 PARTS = ("real", "imaginary")
 
@@ -29,7 +29,7 @@ def equilibrium(bench: Bench, found: Settled, moving: bool) -> xr.Dataset:
     ahead = [np.full((1, 1), bench.time), np.ones((1, contacts)), np.full((1, contacts), NO_IMPACT)]
     once = Trajectory(
         np.hstack([*ahead, rows["state"]]),
-        np.zeros((0, slots.EVENT_SIZE)),
+        np.zeros((0, m.EVENT.size)),
         {},
         ((bench.time, bench.engine.kept.copy()),),
     )

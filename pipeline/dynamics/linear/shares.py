@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.model.model import Tables
 from pipeline.dynamics.record.motion import Motion, body_motions, modal
 
 Seen = dict[str, np.ndarray]

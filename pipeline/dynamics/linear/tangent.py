@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import Bench, balance, displacement_map
 from pipeline.dynamics.linear.differences import Rounding, derivative
 
@@ -70,8 +71,8 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 def scales(bench: Bench) -> np.ndarray:
     """Size of a large displacement of every coordinate: the mechanism's size, or a radian; shape (nv,)."""
     packed, layout = bench.engine.built.packed, bench.engine.built.layout
-    groups = packed.table("GROUPS")[layout.nq : layout.nq + layout.nv, 0]
-    return packed.table("FLOORS")[groups, 0]
+    groups = packed.table(m.GROUPS)["group"][layout.nq : layout.nq + layout.nv]
+    return packed.table(m.FLOORS)["magnitude"][groups]
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,21 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.driving import joint_class
-from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.assembly.tree import PATH
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import (
-    ACCELERATION,
-    ALPHA,
-    AXES,
-    FRAME_SIZE,
-    OMEGA,
-    ORIGIN,
-    SITE_A,
-    SITE_B,
-    VELOCITY,
-)
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.model.tree import PATH
 
 Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
 
@@ -69,22 +59,28 @@ def _in_order(built: Tables, found: dict[str, Series]) -> list[str]:
 
 def _measured(built: Tables, seen: dict[str, np.ndarray], row: int, coordinate: Coordinate) -> Series:
     """Coordinate of a joint that closes a loop, from the frames of its two sites."""
-    sites = seen["site_frame"].reshape(len(seen["site_frame"]), -1, FRAME_SIZE)
-    a, b = (sites[:, built.packed.table("CLOSURES")[row, side]] for side in (SITE_A, SITE_B))
-    F, G = (x[:, AXES : AXES + 9].reshape(-1, 3, 3) for x in (a, b))
+    sites = seen["site_frame"].reshape(len(seen["site_frame"]), -1, m.FRAME.size)
+    a, b = (sites[:, built.packed.table(m.CLOSURES)[side][row]] for side in ("site_a", "site_b"))
+    F, G = (x[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3) for x in (a, b))
     along = (G if coordinate.side else F)[:, :, coordinate.axis]
-    omega = a[:, OMEGA : OMEGA + 3]
-    turning = b[:, OMEGA : OMEGA + 3] - omega
+    omega = a[:, m.FRAME.omega : m.FRAME.omega + 3]
+    turning = b[:, m.FRAME.omega : m.FRAME.omega + 3] - omega
     if coordinate.turning:
         R = np.einsum("tki,tkj->tij", F, G)
         (i, j), (k, l) = coordinate.sine, coordinate.cosine
         angle = np.unwrap(np.arctan2(R[:, i, j], R[:, k, l]))
-        swing = np.cross((b if coordinate.side else a)[:, OMEGA : OMEGA + 3], along)
-        second = b[:, ALPHA : ALPHA + 3] - a[:, ALPHA : ALPHA + 3]
+        swing = np.cross((b if coordinate.side else a)[:, m.FRAME.omega : m.FRAME.omega + 3], along)
+        second = b[:, m.FRAME.alpha : m.FRAME.alpha + 3] - a[:, m.FRAME.alpha : m.FRAME.alpha + 3]
         return angle, _dot(along, turning), _dot(along, second) + _dot(swing, turning)
-    r, v, acceleration = (b[:, o : o + 3] - a[:, o : o + 3] for o in (ORIGIN, VELOCITY, ACCELERATION))
+    r, v, acceleration = (
+        b[:, o : o + 3] - a[:, o : o + 3] for o in (m.FRAME.origin, m.FRAME.velocity, m.FRAME.acceleration)
+    )
     slide = v - np.cross(omega, r)
-    second = acceleration - np.cross(a[:, ALPHA : ALPHA + 3], r) - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
+    second = (
+        acceleration
+        - np.cross(a[:, m.FRAME.alpha : m.FRAME.alpha + 3], r)
+        - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
+    )
     return _dot(along, r), _dot(along, slide), _dot(along, second)
 
 

@@ -12,34 +12,24 @@ import xarray as xr
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.integrate import state
-from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Tables
 from pipeline.dynamics.record import ledger
 from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
-from pipeline.dynamics.run import Run
-from pipeline.dynamics.tables import (
-    FRICTION_POWER,
-    GAP,
-    NORMAL_FORCE,
-    RATE,
-    SLIP,
-    TOUCH_FORCE,
-    TOUCH_OFFSET,
-    TOUCH_SIZE,
-)
+from pipeline.dynamics.run.run import Run
+from pipeline.dynamics.run.trajectory import Trajectory
 
 #: event kinds by their flag values; 0 and 1 as ever
 EVENT_KINDS = ("opening", "closing", "compression", "sticking", "slipping")
 _FLAGS = {
-    state.OPENING: "opening",
-    state.CLOSING: "closing",
-    state.COMPRESSION: "compression",
-    state.STICKING: "sticking",
-    state.SLIPPING: "slipping",
+    m.OPENING: "opening",
+    m.CLOSING: "closing",
+    m.COMPRESSION: "compression",
+    m.STICKING: "sticking",
+    m.SLIPPING: "slipping",
 }
 
 Seen = dict[str, np.ndarray]
@@ -128,8 +118,8 @@ def _contact_warnings(built: Tables, trajectory: Trajectory) -> list[str]:
 
     e, found = trajectory.events, []
     for c, ((name, joint, _, _), law) in enumerate(zip(built.system.contacts, built.laws, strict=True)):
-        mine = e[e[:, state.EVENT_CONTACT] == c]
-        depth, force = np.fmax.reduce(mine[:, [state.PEAK_DEPTH, state.PEAK_FORCE]], axis=0, initial=0.0)
+        mine = e[e[:, m.EVENT.contact] == c]
+        depth, force = np.fmax.reduce(mine[:, [m.EVENT.peak_depth, m.EVENT.peak_force]], axis=0, initial=0.0)
         found += validity.warnings(name, joint, law, float(depth), float(force))
     return found
 
@@ -239,18 +229,18 @@ def _loads(built: Tables, seen: Seen, variables: Variables, coordinates: dict[st
 
 
 def _contacts(built: Tables, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
-    touch = seen["touch"].reshape(len(seen["touch"]), -1, TOUCH_SIZE)
+    touch = seen["touch"].reshape(len(seen["touch"]), -1, m.TOUCH.size)
     coordinates["contact"] = [name for name, *_ in built.system.contacts]
     scalars = {
-        "contact_gap": touch[..., GAP],
-        "contact_penetration": np.maximum(0.0, -touch[..., GAP]),
-        "contact_rate": touch[..., RATE],
-        "contact_normal_force": touch[..., NORMAL_FORCE],
-        "contact_friction_power": touch[..., FRICTION_POWER],
-        "contact_sliding_speed": touch[..., SLIP],
+        "contact_gap": touch[..., m.TOUCH.gap],
+        "contact_penetration": np.maximum(0.0, -touch[..., m.TOUCH.gap]),
+        "contact_rate": touch[..., m.TOUCH.rate],
+        "contact_normal_force": touch[..., m.TOUCH.normal_force],
+        "contact_friction_power": touch[..., m.TOUCH.friction_power],
+        "contact_sliding_speed": touch[..., m.TOUCH.slip],
     }
     variables.update({name: (("time", "contact"), values) for name, values in scalars.items()})
-    for name, o in (("contact_force", TOUCH_FORCE), ("contact_offset", TOUCH_OFFSET)):
+    for name, o in (("contact_force", m.TOUCH.force), ("contact_offset", m.TOUCH.offset)):
         variables[name] = (("time", "contact", "axis"), touch[..., o : o + 3])
     variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in built.laws]))
 
@@ -258,12 +248,12 @@ def _contacts(built: Tables, seen: Seen, variables: Variables, coordinates: dict
 def _events(trajectory: Trajectory, variables: Variables) -> None:
     e = trajectory.events
     columns = {
-        "event_time": e[:, state.EVENT_TIME],
-        "event_contact": e[:, state.EVENT_CONTACT].astype(np.int32),
-        "event_kind": np.array([EVENT_KINDS.index(_FLAGS[int(k)]) for k in e[:, state.EVENT_KIND]], dtype=np.int8),
-        "event_approach_speed": e[:, state.SPEED],
-        "event_peak_force": e[:, state.PEAK_FORCE],
-        "event_peak_penetration": e[:, state.PEAK_DEPTH],
-        "event_duration": e[:, state.DURATION],
+        "event_time": e[:, m.EVENT.time],
+        "event_contact": e[:, m.EVENT.contact].astype(np.int32),
+        "event_kind": np.array([EVENT_KINDS.index(_FLAGS[int(k)]) for k in e[:, m.EVENT.kind]], dtype=np.int8),
+        "event_approach_speed": e[:, m.EVENT.speed],
+        "event_peak_force": e[:, m.EVENT.peak_force],
+        "event_peak_penetration": e[:, m.EVENT.peak_depth],
+        "event_duration": e[:, m.EVENT.duration],
     }
     variables.update({name: (("event",), values) for name, values in columns.items()})

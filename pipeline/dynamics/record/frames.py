@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.assembly.flexible_numbers import bow
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.model.flexible_bodies import bow
+from pipeline.dynamics.model.model import Tables
 from pipeline.dynamics.record.deformation import shift
 from pipeline.dynamics.record.motion import Motion, modal
 

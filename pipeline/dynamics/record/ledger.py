@@ -6,20 +6,9 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.solver import Solver
-from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.integrate.trajectory import Trajectory
-from pipeline.dynamics.tables import (
-    BENT,
-    CONTACT_SLOTS,
-    DAMPING_LOSS,
-    DRIVE_WORK,
-    FRICTION_LOSS,
-    IMPULSE,
-    MODAL_LOSS,
-    PER_CONTACT,
-    STORED,
-    TOUCH_SIZE,
-)
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.run.trajectory import Trajectory
 
 Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -39,18 +28,18 @@ def series(built: Tables, seen: Seen) -> Variables:
     ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
     kinetic, potential, elastic = seen["energy"].T
     contacts = len(built.system.contacts)
-    touch = seen["touch"].reshape(len(ledger), contacts, TOUCH_SIZE)
-    slots = ledger[:, CONTACT_SLOTS : CONTACT_SLOTS + PER_CONTACT * contacts].reshape(
-        len(ledger), contacts, PER_CONTACT
+    touch = seen["touch"].reshape(len(ledger), contacts, m.TOUCH.size)
+    slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.PER_CONTACT * contacts].reshape(
+        len(ledger), contacts, m.PER_CONTACT
     )
     # friction's slot is its work; what bent bristles still hold of it is not lost
-    damping, friction = slots[..., DAMPING_LOSS], slots[..., FRICTION_LOSS] - touch[..., BENT]
-    work, modal = ledger[:, DRIVE_WORK], ledger[:, MODAL_LOSS]
+    damping, friction = slots[..., m.DAMPING_LOSS], slots[..., m.FRICTION_LOSS] - touch[..., m.TOUCH.bent]
+    work, modal = ledger[:, m.DRIVE_WORK], ledger[:, m.MODAL_LOSS]
     dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
     balance = kinetic + potential + elastic + dissipated - work
     loaded: Variables = {}
     if built.system.scene.forces():
-        load_work, load_loss = ledger[:, built.packed.sizes["LOAD_SLOT"] :].T[:2]
+        load_work, load_loss = ledger[:, built.packed.size(m.LOAD_SLOT) :].T[:2]
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
     found: Variables = {
@@ -66,9 +55,9 @@ def series(built: Tables, seen: Seen) -> Variables:
     if built.layout.modes:
         found["modal_damping_loss"] = (("time",), modal)
     if contacts:
-        found["contact_elastic"] = (("time", "contact"), touch[..., STORED] + touch[..., BENT])
+        found["contact_elastic"] = (("time", "contact"), touch[..., m.TOUCH.stored] + touch[..., m.TOUCH.bent])
         found["contact_damping_loss"] = (("time", "contact"), damping)
-        found["contact_impulse"] = (("time", "contact"), slots[..., IMPULSE])
+        found["contact_impulse"] = (("time", "contact"), slots[..., m.IMPULSE])
         found["contact_friction_loss"] = (("time", "contact"), friction)
     return found
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics.assembly.flexible_numbers import bow
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.flexible_bodies import bow
+from pipeline.dynamics.model.model import Tables
 from pipeline.dynamics.record.deformation import shift
-from pipeline.dynamics.tables import ACCELERATION, ALPHA, AXES, FRAME_SIZE, OMEGA, ORIGIN, VELOCITY
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,16 @@ class Motion:
 
 def link_motions(built: Tables, frames: np.ndarray) -> list[Motion]:
     """Motion of every link's frame, gravity's upward acceleration of the ground taken out."""
-    gravity = built.packed.table("GRAVITY")[0]
-    frames = frames.reshape(len(frames), -1, FRAME_SIZE)
+    gravity = built.packed.table(m.GRAVITY)["acceleration"][0]
+    frames = frames.reshape(len(frames), -1, m.FRAME.size)
     found = []
     for i in range(frames.shape[1]):
         f = frames[:, i]
-        R = f[:, AXES : AXES + 9].reshape(-1, 3, 3)
-        p, omega, v, alpha, a = (f[:, o : o + 3] for o in (ORIGIN, OMEGA, VELOCITY, ALPHA, ACCELERATION))
+        R = f[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3)
+        p, omega, v, alpha, a = (
+            f[:, o : o + 3]
+            for o in (m.FRAME.origin, m.FRAME.omega, m.FRAME.velocity, m.FRAME.alpha, m.FRAME.acceleration)
+        )
         found.append(Motion(p, R, v, omega, a + gravity, alpha))
     return found
 

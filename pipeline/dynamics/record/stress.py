@@ -20,7 +20,8 @@ import xarray as xr
 
 from pipeline.core.algebra import skew
 from pipeline.core.errors import InputError
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Tables
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal
 from pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
 
@@ -152,7 +153,7 @@ def _turn(v: np.ndarray) -> np.ndarray:
 def _motion_and_loads(built: Tables, seen: Seen, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
     link = built.system.link_of[name]
     frame, state = link_motions(built, seen["link_frame"])[link], modal(built, link, seen)
-    gravity = built.packed.table("GRAVITY")[0]
+    gravity = built.packed.table(m.GRAVITY)["acceleration"][0]
     R_BW = np.swapaxes(frame.R, 1, 2)
     a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - gravity, frame.omega, frame.alpha))
     names = [f"{name}.{label}" for label in built.system.bundles[name]["frame"].values]

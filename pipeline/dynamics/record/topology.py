@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics.assembly import selection
-from pipeline.dynamics.integrate import singular
-from pipeline.dynamics.integrate.engine import Engine
-from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import selection
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
@@ -129,13 +130,13 @@ def _between(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int
     states, rates = trajectory.rows[nodes, first:], []
     for t, y in zip(times[nodes], states, strict=True):
         engine.attempt(y, float(t))
-        rates.append(engine.view("SLOPES", len(y)).copy())
+        rates.append(engine.view(m.SLOPES, len(y)).copy())
     values = np.stack([states, np.array(rates) * (end - start)], axis=1).reshape(-1, states.shape[1])
     path = KroghInterpolator(np.repeat((times[nodes] - start) / (end - start), 2), values)
 
     def jacobian(share: float) -> np.ndarray:
         engine.attempt(path(share), start + share * (end - start))
-        return singular.scaled(engine.built, engine.h, engine.rows("JACOBIAN"))
+        return singular.scaled(engine.built, engine.h, engine.rows(m.JACOBIAN))
 
     return jacobian
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Tables
 from pipeline.dynamics.record.motion import Motion
-from pipeline.dynamics.tables import TOUCH_FORCE, TOUCH_POINT, TOUCH_SIZE
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
 
@@ -61,11 +61,11 @@ def _closures(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
 
 
 def _contacts(built: Tables, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
-    touch = seen["touch"].reshape(len(seen["touch"]), -1, TOUCH_SIZE)
+    touch = seen["touch"].reshape(len(seen["touch"]), -1, m.TOUCH.size)
     found = {}
     for c, (name, *_) in enumerate(built.system.contacts):
-        force = touch[:, c, TOUCH_FORCE : TOUCH_FORCE + 3]
-        found[name] = (np.cross(touch[:, c, TOUCH_POINT : TOUCH_POINT + 3], force), force)
+        force = touch[:, c, m.TOUCH.force : m.TOUCH.force + 3]
+        found[name] = (np.cross(touch[:, c, m.TOUCH.point : m.TOUCH.point + 3], force), force)
     return found
 
 
@@ -110,7 +110,7 @@ def _demand(
     if isinstance(body, RigidBody):
         motion = bodies[name]
         J = motion.R @ np.array(body.inertia) @ np.swapaxes(motion.R, 1, 2)
-        force = body.mass * (motion.a - built.packed.table("GRAVITY")[0])
+        force = body.mass * (motion.a - built.packed.table(m.GRAVITY)["acceleration"][0])
         spin = np.einsum("tij,tj->ti", J, motion.omega)
         moment = np.einsum("tij,tj->ti", J, motion.alpha) + np.cross(motion.omega, spin) + np.cross(motion.p, force)
     for joint_name, (n, f) in known.items():
