@@ -106,7 +106,7 @@ def trajectory(engine: Engine) -> Trajectory:
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
     """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
-    contacts = engine.built.packed.size(m.N_CONTACTS)
+    contacts = engine.model.arrays.size(m.N_CONTACTS)
     modes = run.rows[:, 1 : 1 + contacts]
     found = {"free": np.flatnonzero(~np.any(modes == 1.0, axis=1))}
     if contacts:

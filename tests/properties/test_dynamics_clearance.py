@@ -20,7 +20,7 @@ from pipeline.dynamics.contact import forces, friction
 from pipeline.dynamics.contact import form as forms
 from pipeline.dynamics.equations import choice as dispatch
 from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Tables, tabulate
+from pipeline.dynamics.model.model import Model, tabulate
 from tests.properties.kernels import from_python
 
 FRICTION: dict[str, dict[str, Any]] = {
@@ -43,7 +43,7 @@ Laws = tuple[str, str | None, str]
 
 
 @cache
-def tables_of(laws: Laws) -> Tables:
+def tables_of(laws: Laws) -> Model:
     """A free ball in a free socket."""
     contact: dict[str, Any] = {
         "type": laws[2],
@@ -82,7 +82,7 @@ class Touch:
 
     def __init__(self, laws: Laws, seed: int, depth: float, slip: float, together: bool = False) -> None:
         random = np.random.default_rng(seed)
-        packed = tables_of(laws).packed
+        packed = tables_of(laws).arrays
         w, n = packed.work_space()
         n[n[m.MODE]] = 1
         turned = rotation_vector_to_matrix(random.normal(size=3))

@@ -55,7 +55,7 @@ def test_a_right_hand_side_that_is_no_number_is_refused(solver: dict[str, Any]) 
     scene = Scene.model_validate({**double_pendulum(), "solver": {"rtol": 1e-6, **solver}})
     engine = engine_with(scene)
     start, _ = consistent_start(engine)
-    engine.built.packed.table(m.GRAVITY)["acceleration"] = np.nan
+    engine.model.arrays.table(m.GRAVITY)["acceleration"] = np.nan
     with pytest.raises(SolverError, match="not a number"):
         stepping.integrate(engine, start, lambda share, text: None)
 

@@ -162,7 +162,7 @@ ROWS = "time,other,angle\n# a remark\n0,9,0\n400,9,20\n1000,9,90\n"
 
 
 def values(path: Path) -> np.ndarray:
-    packed = tabulate(build(load_scene(path), {})).packed
+    packed = tabulate(build(load_scene(path), {})).arrays
     pieces = packed.table(m.PIECES)
     return np.column_stack([pieces["start"], pieces["coefficients"][:, 0]])
 

@@ -49,10 +49,10 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
     """Integer that the C function at `address` returns for a tuple; of its arrays it gets the first entries' places."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        where, packed = values
+        where, arrays = values
         given = []
         for k in range(len(arguments.types)):
-            value = builder.extract_value(packed, k)
+            value = builder.extract_value(arrays, k)
             given.append(value)
         function = ir.FunctionType(ir.IntType(64), [value.type for value in given])
         return builder.call(builder.inttoptr(where, function.as_pointer()), given)

@@ -68,15 +68,15 @@ def settle(bench: Bench, q: np.ndarray) -> Settled:
 
 def weight(bench: Bench) -> float:
     """Norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
-    packed = bench.engine.built.packed
-    mass = packed.table(m.LINK_NUMBERS)["mass"].sum() + packed.table(m.FLEX_NUMBERS)["mass"].sum()
-    return float(np.sqrt(mass) * np.linalg.norm(packed.table(m.GRAVITY)["acceleration"][0]))
+    arrays = bench.engine.model.arrays
+    mass = arrays.table(m.LINK_NUMBERS)["mass"].sum() + arrays.table(m.FLEX_NUMBERS)["mass"].sum()
+    return float(np.sqrt(mass) * np.linalg.norm(arrays.table(m.GRAVITY)["acceleration"][0]))
 
 
 def residual(bench: Bench, at: Tangent) -> float:
     """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
     forces = at.mass @ at.Z @ at.unbalanced
-    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.built.system.length
+    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.model.mechanism.length
 
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:

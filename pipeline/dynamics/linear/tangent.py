@@ -70,9 +70,9 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 
 def scales(bench: Bench) -> np.ndarray:
     """Size of a large displacement of every coordinate: the mechanism's size, or a radian; shape (nv,)."""
-    packed, layout = bench.engine.built.packed, bench.engine.built.layout
-    groups = packed.table(m.GROUPS)["group"][layout.nq : layout.nq + layout.nv]
-    return packed.table(m.FLOORS)["magnitude"][groups]
+    arrays, numbering = bench.engine.model.arrays, bench.engine.model.numbering
+    groups = arrays.table(m.GROUPS)["group"][numbering.nq : numbering.nq + numbering.nv]
+    return arrays.table(m.FLOORS)["magnitude"][groups]
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -68,13 +68,13 @@ def pack(
     """
     h = np.zeros(m.HEADER, dtype=np.int64)
     counts: dict[Any, int] = {}
-    packed: dict[str, list[np.ndarray]] = {"h": [h], "f": []}
+    arrays: dict[str, list[np.ndarray]] = {"h": [h], "f": []}
     for array, start in (("h", m.HEADER), ("f", 0)):
         for table in m.TABLES[array]:
             found = rows(table, tables[table])
             counts[table], h[table.place] = len(found), start
             start += found.size
-            packed[array].append(found.ravel())
+            arrays[array].append(found.ravel())
     for place, size in (_sizes(counts, tables) | dict(sizes)).items():
         h[place] = size
     start = 0
@@ -82,7 +82,7 @@ def pack(
         h[place] = start
         start += length
     integers = m.INTEGERS + int(h[m.N_LAWS] + h[m.N_CONTACTS])
-    return Arrays(np.concatenate(packed["h"]), np.concatenate(packed["f"]), start, integers)
+    return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), start, integers)
 
 
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:

@@ -14,7 +14,7 @@ from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.chain import path_positions
 from pipeline.dynamics.model.constraints import NONE, Constraint, constraints, demands, massless, prescribed
 from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.mechanism import Link, System
+from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.tree import PATH
 
@@ -45,7 +45,7 @@ class Misfit:
         return float(np.max(np.abs(self.values), initial=0.0))
 
 
-def assembled(system: System, given: Mapping[str, Pieces] = NONE) -> System:
+def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
     """The system with links placed so that all joints fit and driven ones stand where their drives say.
 
     Raises InputError for joints whose frames start far apart or face each other the wrong way, and
@@ -53,41 +53,41 @@ def assembled(system: System, given: Mapping[str, Pieces] = NONE) -> System:
     or paths is only checked: deformation and prescribed poses are part of its closing, which the engine does.
     given: laws that replace the scene's.
     """
-    joints, poses = constraints(system, given), [link.start for link in system.links]
-    _refuse_apart(system, joints, poses)
+    joints, poses = constraints(mechanism, given), [link.start for link in mechanism.links]
+    _refuse_apart(mechanism, joints, poses)
     _refuse_opposite(joints, poses)
-    system = replace(system, start_residual=max(residuals(joints, poses).values(), default=0.0))
-    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in system.links)
-    if paths or any(link.flexible for link in system.links):
-        return settled(system, poses)
-    closed = close(system, joints, poses)
+    mechanism = replace(mechanism, start_residual=max(residuals(joints, poses).values(), default=0.0))
+    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in mechanism.links)
+    if paths or any(link.flexible for link in mechanism.links):
+        return settled(mechanism, poses)
+    closed = close(mechanism, joints, poses)
     if closed is None:
-        _refuse_drives(system, joints, poses)
-        raise _impossible(system, joints, poses)
-    return settled(system, closed)
+        _refuse_drives(mechanism, joints, poses)
+        raise _impossible(mechanism, joints, poses)
+    return settled(mechanism, closed)
 
 
-def close(system: System, joints: list[Constraint], poses: Sequence[Placement]) -> list[Placement] | None:
+def close(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> list[Placement] | None:
     """Poses nearby, in the metric of the mass, in which all joints fit; None when there are none.
 
     Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints ask for the
     same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
     """
     here = list(poses)
-    now = misfit(system, joints, here)
+    now = misfit(mechanism, joints, here)
     if now.worst <= EXACT:
         return here
     from scipy.sparse.linalg import spsolve  # slow to import, and most scenes give poses that fit
 
-    mobility = diags_array(_mobilities(system, here))
+    mobility = diags_array(_mobilities(mechanism, here))
     damping = 1.0
     for _ in range(ITERATIONS):
         G = now.gradient @ mobility
         normal, rows = G @ now.gradient.T, len(now.values)
         scale = damping * float(np.linalg.norm(now.values)) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
-        there = _moved(system, here, step)
-        then = misfit(system, joints, there)
+        there = _moved(mechanism, here, step)
+        then = misfit(mechanism, joints, there)
         if np.linalg.norm(then.values) < np.linalg.norm(now.values):
             here, now, damping = there, then, 0.1 * damping
         else:
@@ -97,15 +97,15 @@ def close(system: System, joints: list[Constraint], poses: Sequence[Placement]) 
     return here if now.worst <= CLOSED else None
 
 
-def misfit(system: System, joints: list[Constraint], poses: Sequence[Placement]) -> Misfit:
+def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Misfit:
     """Residuals of all joints and driven coordinates.
 
     Motions: per link but the ground its small rotation about its centre of mass, and that centre's displacement in
     units of the mechanism's size.
     """
-    L = system.length
+    L = mechanism.length
     values, blocks, row = [], list[tuple[np.ndarray, int, int]](), 0
-    centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(system.links, poses, strict=True)]
+    centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(mechanism.links, poses, strict=True)]
     for joint in joints:
         A, B = joint.frames(poses)
         parts = [demands(joint.edge.kind, A, B)]
@@ -120,7 +120,7 @@ def misfit(system: System, joints: list[Constraint], poses: Sequence[Placement])
                 if link:  # the ground does not move
                     blocks.append((block, row, 6 * (link - 1)))
             row += len(wrench)
-    shape = (row, 6 * (len(system.links) - 1))
+    shape = (row, 6 * (len(mechanism.links) - 1))
     return Misfit(np.concatenate([*values, np.zeros(0)]), _sparse(blocks, shape))
 
 
@@ -136,12 +136,12 @@ def _centre(link: Link) -> np.ndarray:
     return link.inertia[1] if link.inertia is not None else np.zeros(3)
 
 
-def _mobilities(system: System, poses: Sequence[Placement]) -> np.ndarray:
+def _mobilities(mechanism: Mechanism, poses: Sequence[Placement]) -> np.ndarray:
     """Inverse of mass and least principal moment of inertia per motion, shape (6 (links - 1),)."""
-    L, result = system.length, []
-    masses = [_mass(system, link) for link in system.links[1:]]
+    L, result = mechanism.length, []
+    masses = [_mass(mechanism, link) for link in mechanism.links[1:]]
     largest = max(masses, default=1.0)
-    for link, mass in zip(system.links[1:], masses, strict=True):
+    for link, mass in zip(mechanism.links[1:], masses, strict=True):
         if massless(link):
             result += [0.0] * 6
             continue
@@ -150,33 +150,35 @@ def _mobilities(system: System, poses: Sequence[Placement]) -> np.ndarray:
     return np.array(result)
 
 
-def _mass(system: System, link: Link) -> float:
+def _mass(mechanism: Mechanism, link: Link) -> float:
     if link.inertia is not None:
         return link.inertia[0]
-    return 0.0 if massless(link) else float(system.bundles[str(link.flexible)]["mass"])
+    return 0.0 if massless(link) else float(mechanism.bundles[str(link.flexible)]["mass"])
 
 
-def _moved(system: System, poses: list[Placement], step: np.ndarray) -> list[Placement]:
+def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> list[Placement]:
     moved = [poses[0]]
-    for i, link in enumerate(system.links[1:], start=1):
-        turn, shift = step[6 * i - 6 : 6 * i - 3], system.length * step[6 * i - 3 : 6 * i]
+    for i, link in enumerate(mechanism.links[1:], start=1):
+        turn, shift = step[6 * i - 6 : 6 * i - 3], mechanism.length * step[6 * i - 3 : 6 * i]
         centre = poses[i].of(Placement(_centre(link))).p
         R = rotation_vector_to_matrix(turn) @ poses[i].R
         moved.append(Placement(centre + shift - R @ _centre(link), R))
     return moved
 
 
-def settled(system: System, poses: Sequence[Placement]) -> System:
+def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
     """The system with these starts; massless links within joints stand where the joints' coordinates put them."""
     links, settled_poses = [], list(poses)
-    for i, link in enumerate(system.links):
+    for i, link in enumerate(mechanism.links):
         if massless(link) and i:
-            settled_poses[i] = _between(system, link, poses, settled_poses)
+            settled_poses[i] = _between(mechanism, link, poses, settled_poses)
         links.append(replace(link, start=settled_poses[i]))
-    return replace(system, links=links)
+    return replace(mechanism, links=links)
 
 
-def _between(system: System, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]) -> Placement:
+def _between(
+    mechanism: Mechanism, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]
+) -> Placement:
     """Pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
     edge, stage, inboard = link.branch.edge, link.stage, link.inboard
     assert edge is not None
@@ -185,12 +187,12 @@ def _between(system: System, link: Link, poses: Sequence[Placement], settled_pos
     F = settled_poses[inboard.link].of(inboard.place)
     if not stage.positions:
         return F
-    site = system.site(edge.frame_b)
+    site = mechanism.site(edge.frame_b)
     G = poses[site.link].of(site.place)
     if edge.kind == PATH:
-        whole = path_positions(edge, G.R, G.p + system.origin)
+        whole = path_positions(edge, G.R, G.p + mechanism.origin)
     else:
-        near = system.site(edge.frame_a)
+        near = mechanism.site(edge.frame_a)
         relative = poses[near.link].of(near.place).inverse().of(G)
         whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
     value = stage.sign * float(whole[stage.positions[0]])
@@ -208,7 +210,7 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
     return found
 
 
-def _refuse_apart(system: System, joints: list[Constraint], poses: Sequence[Placement]) -> None:
+def _refuse_apart(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> None:
     for joint in joints:
         A, B = joint.frames(poses)
         values, wrenches = demands(joint.edge.kind, A, B)
@@ -216,11 +218,11 @@ def _refuse_apart(system: System, joints: list[Constraint], poses: Sequence[Plac
         apart = float(np.max(np.abs(values[force]), initial=0.0))
         turned = float(np.max(np.abs(values[~force]), initial=0.0))
         a, b = joint.edge.frame_a, joint.edge.frame_b
-        if apart > WORST_GUESS * system.length:
+        if apart > WORST_GUESS * mechanism.length:
             raise InputError(
                 f"[joint.{joint.name}.between]",
                 f"'{a}' and '{b}' start {apart:.3g} m apart, where a {joint.edge.kind} joint lets them be together "
-                f"(more than {WORST_GUESS:.0%} of the mechanism's size, {system.length:.3g} m)",
+                f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
                 "correct the poses of the bodies, or the frames",
             )
         if turned > WORST_GUESS:
@@ -248,12 +250,12 @@ def _refuse_opposite(joints: list[Constraint], poses: Sequence[Placement]) -> No
                 )
 
 
-def _refuse_drives(system: System, joints: list[Constraint], poses: list[Placement]) -> None:
+def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> None:
     """InputError when the mechanism could be assembled, but for where its drives start."""
     driven = [joint for joint in joints if joint.values]
-    if not driven or close(system, [replace(joint, values={}) for joint in joints], poses) is None:
+    if not driven or close(mechanism, [replace(joint, values={}) for joint in joints], poses) is None:
         return
-    scene = system.scene
+    scene = mechanism.scene
     names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in {joint.name for joint in driven}]
     raise InputError(
         f"[drive.{names[0]}.law]",
@@ -263,10 +265,10 @@ def _refuse_drives(system: System, joints: list[Constraint], poses: list[Placeme
     )
 
 
-def _impossible(system: System, joints: list[Constraint], poses: list[Placement]) -> InputError:
+def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> InputError:
     found = residuals(joints, poses)
     worst = max(found, key=lambda name: found[name])
-    listed = ", ".join(f"{name} {value:.3g}" for name, value in found.items() if value > EXACT * system.length)
+    listed = ", ".join(f"{name} {value:.3g}" for name, value in found.items() if value > EXACT * mechanism.length)
     return InputError(
         f"[joint.{worst}.between]",
         f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}",

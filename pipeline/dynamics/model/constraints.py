@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.driving import drive_laws, joint_class
-from pipeline.dynamics.model.mechanism import Link, System
+from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.tree import PATH, Edge
 
@@ -37,16 +37,16 @@ class Constraint:
         return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
 
 
-def constraints(system: System, given: Mapping[str, Pieces] = NONE) -> list[Constraint]:
+def constraints(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> list[Constraint]:
     """All joints but contacts and paths: those of the tree in the order of its links, then the closures."""
-    t = system.scene.time.start
-    laws = dict(zip(system.drives, drive_laws(system.scene, given), strict=True))
-    tree = [link.branch.edge for link in system.links if link.branch.edge is not None and not massless(link)]
+    t = mechanism.scene.time.start
+    laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
+    tree = [link.branch.edge for link in mechanism.links if link.branch.edge is not None and not massless(link)]
     found = []
-    for edge in [*tree, *(edge for edge, _, _ in system.closures)]:
+    for edge in [*tree, *(edge for edge, _, _ in mechanism.closures)]:
         if edge.kind == PATH:
             continue
-        a, b = system.site(edge.frame_a), system.site(edge.frame_b)
+        a, b = mechanism.site(edge.frame_a), mechanism.site(edge.frame_b)
         values = {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
         found.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
     return found
@@ -57,12 +57,12 @@ def massless(link: Link) -> bool:
     return link.inertia is None and not link.flexible
 
 
-def outboard_place(system: System, link: Link) -> Placement:
+def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
     """A link's own side of its inboard joint, in the link's frame."""
     edge = link.branch.edge
     if edge is None or not link.flexible:
         return Placement()
-    return system.frames[edge.frame_a if link.branch.reverse else edge.frame_b].place
+    return mechanism.frames[edge.frame_a if link.branch.reverse else edge.frame_b].place
 
 
 def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:

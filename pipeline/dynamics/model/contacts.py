@@ -10,8 +10,8 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
 from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.mechanism import Site, System
-from pipeline.dynamics.model.numbering import Layout
+from pipeline.dynamics.model.mechanism import Mechanism, Site
+from pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
@@ -32,14 +32,14 @@ class ContactKinds:
     frictions: tuple[str, ...] = ()
 
 
-def resolve(system: System) -> tuple[Resolved, ...]:
+def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """The normal law of every contact with its numbers; InputError for a law that cannot be had."""
-    return tuple(_resolve(system, name, joint, (a, b)) for name, joint, a, b in system.contacts)
+    return tuple(_resolve(mechanism, name, joint, (a, b)) for name, joint, a, b in mechanism.contacts)
 
 
-def kinds(system: System, laws: Sequence[Resolved]) -> ContactKinds:
+def kinds(mechanism: Mechanism, laws: Sequence[Resolved]) -> ContactKinds:
     """The kinds that are there."""
-    joints = [joint for _, joint, _, _ in system.contacts]
+    joints = [joint for _, joint, _, _ in mechanism.contacts]
     return ContactKinds(
         tuple(sorted({j.type for j in joints})),
         tuple(sorted({law.form for law in laws})),
@@ -47,12 +47,12 @@ def kinds(system: System, laws: Sequence[Resolved]) -> ContactKinds:
     )
 
 
-def fill(layout: Layout, present: ContactKinds, laws: Sequence[Resolved], touching: Touching) -> dict[Any, Any]:
+def fill(numbering: Numbering, present: ContactKinds, laws: Sequence[Resolved], touching: Touching) -> dict[Any, Any]:
     """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact."""
-    system = layout.system
-    places = bristle_places(layout)
+    mechanism = numbering.mechanism
+    places = bristle_places(numbering)
     rows, reals = [], []
-    for (name, joint, _, _), law, sites, place in zip(system.contacts, laws, touching, places, strict=True):
+    for (name, joint, _, _), law, sites, place in zip(mechanism.contacts, laws, touching, places, strict=True):
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
             friction = _friction(name, joint)
@@ -64,32 +64,32 @@ def fill(layout: Layout, present: ContactKinds, laws: Sequence[Resolved], touchi
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 
-def ledger_groups(system: System, energy: float) -> list[tuple[float, int]]:
+def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
     """(floor, number of variables) of every error group after positions and speeds: ledger, then bristles."""
-    contact = [(energy, 1), (energy, 1), (energy / system.length, 1)]  # losses [J], impulse [N s]
-    ledger = [(energy, 1)] * m.CONTACT_SLOTS + contact * len(system.contacts)
-    return ledger + [(size, 3) for size in _bristles(system) if size is not None]
+    contact = [(energy, 1), (energy, 1), (energy / mechanism.length, 1)]  # losses [J], impulse [N s]
+    ledger = [(energy, 1)] * m.CONTACT_SLOTS + contact * len(mechanism.contacts)
+    return ledger + [(size, 3) for size in _bristles(mechanism) if size is not None]
 
 
-def ledger_size(system: System) -> int:
+def ledger_size(mechanism: Mechanism) -> int:
     """Variables of the ledger up to the contacts' and their bristles, where those of the loads begin."""
-    return sum(count for _, count in ledger_groups(system, 0.0))
+    return sum(count for _, count in ledger_groups(mechanism, 0.0))
 
 
-def bristle_places(layout: Layout) -> list[int]:
+def bristle_places(numbering: Numbering) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    place = layout.nq + layout.nv + m.CONTACT_SLOTS + m.PER_CONTACT * len(layout.system.contacts)
+    place = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.PER_CONTACT * len(numbering.mechanism.contacts)
     found = []
-    for size in _bristles(layout.system):
+    for size in _bristles(numbering.mechanism):
         found.append(-1 if size is None else place)
         place += 0 if size is None else 3
     return found
 
 
-def _bristles(system: System) -> list[float | None]:
+def _bristles(mechanism: Mechanism) -> list[float | None]:
     return [
         None if joint.friction is None else _friction(name, joint).bristle(joint.friction)
-        for name, joint, _, _ in system.contacts
+        for name, joint, _, _ in mechanism.contacts
     ]
 
 
@@ -98,25 +98,25 @@ def _friction(name: str, joint: Clearance) -> Any:
     return lookup(FRICTION, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
-def _resolve(system: System, name: str, joint: Clearance, sites: tuple[Site, Site]) -> Resolved:
+def _resolve(mechanism: Mechanism, name: str, joint: Clearance, sites: tuple[Site, Site]) -> Resolved:
     place = f"[joint.{name}.normal]"
     normal = lookup(NORMAL, joint.normal.law, where=place)
     surfaces = lookup(SURFACES, joint.type, where=place)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
-        return normal.resolve(joint.normal, surfaces.stiffness(joint, exponent), _reduced_mass(system, sites))
+        return normal.resolve(joint.normal, surfaces.stiffness(joint, exponent), _reduced_mass(mechanism, sites))
     except ValueError as error:
         raise InputError(place, str(error)) from None
 
 
-def _reduced_mass(system: System, sites: tuple[Site, Site]) -> float | None:
+def _reduced_mass(mechanism: Mechanism, sites: tuple[Site, Site]) -> float | None:
     """Of the links on both sides [kg], the ground's being infinite; None when both are."""
-    inverse = sum(1.0 / mass for mass in (_mass(system, site.link) for site in sites) if mass > 0.0)
+    inverse = sum(1.0 / mass for mass in (_mass(mechanism, site.link) for site in sites) if mass > 0.0)
     return 1.0 / inverse if inverse > 0.0 else None
 
 
-def _mass(system: System, i: int) -> float:
-    link = system.links[i]
+def _mass(mechanism: Mechanism, i: int) -> float:
+    link = mechanism.links[i]
     if link.inertia is not None:
         return float(link.inertia[0])
-    return float(system.bundles[link.flexible]["mass"]) if link.flexible else 0.0
+    return float(mechanism.bundles[link.flexible]["mass"]) if link.flexible else 0.0

@@ -10,31 +10,31 @@ import xarray as xr
 from pipeline.core.errors import InputError
 from pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.mechanism import System
-from pipeline.dynamics.model.numbering import Layout
+from pipeline.dynamics.model.mechanism import Mechanism
+from pipeline.dynamics.model.numbering import Numbering
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
 NEGLIGIBLE = 1e-13
 
 
-def fill(layout: Layout) -> dict[Any, Any]:
+def fill(numbering: Numbering) -> dict[Any, Any]:
     """The tables FLEXES, MOMENTS, PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
     flex, flex_real, data, index, value = [], [], [], [], []
     data0 = moment0 = 0
-    any_shortened = any(b.stiffening is not None for b in layout.system.scene.flexible().values())
-    order = sorted(layout.modes)
+    any_shortened = any(b.stiffening is not None for b in numbering.mechanism.scene.flexible().values())
+    order = sorted(numbering.modes)
     for i in order:
-        link = layout.system.links[i]
-        body = layout.system.scene.body[str(link.flexible)]
+        link = numbering.mechanism.links[i]
+        body = numbering.mechanism.scene.body[str(link.flexible)]
         assert isinstance(body, FlexibleBody)
-        bundle = layout.system.bundles[str(link.flexible)]
-        n = layout.modes[i]
+        bundle = numbering.mechanism.bundles[str(link.flexible)]
+        n = numbering.modes[i]
         moments, where = _moments(bundle)
         chunk = _data(bundle, _damping(str(link.flexible), body, bundle))
         if any_shortened:
-            chunk = np.concatenate([chunk, *_forms(layout.system, str(link.flexible), n)])
-        moves = int(_inboard_moves(layout, i, bundle))
-        flex.append((i, n, layout.flex_q0[i], layout.flex_c0[i], data0, moment0, len(moments), moves))
+            chunk = np.concatenate([chunk, *_forms(numbering.mechanism, str(link.flexible), n)])
+        moves = int(_inboard_moves(numbering, i, bundle))
+        flex.append((i, n, numbering.flex_q0[i], numbering.flex_c0[i], data0, moment0, len(moments), moves))
         flex_real.append(
             [float(bundle["mass"]), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
         )
@@ -43,7 +43,7 @@ def fill(layout: Layout) -> dict[Any, Any]:
         index.append(where)
         data0 += len(chunk)
         moment0 += len(moments)
-    port, port_real, port_data = _ports(layout, order, any_shortened)
+    port, port_real, port_data = _ports(numbering, order, any_shortened)
     return {
         m.FLEXES: flex,
         m.MOMENTS: np.concatenate([*index, np.zeros((0, 2), dtype=np.int64)]),
@@ -56,15 +56,15 @@ def fill(layout: Layout) -> dict[Any, Any]:
     }
 
 
-def bow(system: System, body: str, frame: str | None = None) -> np.ndarray | None:
+def bow(mechanism: Mechanism, body: str, frame: str | None = None) -> np.ndarray | None:
     """Shortening of a bent body per pair of modes at a frame [1/(kg m)], or its first moment [1/m]; shape (mode, mode).
 
     None where the scene does not ask for it.
     """
-    part = system.scene.body[body]
+    part = mechanism.scene.body[body]
     if not isinstance(part, FlexibleBody) or part.stiffening is None:
         return None
-    bundle = system.bundles[body]
+    bundle = mechanism.bundles[body]
     if "frame_shortening" not in bundle:
         raise InputError(
             f"[body.{body}.stiffening]",
@@ -92,10 +92,10 @@ def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:
     return 2.0 * np.asarray(ratios) * np.sqrt(square)
 
 
-def _forms(system: System, body: str, n: int) -> list[np.ndarray]:
+def _forms(mechanism: Mechanism, body: str, n: int) -> list[np.ndarray]:
     """Int rho B and int rho x B (n n each) of a body, zeros where it does not ask for stiffening."""
-    first = bow(system, body)
-    second = None if first is None else system.bundles[body]["shortening_second_moment"].values
+    first = bow(mechanism, body)
+    second = None if first is None else mechanism.bundles[body]["shortening_second_moment"].values
     return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
 
 
@@ -138,47 +138,51 @@ def _frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarra
     return pose, shapes[0], shapes[1]
 
 
-def _inboard_frame(layout: Layout, i: int) -> str | None:
+def _inboard_frame(numbering: Numbering, i: int) -> str | None:
     """Name of the frame by which a flexible link hangs in the tree; None for a free body."""
-    branch = layout.system.links[i].branch
+    branch = numbering.mechanism.links[i].branch
     if branch.edge is None:
         return None
     name = branch.edge.frame_a if branch.reverse else branch.edge.frame_b
     return name.partition(".")[2]
 
 
-def _inboard_moves(layout: Layout, i: int, bundle: xr.Dataset) -> bool:
-    frame = _inboard_frame(layout, i)
+def _inboard_moves(numbering: Numbering, i: int, bundle: xr.Dataset) -> bool:
+    frame = _inboard_frame(numbering, i)
     if frame is None:
         return False
     _, translation, rotation = _frame_shapes(bundle, frame)
-    drawn = bow(layout.system, str(layout.system.links[i].flexible), frame)
+    drawn = bow(numbering.mechanism, str(numbering.mechanism.links[i].flexible), frame)
     return bool(np.any(translation) or np.any(rotation) or (drawn is not None and np.any(drawn)))
 
 
-def _ports(layout: Layout, order: list[int], shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:
+def _ports(numbering: Numbering, order: list[int], shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:
     """Ports of sites first, then one inboard port per flexible link (Layout.port_of_inboard)."""
     rows, reals, data, start = [], [], [], 0
 
     def add(link: int, frame: str | None, column: int) -> None:
         nonlocal start
-        bundle = layout.system.bundles[str(layout.system.links[link].flexible)]
-        n = layout.modes[link]
+        bundle = numbering.mechanism.bundles[str(numbering.mechanism.links[link].flexible)]
+        n = numbering.modes[link]
         if frame is None:
             pose, shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), [np.zeros(3 * n)] * 2
         else:
             pose, *found = _frame_shapes(bundle, frame)
             shapes = [s.ravel() for s in found]
         if shortened:
-            drawn = None if frame is None else bow(layout.system, str(layout.system.links[link].flexible), frame)
+            drawn = (
+                None
+                if frame is None
+                else bow(numbering.mechanism, str(numbering.mechanism.links[link].flexible), frame)
+            )
             shapes.append(np.zeros(n * n) if drawn is None else drawn.ravel())
         rows.append((order.index(link), column, start))
         reals.append(pose)
         data.extend(shapes)
         start += sum(len(s) for s in shapes)
 
-    for site, frame, column in layout.ports:
-        add(layout.sites[site].link, frame.partition(".")[2], column)
+    for site, frame, column in numbering.ports:
+        add(numbering.sites[site].link, frame.partition(".")[2], column)
     for i in order:
-        add(i, _inboard_frame(layout, i), -1)
+        add(i, _inboard_frame(numbering, i), -1)
     return rows, reals, np.concatenate([*data, np.zeros(0)])

@@ -15,7 +15,7 @@ from pipeline.dynamics.model.constraints import outboard_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.loads import order
 from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.tree import PATH
 
 #: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
@@ -27,67 +27,67 @@ RIGID = 1e-9
 SHORTEST = 1e-9
 
 
-def start_state(built: Tables) -> np.ndarray:
+def start_state(model: Model) -> np.ndarray:
     """State at the start as the scene gives it, before the loops are closed; shape (n,)."""
-    layout, system = built.layout, built.system
-    q, v = np.zeros(layout.nq), np.zeros(layout.nv)
-    for i, link in enumerate(system.links[1:], start=1):
+    numbering, mechanism = model.numbering, model.mechanism
+    q, v = np.zeros(numbering.nq), np.zeros(numbering.nv)
+    for i, link in enumerate(mechanism.links[1:], start=1):
         declared = joint_class(link.kind)
-        if layout.driven(i) >= 0 or not declared.POSITIONS:
+        if numbering.driven(i) >= 0 or not declared.POSITIONS:
             continue
-        coordinates = _coordinates(built, i)
-        q[layout.q0[i] : layout.q0[i] + len(coordinates)] = coordinates
-    return np.concatenate([q, v, np.zeros(built.packed.size(m.N_LEDGER))])
+        coordinates = _coordinates(model, i)
+        q[numbering.q0[i] : numbering.q0[i] + len(coordinates)] = coordinates
+    return np.concatenate([q, v, np.zeros(model.arrays.size(m.N_LEDGER))])
 
 
-def _coordinates(built: Tables, i: int) -> np.ndarray:
+def _coordinates(model: Model, i: int) -> np.ndarray:
     """Positions of a link's joint, or of its part of it, from the poses of the two frames."""
-    system = built.system
-    link = system.links[i]
+    mechanism = model.mechanism
+    link = mechanism.links[i]
     edge, stage = link.branch.edge, link.stage
     assert link.inboard is not None
     if edge is None or stage is None or edge.kind == link.kind:
-        F = system.links[link.inboard.link].start.of(link.inboard.place)
-        relative = F.inverse().of(link.start.of(outboard_place(system, link)))
+        F = mechanism.links[link.inboard.link].start.of(link.inboard.place)
+        relative = F.inverse().of(link.start.of(outboard_place(mechanism, link)))
         found: np.ndarray = joint_class(link.kind).coordinates(relative.R, relative.p)
         return found
-    G = _world(built, edge.frame_b)
+    G = _world(model, edge.frame_b)
     if edge.kind == PATH:
-        whole = path_positions(edge, G.R, G.p + system.origin)
+        whole = path_positions(edge, G.R, G.p + mechanism.origin)
     else:
-        relative = _world(built, edge.frame_a).inverse().of(G)
+        relative = _world(model, edge.frame_a).inverse().of(G)
         whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
     return stage.sign * whole[list(stage.positions)]
 
 
-def _world(built: Tables, frame: str) -> Placement:
+def _world(model: Model, frame: str) -> Placement:
     """Start pose of a named frame, from the kernels' origin."""
-    site = built.system.site(frame)
-    return built.system.links[site.link].start.of(site.place)
+    site = model.mechanism.site(frame)
+    return model.mechanism.links[site.link].start.of(site.place)
 
 
-def given_velocities(built: Tables, motion: Motions, y: np.ndarray) -> np.ndarray:
+def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
     Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
     Raises InputError when joints and drives do not allow the velocities.
     """
-    scene, layout = built.system.scene, built.layout
+    scene, numbering = model.scene, model.numbering
     wanted = {
         n: b
         for n, b in scene.body.items()
         if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
     }
-    elastic = np.zeros(layout.nv, dtype=bool)
-    for link, first in layout.flex_c0.items():
-        elastic[first : first + layout.modes[link]] = True
+    elastic = np.zeros(numbering.nv, dtype=bool)
+    for link, first in numbering.flex_c0.items():
+        elastic[first : first + numbering.modes[link]] = True
     if not wanted and not elastic.any():
         return y
     y = y.copy()
-    nq, nv = layout.nq, layout.nv
+    nq, nv = numbering.nq, numbering.nv
     y[nq : nq + nv] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told, arms = ~np.isnan(given), _arms(built, wanted)
+    told, arms = ~np.isnan(given), _arms(model, wanted)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
@@ -125,10 +125,10 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
     return [np.nan] * 3 if given is None else list(given)
 
 
-def _arms(built: Tables, bodies: dict) -> tuple[np.ndarray, np.ndarray]:
+def _arms(model: Model, bodies: dict) -> tuple[np.ndarray, np.ndarray]:
     """Number of each body's link, (n,), and its centre of mass in the link's frame, (n, 3)."""
-    links = [built.system.link_of[name] for name in bodies]
-    places = [built.system.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
+    links = [model.mechanism.link_of[name] for name in bodies]
+    places = [model.mechanism.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
     coms = [np.array(getattr(body, "com", (0.0, 0.0, 0.0))) for body in bodies.values()]
     arms = [place.p + place.R @ com for place, com in zip(places, coms, strict=True)]
     return np.array(links, dtype=int), np.array(arms).reshape(len(links), 3)
@@ -142,18 +142,18 @@ def _twists(link_frames: np.ndarray, links: np.ndarray, arms: np.ndarray) -> np.
     return np.hstack([omega, v + np.cross(omega, turned)]).ravel()
 
 
-def start_loads(built: Tables, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
+def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
     """Y with the angles that loads follow; `loads`: what each does at y, shape (loads, LOAD_SIZE).
 
     Raises InputError for a spring or damper of no length, which has no direction.
     """
-    y, scene = y.copy(), built.system.scene
-    for name, row, now in zip(order(scene), built.packed.table(m.LOADS), loads, strict=True):
+    y, scene = y.copy(), model.scene
+    for name, row, now in zip(order(scene), model.arrays.table(m.LOADS), loads, strict=True):
         load = scene.load[name]
         if row["turns"] >= 0:
-            y[len(y) - built.packed.size(m.N_TURNS) + row["turns"]] = now["value"]
+            y[len(y) - model.arrays.size(m.N_TURNS) + row["turns"]] = now["value"]
         has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
-        if has_direction and now["value"] <= SHORTEST * built.system.length:
+        if has_direction and now["value"] <= SHORTEST * model.mechanism.length:
             raise InputError(
                 f"[load.{name}.between]",
                 "its two ends start in one place, so that it pulls in no direction",

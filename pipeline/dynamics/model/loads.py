@@ -16,9 +16,9 @@ from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.loads.row import Row
 from pipeline.dynamics.model.driving import checked_law, coordinate_of
-from pipeline.dynamics.model.mechanism import System
+from pipeline.dynamics.model.mechanism import Mechanism
 from pipeline.dynamics.model.merge import find_frame
-from pipeline.dynamics.model.numbering import Layout
+from pipeline.dynamics.model.numbering import Numbering
 
 LOADS = "pipeline.dynamics.loads"
 #: what loads add to the ledger, before the turns that they count: work done, energy lost
@@ -50,19 +50,19 @@ def order(scene: Scene) -> list[str]:
     return sorted(forces, key=lambda name: (forces[name].type, list(forces).index(name)))
 
 
-def tabulate(system: System, layout: Layout, given: Mapping[str, Pieces]) -> Loaded:
+def tabulate(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pieces]) -> Loaded:
     """Check the loads of a system, give their frames sites, and fill their tables; `given`: as `numbers.tabulate`."""
-    scene, names = system.scene, order(system.scene)
+    scene, names = mechanism.scene, order(mechanism.scene)
     kinds = tuple(sorted({load.type for load in scene.forces().values()}))
     rows: list[tuple[int, ...]] = []
     numbers, laws, turns = list[list[float]](), list[Pieces](), 0
     for name in names:
         row, coordinate = describe(scene, name)
-        a, b = _sites(system, layout, name, row)
+        a, b = _sites(mechanism, numbering, name, row)
         turn = -1
         if row.counts_turns:
             turn, turns = turns, turns + 1
-        first = layout.known + len(laws)
+        first = numbering.known + len(laws)
         if f"load.{name}" in given:
             laws.append(given[f"load.{name}"])
         else:
@@ -94,15 +94,15 @@ def describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
     return row, coordinate
 
 
-def _sites(system: System, layout: Layout, name: str, row: Row) -> tuple[int, int]:
+def _sites(mechanism: Mechanism, numbering: Numbering, name: str, row: Row) -> tuple[int, int]:
     place = f"[load.{name}]"
-    frames = system.scene.joint[row.joint].between if row.joint is not None else row.frames
-    found = [find_frame(system.frames, frame, place) for frame in frames]
-    if len(found) == 2 and system.link_of[found[0].body] == system.link_of[found[1].body]:
+    frames = mechanism.scene.joint[row.joint].between if row.joint is not None else row.frames
+    found = [find_frame(mechanism.frames, frame, place) for frame in frames]
+    if len(found) == 2 and mechanism.link_of[found[0].body] == mechanism.link_of[found[1].body]:
         raise InputError(place, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
-    if len(found) == 1 and system.link_of[found[0].body] == 0:
+    if len(found) == 1 and mechanism.link_of[found[0].body] == 0:
         raise InputError(place, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
-    sites = [layout.site(system.site(frame)) for frame in frames]
+    sites = [numbering.site(mechanism.site(frame)) for frame in frames]
     return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])
 
 

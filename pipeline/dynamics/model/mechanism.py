@@ -65,7 +65,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class System:
+class Mechanism:
     """Links in tree order, closures, contacts and drives of a scene; lengths in the world's axes.
 
     origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
@@ -100,7 +100,7 @@ def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, 
     return Site(i, place, name if links[i].flexible else None)
 
 
-def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
+def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
     """The system that a scene describes; InputError for what cannot be built."""
     require_bodies(scene)
     frames = frames_of(scene, bundles)
@@ -127,7 +127,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> System:
     closures = [(e, at(e.frame_a), at(e.frame_b)) for e in closing]
     contacts = [(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
     length = _length(scene, links, frames)
-    return System(scene, bundles, frames, links, link_of, closures, contacts, origin, length)
+    return Mechanism(scene, bundles, frames, links, link_of, closures, contacts, origin, length)
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:

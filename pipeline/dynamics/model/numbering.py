@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.mechanism import Link, Site, System
+from pipeline.dynamics.model.mechanism import Link, Mechanism, Site
 
 Route = list[tuple[int, int]]  #: (coordinate, column) pairs that move a site
 
 
 @dataclass
-class Layout:
+class Numbering:
     """Numbering of a system. Coordinates: free ones 0..nv-1 in elimination order, then prescribed."""
 
-    system: System
+    mechanism: Mechanism
     nq: int = 0
     nv: int = 0
     q0: list[int] = field(default_factory=list)
@@ -31,7 +31,7 @@ class Layout:
     @property
     def known(self) -> int:
         """Number of prescribed coordinates."""
-        return len(self.system.drives)
+        return len(self.mechanism.drives)
 
     def site(self, site: Site) -> int:
         """Number of a site; of one that is there already when the place is the same."""
@@ -76,45 +76,45 @@ class Layout:
 
     def n_speeds(self, link: int) -> int:
         """Coordinates of a link's joint, prescribed ones included."""
-        return len(joint_class(self.system.links[link].kind).SPEEDS) if link else 0
+        return len(joint_class(self.mechanism.links[link].kind).SPEEDS) if link else 0
 
     def driven(self, link: int) -> int:
         """Number of the first prescribed coordinate of a link, or -1; it has all prescribed or none."""
-        drives = self.system.links[link].drives
-        return self.system.drives.index(drives[0]) if drives else -1
+        drives = self.mechanism.links[link].drives
+        return self.mechanism.drives.index(drives[0]) if drives else -1
 
 
-def number(system: System) -> Layout:
+def number(mechanism: Mechanism) -> Numbering:
     """The layout of a system. Site k - 1 is the inboard site of link k."""
-    layout = Layout(system)
-    links = system.links
-    layout.q0, layout.c0 = [0] * len(links), [0] * len(links)
+    numbering = Numbering(mechanism)
+    links = mechanism.links
+    numbering.q0, numbering.c0 = [0] * len(links), [0] * len(links)
     for i, link in enumerate(links):
         if link.flexible:
-            layout.modes[i] = system.bundles[link.flexible].sizes["mode"]
-    _number_positions(layout, links)
-    _number_coordinates(layout, links)
-    layout.columns = layout.nv + layout.known
+            numbering.modes[i] = mechanism.bundles[link.flexible].sizes["mode"]
+    _number_positions(numbering, links)
+    _number_coordinates(numbering, links)
+    numbering.columns = numbering.nv + numbering.known
     for link in links[1:]:
         assert link.inboard is not None
-        layout.add_site(link.inboard)
-    return layout
+        numbering.add_site(link.inboard)
+    return numbering
 
 
-def _number_positions(layout: Layout, links: list[Link]) -> None:
+def _number_positions(numbering: Numbering, links: list[Link]) -> None:
     for i, link in enumerate(links[1:], start=1):
-        if layout.driven(i) < 0:
-            layout.q0[i] = layout.nq
-            layout.nq += len(joint_class(link.kind).POSITIONS)
-        if i in layout.modes:
-            layout.flex_q0[i] = layout.nq
-            layout.nq += layout.modes[i]
+        if numbering.driven(i) < 0:
+            numbering.q0[i] = numbering.nq
+            numbering.nq += len(joint_class(link.kind).POSITIONS)
+        if i in numbering.modes:
+            numbering.flex_q0[i] = numbering.nq
+            numbering.nq += numbering.modes[i]
     for i in range(1, len(links)):
-        if layout.driven(i) >= 0:
-            layout.q0[i] = layout.nq + layout.driven(i)
+        if numbering.driven(i) >= 0:
+            numbering.q0[i] = numbering.nq + numbering.driven(i)
 
 
-def _number_coordinates(layout: Layout, links: list[Link]) -> None:
+def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
     """Descendants before ancestors: then the factor of the mass matrix has no fill."""
     children: dict[int, list[int]] = {}
     for i, link in enumerate(links[1:], start=1):
@@ -123,14 +123,14 @@ def _number_coordinates(layout: Layout, links: list[Link]) -> None:
     def visit(i: int) -> None:
         for child in children.get(i, []):
             visit(child)
-        if i in layout.modes:
-            layout.flex_c0[i] = layout.nv
-            layout.nv += layout.modes[i]
-        if i and layout.driven(i) < 0:
-            layout.c0[i] = layout.nv
-            layout.nv += layout.n_speeds(i)
+        if i in numbering.modes:
+            numbering.flex_c0[i] = numbering.nv
+            numbering.nv += numbering.modes[i]
+        if i and numbering.driven(i) < 0:
+            numbering.c0[i] = numbering.nv
+            numbering.nv += numbering.n_speeds(i)
 
     visit(0)
     for i in range(1, len(links)):
-        if layout.driven(i) >= 0:
-            layout.c0[i] = layout.nv + layout.driven(i)
+        if numbering.driven(i) >= 0:
+            numbering.c0[i] = numbering.nv + numbering.driven(i)

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.arrays import envelope_size
-from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.wiring import closure_envelope
 
 #: rows below this share of the longest are rounding
@@ -36,17 +36,17 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     return kept, float(R[count - 1, count - 1] ** 2)
 
 
-def row_scales(built: Tables, spread: np.ndarray) -> np.ndarray:
+def row_scales(model: Model, spread: np.ndarray) -> np.ndarray:
     """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
 
     Not less than a small share of the longest of all, a length of the mechanism's size counting like a radian: rows
     that are nothing but rounding must stay small.
     """
-    kinds, scales = built.packed.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
-    units = np.where(kinds == 0, built.system.length, 1.0)
+    kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
+    units = np.where(kinds == 0, model.mechanism.length, 1.0)
     lengths = np.linalg.norm(spread, axis=1)
     floor = NOTHING * units * float(np.max(lengths / units, initial=0.0))
-    for line in built.packed.table(m.CLOSURES):
+    for line in model.arrays.table(m.CLOSURES):
         span = slice(line["row0"], line["row0"] + line["n_rows"])
         for kind in (0, 1):
             mine = np.flatnonzero(kinds[span] == kind) + span.start
@@ -54,14 +54,14 @@ def row_scales(built: Tables, spread: np.ndarray) -> np.ndarray:
     return scales
 
 
-def write(built: Tables, h: np.ndarray, kept: np.ndarray) -> None:
+def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
     """Write into h, a copy of the system's wiring, that the `kept` rows are solved for.
 
     kept: per row of the closure table.  No size and no offset changes except the number of rows solved for.
     """
-    all_rows = built.packed.table(m.CLOSURES)
-    closures, rows = built.packed.table(m.CLOSURES, h), built.packed.table(m.CLOSURE_ROWS, h)
-    declared = built.packed.table(m.CLOSURE_ROWS)
+    all_rows = model.arrays.table(m.CLOSURES)
+    closures, rows = model.arrays.table(m.CLOSURES, h), model.arrays.table(m.CLOSURE_ROWS, h)
+    declared = model.arrays.table(m.CLOSURE_ROWS)
     start = 0
     for closure, was in zip(closures, all_rows, strict=True):
         span = slice(was["row0"], was["row0"] + was["n_rows"])
@@ -69,21 +69,21 @@ def write(built: Tables, h: np.ndarray, kept: np.ndarray) -> None:
         rows[span] = declared[span][order]
         closure["kept0"], closure["n_kept"] = start, np.sum(kept[span])
         start += int(closure["n_kept"])
-    envelope = built.packed.table(m.CLOSURE_ENVELOPE, h)
+    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
     envelope["first"][:start], envelope["start"][:start] = closure_envelope(
-        closures, built.packed.table(m.CLOSURE_PAIRS)
+        closures, model.arrays.table(m.CLOSURE_PAIRS)
     ).T
     h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
 
 
-def dense(built: Tables, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
+def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     """Kept rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
 
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).
     """
-    support = built.packed.table(m.SUPPORT)["coordinate"]
-    full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), built.layout.nv))
-    for c in built.packed.table(m.CLOSURES, h):
+    support = model.arrays.table(m.SUPPORT)["coordinate"]
+    full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.numbering.nv))
+    for c in model.arrays.table(m.CLOSURES, h):
         count, slots = int(c["n_kept"]), int(c["n_support"])
         columns = support[c["support0"] : c["support0"] + slots]
         block = stored[..., c["jacobian0"] : c["jacobian0"] + count * slots]
@@ -92,14 +92,14 @@ def dense(built: Tables, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     return full
 
 
-def kept_places(built: Tables, h: np.ndarray) -> np.ndarray:
+def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
     """Place of each kept row among all, as residuals and their rates are stored."""
-    spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in built.packed.table(m.CLOSURES, h))
+    spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
     return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
-def joints_of_rows(built: Tables, h: np.ndarray) -> list[str]:
+def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
     """Name of the joint to which each kept row belongs."""
-    names = [built.system.closures[k][0].name for k in built.closure_order]
-    counts = built.packed.table(m.CLOSURES, h)["n_kept"]
+    names = [model.mechanism.closures[k][0].name for k in model.closure_order]
+    counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
     return [name for name, count in zip(names, counts, strict=True) for _ in range(count)]

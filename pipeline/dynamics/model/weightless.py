@@ -10,7 +10,7 @@ import scipy.linalg
 from pipeline.core.errors import InputError
 from pipeline.dynamics.model.assembly import LEAST_GYRATION
 from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.model.model import Model
 
 #: a motion has no mass when it has this share of what it would have if every body resisted turning about all axes alike
 ZERO = 1e-14
@@ -18,19 +18,19 @@ ZERO = 1e-14
 TAKES_PART = 1e-3
 
 
-def refuse(built: Tables, poses: Sequence[Placement], twists: np.ndarray, J: np.ndarray, rank: int) -> None:
+def refuse(model: Model, poses: Sequence[Placement], twists: np.ndarray, J: np.ndarray, rank: int) -> None:
     """InputError when rigid bodies can move without any of their masses moving.
 
     twists: of every column of the layout, (columns, 6), velocities in units of the size; J: closure rows, (rows, nv).
     Flexible bodies are left to the engine, whose mass matrix knows their modes.
     """
-    links, nv, L = built.system.links, built.layout.nv, built.system.length
+    links, nv, L = model.mechanism.links, model.numbering.nv, model.mechanism.length
     if any(link.flexible for link in links) or rank == nv:
         return
     moved = np.zeros((len(links), 6, nv))
     own, even = np.zeros((nv, nv)), np.zeros((nv, nv))
     for i, link in enumerate(links[1:], start=1):
-        for coordinate, column in built.layout.joint_route(i):
+        for coordinate, column in model.numbering.joint_route(i):
             if coordinate < nv:
                 moved[i, :, coordinate] = twists[column]
         if link.inertia is not None:
@@ -43,7 +43,7 @@ def refuse(built: Tables, poses: Sequence[Placement], twists: np.ndarray, J: np.
     free = np.linalg.svd(J)[2][rank:].T if rank else np.eye(nv)
     motion = _without_mass(free.T @ own @ free, free.T @ even @ free)
     if motion is not None:
-        _refuse(built, moved @ (free @ motion))
+        _refuse(model, moved @ (free @ motion))
 
 
 def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
@@ -56,10 +56,10 @@ def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
     return vectors[:, 0] / sizes if values[0] <= ZERO else None
 
 
-def _refuse(built: Tables, twists: np.ndarray) -> None:
+def _refuse(model: Model, twists: np.ndarray) -> None:
     """twists: of every link in the motion, (links, 6)."""
     sizes = np.abs(twists).max(axis=1)
-    links = [link for link, size in zip(built.system.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
+    links = [link for link, size in zip(model.mechanism.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
     names = sorted({name for link in links for name in link.places})
     raise InputError(
         f"[body.{names[0]}.inertia]",

@@ -11,61 +11,61 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import arrays
 from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.numbering import Layout
+from pipeline.dynamics.model.numbering import Numbering
 
 
-def mass_entries(layout: Layout) -> dict[Any, Any]:
+def mass_entries(numbering: Numbering) -> dict[Any, Any]:
     """The tables PAIRS, KNOWN_PAIRS and ENVELOPE.
 
     A coordinate's momentum (that of all it moves) times the column of a coordinate nearer to the
     ground is their entry of the mass matrix.
     """
     products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
-    for i in range(1, len(layout.system.links)):
-        own = list(range(layout.c0[i], layout.c0[i] + layout.n_speeds(i)))
-        above = layout.route(i - 1)
+    for i in range(1, len(numbering.mechanism.links)):
+        own = list(range(numbering.c0[i], numbering.c0[i] + numbering.n_speeds(i)))
+        above = numbering.route(i - 1)
         for n, c in enumerate(own):
             products += [(c, d, c, d) for d in own[: n + 1]]
             products += [(c, col, c, d) for d, col in above]
-        if i in layout.modes:
-            modal = range(layout.flex_c0[i], layout.flex_c0[i] + layout.modes[i])
-            products += [(c, col, c, d) for c in modal for d, col in layout.joint_route(i)]
-        products += _port_products(layout, i)
-    first = list(range(layout.nv))
+        if i in numbering.modes:
+            modal = range(numbering.flex_c0[i], numbering.flex_c0[i] + numbering.modes[i])
+            products += [(c, col, c, d) for c in modal for d, col in numbering.joint_route(i)]
+        products += _port_products(numbering, i)
+    first = list(range(numbering.nv))
     for _, _, c, d in products:
-        if c < layout.nv and d < layout.nv:
+        if c < numbering.nv and d < numbering.nv:
             first[max(c, d)] = min(first[max(c, d)], c, d)
-    for i, n in layout.modes.items():
+    for i, n in numbering.modes.items():
         for j in range(n):
-            first[layout.flex_c0[i] + j] = min(first[layout.flex_c0[i] + j], layout.flex_c0[i])
+            first[numbering.flex_c0[i] + j] = min(first[numbering.flex_c0[i] + j], numbering.flex_c0[i])
     start, rows = 0, []
     for i, f in enumerate(first):
         rows.append((f, start))
         start += i - f + 1
     pairs, known = [], []
     for momentum, col, c, d in products:
-        if c < layout.nv and d < layout.nv:
+        if c < numbering.nv and d < numbering.nv:
             i, j = max(c, d), min(c, d)
             pairs.append((momentum, col, rows[i][1] + j - rows[i][0]))
-        elif c < layout.nv or d < layout.nv:
-            pair = (max(c, d) - layout.nv, min(c, d))
+        elif c < numbering.nv or d < numbering.nv:
+            pair = (max(c, d) - numbering.nv, min(c, d))
             known.append((momentum, col, *pair))
     return {m.PAIRS: pairs, m.KNOWN_PAIRS: known, m.ENVELOPE: rows}
 
 
-def _port_products(layout: Layout, i: int) -> list[tuple[int, int, int, int]]:
+def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, int]]:
     """Entries between the modes of a flexible parent through the link i that it carries."""
-    port = layout.port_of(i - 1)
+    port = numbering.port_of(i - 1)
     if port < 0:
         return []
-    link = layout.sites[i - 1].link
-    first, c0, n = layout.ports[port][2], layout.flex_c0[link], layout.modes[link]
+    link = numbering.sites[i - 1].link
+    first, c0, n = numbering.ports[port][2], numbering.flex_c0[link], numbering.modes[link]
     return [(first + j, first + k, c0 + j, c0 + k) for j in range(n) for k in range(j + 1)]
 
 
-def closures(layout: Layout, site_pairs: list[tuple[str, int, int]]) -> tuple[dict[Any, Any], np.ndarray]:
+def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tuple[dict[Any, Any], np.ndarray]:
     """Tables of the closures, given (joint type, site a, site b) each, and their order there, for a thin envelope."""
-    routes = [closure_route(layout, a, b) for _, a, b in site_pairs]
+    routes = [closure_route(numbering, a, b) for _, a, b in site_pairs]
     order = _order([{c for c, _, _ in route} for route in routes])
     closure: list[tuple[int, ...]] = []
     rows: list[tuple[int, int, int]] = []
@@ -78,11 +78,11 @@ def closures(layout: Layout, site_pairs: list[tuple[str, int, int]]) -> tuple[di
         kind, a, b = site_pairs[old]
         declared = joint_class(kind)
         mine = [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
-        slots = sorted({c for c, _, _ in routes[old] if c < layout.nv})
+        slots = sorted({c for c, _, _ in routes[old] if c < numbering.nv})
         moved = _moved(routes[old])
         entry0 = len(entries)
-        entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < layout.nv]
-        known += [(new, c - layout.nv, col, sign) for c, col, sign in moved if c >= layout.nv]
+        entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < numbering.nv]
+        known += [(new, c - numbering.nv, col, sign) for c, col, sign in moved if c >= numbering.nv]
         n_entries = len(entries) - entry0
         closure.append((a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine)))
         rows += mine
@@ -101,9 +101,9 @@ def closures(layout: Layout, site_pairs: list[tuple[str, int, int]]) -> tuple[di
     return tables, np.array(order, dtype=np.int64)
 
 
-def closure_route(layout: Layout, a: int, b: int) -> list[tuple[int, int, int]]:
+def closure_route(numbering: Numbering, a: int, b: int) -> list[tuple[int, int, int]]:
     """(coordinate, column, sign) of both sides."""
-    return [(c, col, 1) for c, col in layout.route(b)] + [(c, col, -1) for c, col in layout.route(a)]
+    return [(c, col, 1) for c, col in numbering.route(b)] + [(c, col, -1) for c, col in numbering.route(a)]
 
 
 def _moved(route: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:

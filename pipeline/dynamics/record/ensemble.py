@@ -58,10 +58,12 @@ def _quiet(share: float | None, text: str) -> None:
 
 
 def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
-    system = engine.built.system
-    known = [n for n, b in system.scene.body.items() if b.type != "ground"]
+    mechanism = engine.model.mechanism
+    known = [n for n, b in mechanism.scene.body.items() if b.type != "ground"]
     if wanted.bodies is None:
-        return sorted({system.frames[f].body for _, joint, _, _ in system.contacts for f in joint.between} & set(known))
+        return sorted(
+            {mechanism.frames[f].body for _, joint, _, _ in mechanism.contacts for f in joint.between} & set(known)
+        )
     for name in wanted.bodies:
         if name not in known:
             raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
@@ -69,25 +71,25 @@ def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
-    scene = engine.built.system.scene
+    scene = engine.model.scene
     regular = output_times(engine.breaks, scene.output.interval)
     rows = np.searchsorted(trajectory.time, regular)
     peak, count, share = _contact_statistics(engine, trajectory)
     kept = replace(trajectory, rows=trajectory.rows[rows])
     seen = observed(engine, kept)
-    require_closed(engine.built, kept, seen)
-    motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
+    require_closed(engine.model, kept, seen)
+    motions = body_motions(engine.model, seen, link_motions(engine.model, seen["link_frame"]))
     chosen = [motions[n] for n in names]
     touch = seen["touch"].reshape(len(rows), -1, m.TOUCH.size)
     variables = {
-        **_series(chosen, engine.built.system.origin),
+        **_series(chosen, engine.model.mechanism.origin),
         "contact_normal_force": (("time", "contact"), touch[..., m.TOUCH.normal_force]),
         "contact_offset": (("time", "contact", "axis"), touch[..., m.TOUCH.offset : m.TOUCH.offset + 3]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
-    contacts = [name for name, *_ in engine.built.system.contacts]
+    contacts = [name for name, *_ in engine.model.mechanism.contacts]
     return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
 
 
@@ -107,7 +109,7 @@ def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndar
     e = trajectory.events
     span = engine.end - engine.start
     peak, count, share = [], [], []
-    for c in range(engine.built.packed.size(m.N_CONTACTS)):
+    for c in range(engine.model.arrays.size(m.N_CONTACTS)):
         closing = e[(e[:, m.EVENT.contact] == c) & (e[:, m.EVENT.kind] == m.CLOSING)]
         lasting = np.where(
             np.isnan(closing[:, m.EVENT.duration]), engine.end - closing[:, m.EVENT.time], closing[:, m.EVENT.duration]

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.solver import Solver
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run.trajectory import Trajectory
 
 Seen = dict[str, np.ndarray]
@@ -23,11 +23,11 @@ CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 1.0
 DAMPING = "generalized-alpha"
 
 
-def series(built: Tables, seen: Seen) -> Variables:
+def series(model: Model, seen: Seen) -> Variables:
     """The variables of the ledger, total and by cause."""
-    ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
+    ledger = seen["state"][:, model.numbering.nq + model.numbering.nv :]
     kinetic, potential, elastic = seen["energy"].T
-    contacts = len(built.system.contacts)
+    contacts = len(model.mechanism.contacts)
     touch = seen["touch"].reshape(len(ledger), contacts, m.TOUCH.size)
     slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.PER_CONTACT * contacts].reshape(
         len(ledger), contacts, m.PER_CONTACT
@@ -38,8 +38,8 @@ def series(built: Tables, seen: Seen) -> Variables:
     dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
     balance = kinetic + potential + elastic + dissipated - work
     loaded: Variables = {}
-    if built.system.scene.forces():
-        load_work, load_loss = ledger[:, built.packed.size(m.LOAD_SLOT) :].T[:2]
+    if model.scene.forces():
+        load_work, load_loss = ledger[:, model.arrays.size(m.LOAD_SLOT) :].T[:2]
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
     found: Variables = {
@@ -52,7 +52,7 @@ def series(built: Tables, seen: Seen) -> Variables:
         "constraint_error": (("time",), seen["residual"][:, 0]),
         **loaded,
     }
-    if built.layout.modes:
+    if model.numbering.modes:
         found["modal_damping_loss"] = (("time",), modal)
     if contacts:
         found["contact_elastic"] = (("time", "contact"), touch[..., m.TOUCH.stored] + touch[..., m.TOUCH.bent])
@@ -69,15 +69,15 @@ def usual(solver: Solver) -> float:
     return CHOSEN if solver.integrator == DAMPING else max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
 
 
-def require_closed(built: Tables, trajectory: Trajectory, seen: Seen) -> None:
+def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
     """SolverError when the ledger is off by more than the scene's tolerance times the energy turned over."""
-    found = {name: values for name, (_, values) in series(built, seen).items()}
+    found = {name: values for name, (_, values) in series(model, seen).items()}
     error = np.abs(found["energy_error"])
     turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in found]
     turned = max(float(np.ptp(found[n])) for n in turning)
     turned = max(turned, float(found["kinetic"].max()))
     largest = max(float(np.abs(found[n]).max()) for n in turning)
-    solver = built.system.scene.solver
+    solver = model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
     worst = int(np.argmax(error)) if np.isfinite(error).all() else int(np.argmin(np.isfinite(error)))
     if error[worst] <= tolerance * turned + ROUNDING * largest:
@@ -86,14 +86,14 @@ def require_closed(built: Tables, trajectory: Trajectory, seen: Seen) -> None:
     raise SolverError(
         f"at t = {trajectory.time[first]:.6g} s: the ledger of energy does not close: it is off by up to "
         f"{error[worst]:.3g} J where {turned:.3g} J are turned over (tolerance {tolerance:g}, "
-        f"[solver.ledger_tolerance]); lost so far: {_losses(built, found, first)}; "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(model, found, first)}; "
         "a smaller rtol or step is the remedy, or the scene is beyond this integrator"
     )
 
 
-def _losses(built: Tables, found: dict[str, np.ndarray], k: int) -> str:
+def _losses(model: Model, found: dict[str, np.ndarray], k: int) -> str:
     parts = []
-    for c, (name, *_) in enumerate(built.system.contacts):
+    for c, (name, *_) in enumerate(model.mechanism.contacts):
         for cause in ("damping", "friction"):
             parts.append(f"{found[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
     if "modal_damping_loss" in found:

@@ -56,9 +56,9 @@ def _least(
     engine: Engine, scene: Scene, time: np.ndarray, seen: dict[str, np.ndarray], alone: list[str], names: list[str]
 ) -> np.ndarray:
     """Forces of all actuators at every time, shape (times, actuators)."""
-    system = engine.built.system
-    signs = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}
-    made = [system.drives.index(name) for name in alone]
+    mechanism = engine.model.mechanism
+    signs = {name: link.stage.sign for link in mechanism.links if link.stage for name in link.drives}
+    made = [mechanism.drives.index(name) for name in alone]
     forces = seen["drive_force"][:, made] * [signs[name] for name in alone]
     own = [names.index(name) for name in alone]
     found = []

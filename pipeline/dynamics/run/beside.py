@@ -24,8 +24,8 @@ def beside(engine: Engine, row: np.ndarray) -> dict[str, np.ndarray] | None:
     of both sides, at a distance and at twice that, is but its fourth power from their value.  The states there follow
     from the row's velocities and the closures.  Before the run's start all laws are as just after it.
     """
-    t, first = float(row[0]), 1 + 2 * len(engine.built.system.contacts)
-    y, nq = row[first:], engine.built.layout.nq
+    t, first = float(row[0]), 1 + 2 * len(engine.model.mechanism.contacts)
+    y, nq = row[first:], engine.model.numbering.nq
     engine.attempt(y, t)
     rate = engine.view(m.SLOPES, len(y))[:nq].copy()
     distance = NEAREST * (engine.end - engine.start)

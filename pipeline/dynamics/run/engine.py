@@ -14,7 +14,7 @@ from pipeline.dynamics.equations import observation as observing
 from pipeline.dynamics.integrate.method import scheme_of
 from pipeline.dynamics.model import initial, selection
 from pipeline.dynamics.model.mobility import Mobility, analyse
-from pipeline.dynamics.model.model import Tables
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
 Progress = Callable[[float | None, str], None]
@@ -32,7 +32,7 @@ class Engine:
     kept: per closure row, whether it is solved for.  mobility: counts at the start.
     """
 
-    built: Tables
+    model: Model
     entry: fuse.Entry
     h: np.ndarray
     kept: np.ndarray
@@ -46,8 +46,8 @@ class Engine:
     @property
     def breaks(self) -> np.ndarray:
         """Start, breaks of drives and loads in between, end; breaks that only rounding sets apart are one."""
-        starts, found = self.built.packed.table(m.PIECES)["start"], set()
-        for first, count in self.built.packed.table(m.LAWS):
+        starts, found = self.model.arrays.table(m.PIECES)["start"], set()
+        for first, count in self.model.arrays.table(m.LAWS):
             found |= {float(t) for t in starts[first + 1 : first + count]}
         shortest = SHORTEST_SEGMENT * (self.end - self.start)
         times = [self.start]
@@ -59,7 +59,7 @@ class Engine:
     def select_pieces(self, inside: float) -> None:
         """Put the pieces of the laws in force that hold at `inside`, which is no break."""
         first = self.n[m.ACTIVE]
-        self.n[first : first + self.built.packed.size(m.N_LAWS)] = pieces_at(self.built, inside)
+        self.n[first : first + self.model.arrays.size(m.N_LAWS)] = pieces_at(self.model, inside)
 
     def select_pieces_after(self, t: float) -> None:
         """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""
@@ -69,12 +69,12 @@ class Engine:
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
         self.kept[:] = rows
-        selection.write(self.built, self.h, self.kept)
+        selection.write(self.model, self.h, self.kept)
         self.view(m.ROW_SCALE, len(rows))[:] = 0.0
 
     def view(self, place: int, length: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
-        o = self.built.packed.offset(place)
+        o = self.model.arrays.offset(place)
         return self.w[o : o + length]
 
     def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
@@ -86,59 +86,59 @@ class Engine:
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
         """Evaluate f(t, y) in the work space; whether it could be."""
         self.view(m.Y, len(y))[:] = y
-        self.entry.evaluate(self.h, self.built.packed.f, self.w, self.n, t, repeat)
+        self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
 
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
-        size = self.built.packed.size(m.JACOBIAN_SIZE)
-        return selection.dense(self.built, self.h, self.view(stored, size))
+        size = self.model.arrays.size(m.JACOBIAN_SIZE)
+        return selection.dense(self.model, self.h, self.view(stored, size))
 
 
-def pieces_at(built: Tables, inside: float) -> np.ndarray:
+def pieces_at(model: Model, inside: float) -> np.ndarray:
     """Piece of every law that holds at a time which is no break."""
-    starts, found = built.packed.table(m.PIECES)["start"], []
-    for first, count in built.packed.table(m.LAWS):
+    starts, found = model.arrays.table(m.PIECES)["start"], []
+    for first, count in model.arrays.table(m.LAWS):
         found.append(first + max(int(np.searchsorted(starts[first : first + count], inside, side="right")) - 1, 0))
     return np.array(found, dtype=np.int64)
 
 
-def prepare(built: Tables, progress: Progress) -> Engine:
+def prepare(model: Model, progress: Progress) -> Engine:
     """The engine of a system, its kernels compiled or fetched from disk."""
-    scene, mobility = built.system.scene, analyse(built)
+    scene, mobility = model.scene, analyse(model)
     progress(None, mobility.text())
-    if mobility.singular_start and not may_depart(built):
+    if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
     scheme = scheme_of(scene.solver)
-    w, n = built.packed.work_space()
-    entry = fuse.entry(built.kinds, scheme, lambda text: progress(None, text))
-    h, kept = built.packed.h.copy(), np.ones(built.packed.size(m.N_CLOSURE_ROWS), dtype=bool)
+    w, n = model.arrays.work_space()
+    entry = fuse.entry(model.kinds, scheme, lambda text: progress(None, text))
+    h, kept = model.arrays.h.copy(), np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     entry.connect(h)
-    return Engine(built, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    return Engine(model, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     """State at the start with its loops closed, and the joints' largest residual as the scene gives them [m]."""
-    built = engine.built
+    model = engine.model
     engine.select_pieces_after(engine.start)
-    y = initial.start_state(built)
+    y = initial.start_state(model)
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
-    links, rows = built.packed.size(m.N_LINKS), built.packed.size(m.N_CLOSURE_ROWS)
+    links, rows = model.arrays.size(m.N_LINKS), model.arrays.size(m.N_CLOSURE_ROWS)
 
     def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         _look(engine, state_vector)
         frames = engine.view(m.LINK_FRAMES.place, m.FRAME.size * links).reshape(links, m.FRAME.size)
         return frames, engine.view(m.RESIDUAL_RATE, rows).copy()
 
-    y = initial.given_velocities(built, motion, y)
+    y = initial.given_velocities(model, motion, y)
     if not engine.mobility.singular_start:
         y = project(engine, y)
-    if built.kinds.loads:
+    if model.kinds.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
-    return y, built.system.start_residual
+    return y, model.mechanism.start_residual
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -146,7 +146,7 @@ def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
     try:
         return project(engine, y)
     except SolverError as error:
-        paths = [name for name, drive in engine.built.system.scene.drive.items() if hasattr(drive, "frame")]
+        paths = [name for name, drive in engine.model.scene.drive.items() if hasattr(drive, "frame")]
         place = f"[drive.{paths[0]}]" if paths else "[joint]"
         what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
         raise InputError(place, f"the mechanism cannot be assembled: {error}", what) from None
@@ -160,23 +160,23 @@ def _look(engine: Engine, y: np.ndarray) -> None:
         engine.evaluate(y, engine.start)
 
 
-def may_depart(built: Tables) -> bool:
+def may_depart(model: Model) -> bool:
     """Whether a run may start in a singular pose: bodies are given velocities, and no contact may interfere."""
-    bodies = built.system.scene.body.values()
+    bodies = model.scene.body.values()
     given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
-    return not built.system.contacts and any(v is not None and np.any(np.asarray(v) != 0.0) for v in given)
+    return not model.mechanism.contacts and any(v is not None and np.any(np.asarray(v) != 0.0) for v in given)
 
 
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y with the angles that loads follow as they are at the start; InputError for a spring without direction."""
     _look(engine, y)
-    loads = engine.view(m.LOAD.place, m.LOAD.size * engine.built.packed.size(m.N_LOADS)).reshape(-1, m.LOAD.size)
-    return initial.start_loads(engine.built, y, loads.copy())
+    loads = engine.view(m.LOAD.place, m.LOAD.size * engine.model.arrays.size(m.N_LOADS)).reshape(-1, m.LOAD.size)
+    return initial.start_loads(engine.model, y, loads.copy())
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y at the start with the loops closed and their rates zero; SolverError when that fails."""
-    contacts = engine.built.packed.size(m.N_CONTACTS)
+    contacts = engine.model.arrays.size(m.N_CONTACTS)
     row = np.concatenate([[engine.start], np.zeros(2 * contacts), y])
     seen = observe(engine, row[None, :])
     if seen["status"][0, 0] != m.OK:
@@ -188,7 +188,7 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
-    contacts = engine.built.system.contacts
+    contacts = engine.model.mechanism.contacts
     if not contacts:
         return {}
     engine.evaluate(y, engine.start)
@@ -198,7 +198,7 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
 
 def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
     for c, depth in overlapping(engine, y).items():
-        name, joint, _, _ = engine.built.system.contacts[c]
+        name, joint, _, _ = engine.model.mechanism.contacts[c]
         if joint.initial_approach_speed is None:
             raise InputError(
                 f"[joint.{name}]",
@@ -214,17 +214,17 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> dict[st
     On a break the laws hold as before it, or as after it.
     Fields and widths: `pipeline.dynamics.equations.observation`; shape (rows, width) each.
     """
-    built = engine.built
-    packed, segments = built.packed, engine.breaks
+    model = engine.model
+    arrays, segments = model.arrays, engine.breaks
     sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
-    per_segment = {x: pieces_at(built, x) for x in set(middles.tolist())}
+    per_segment = {x: pieces_at(model, x) for x in set(middles.tolist())}
     pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(
-        len(rows), packed.size(m.N_LAWS)
+        len(rows), arrays.size(m.N_LAWS)
     )
-    widths = observing.widths(packed.size)
+    widths = observing.widths(arrays.size)
     out = np.zeros((len(rows), sum(widths.values())))
-    tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * built.system.length
-    engine.entry.observe(engine.h, packed.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
+    tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * model.mechanism.length
+    engine.entry.observe(engine.h, arrays.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
     ends = np.cumsum(list(widths.values()))
     return {name: out[:, end - widths[name] : end] for name, end in zip(widths, ends, strict=True)}

@@ -50,10 +50,10 @@ def hand_over(
     engine: Engine, rows: np.ndarray, events: np.ndarray, selections: list[tuple[float, np.ndarray]]
 ) -> Handover:
     """What a paused integration leaves to another method; rows and events may have room left."""
-    n, packed = engine.n, engine.built.packed
-    contacts = packed.size(m.N_CONTACTS)
+    n, arrays = engine.n, engine.model.arrays
+    contacts = arrays.size(m.N_CONTACTS)
     return Handover(
-        engine.view(m.Y, packed.size(m.NY)).copy(),
+        engine.view(m.Y, arrays.size(m.NY)).copy(),
         n[n[m.MODE] : n[m.MODE] + contacts].copy(),
         engine.view(m.LATCHED, contacts).copy(),
         engine.view(m.WATCH.place, m.WATCH.size * contacts).copy(),

@@ -27,7 +27,7 @@ from pipeline.dynamics.drives.pieces import Piece, Pieces
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.model.driving import coordinate_of
 from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Tables, tabulate
+from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.record.coordinates import joint_coordinates, label
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.run.trajectory import integrate as step
@@ -55,7 +55,7 @@ def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     chosen = _enough(engine, scene, wanted, names)
     trajectory = step(engine, start, progress)
     before, after = observe(engine, trajectory.rows), observe(engine, trajectory.rows, after=True)
-    sides = [joint_coordinates(engine.built, seen) for seen in (before, after)]
+    sides = [joint_coordinates(engine.model, seen) for seen in (before, after)]
     laws = {}
     for name in chosen:
         series = [np.array(side[_full_name(scene, name)]) for side in sides]
@@ -112,13 +112,13 @@ def _full_name(scene: Scene, actuator: str) -> str:
 
 def _enough(engine: Engine, scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> list[str]:
     """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
-    built = engine.built
+    model = engine.model
     free = null_space(closure_jacobian(engine), rcond=RANK)
-    known = [k for k, name in enumerate(built.system.drives) if name.partition(".")[0] in wanted]
-    held = [k for k in range(built.layout.known) if k not in known]
+    known = [k for k, name in enumerate(model.mechanism.drives) if name.partition(".")[0] in wanted]
+    held = [k for k in range(model.numbering.known) if k not in known]
     if held:  # other drives go on as they do
-        free = free @ null_space(free[[built.layout.nv + k for k in held]], rcond=RANK)
-    of_path = free[[built.layout.nv + k for k in known]]
+        free = free @ null_space(free[[model.numbering.nv + k for k in held]], rcond=RANK)
+    of_path = free[[model.numbering.nv + k for k in known]]
     of_actuators = np.array([rate(engine, scene, name) @ free for name in names])
     place = f"[drive.{next(iter(wanted))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
@@ -147,51 +147,51 @@ def _rank(matrix: np.ndarray) -> int:
 
 def closure_jacobian(engine: Engine) -> np.ndarray:
     """Rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
-    built = engine.built
-    packed, nv = built.packed, built.layout.nv
-    n_rows = packed.size(m.N_CLOSURE_ROWS)
+    model = engine.model
+    arrays, nv = model.arrays, model.numbering.nv
+    n_rows = arrays.size(m.N_CLOSURE_ROWS)
     rows, columns = engine.view(m.ROWS.place, 6 * n_rows).reshape(-1, 6), _columns(engine)
-    J = np.zeros((n_rows, nv + built.layout.known))
-    closures, entries, support = (packed.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
+    J = np.zeros((n_rows, nv + model.numbering.known))
+    closures, entries, support = (arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
     for c in closures:
         mine = slice(c["row0"], c["row0"] + c["n_rows"])
         for slot, col, sign in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
             J[mine, support["coordinate"][c["support0"] + slot]] += sign * rows[mine] @ columns[col]
-    for c, d, col, sign in packed.table(m.KNOWN_ENTRIES):
+    for c, d, col, sign in arrays.table(m.KNOWN_ENTRIES):
         mine = slice(closures["row0"][c], closures["row0"][c] + closures["n_rows"][c])
         J[mine, nv + d] += sign * rows[mine] @ columns[col]
     return J
 
 
 def _columns(engine: Engine) -> np.ndarray:
-    return engine.view(m.COLUMNS.place, 6 * engine.built.layout.columns).reshape(-1, 6)
+    return engine.view(m.COLUMNS.place, 6 * engine.model.numbering.columns).reshape(-1, 6)
 
 
 def rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
     """Rate of an actuator's coordinate per speed of the system."""
-    built = engine.built
+    model = engine.model
     joint, _, name = actuator.partition(".")
     _, k, coordinate = coordinate_of(scene, joint, name or None, "[drive]")
-    row = np.zeros(built.layout.nv + built.layout.known)
-    for i, link in enumerate(built.system.links):
+    row = np.zeros(model.numbering.nv + model.numbering.known)
+    for i, link in enumerate(model.mechanism.links):
         edge, stage = link.branch.edge, link.stage
         if edge is not None and stage is not None and edge.name == joint and k in stage.positions:
-            row[built.layout.c0[i] + stage.positions.index(k)] = stage.sign
+            row[model.numbering.c0[i] + stage.positions.index(k)] = stage.sign
             return row
-    number = [e.name for e, _, _ in built.system.closures].index(joint)
-    a, b = built.packed.table(m.CLOSURES)[
-        list(built.closure_order).index(number), [m.CLOSURES.site_a, m.CLOSURES.site_b]
+    number = [e.name for e, _, _ in model.mechanism.closures].index(joint)
+    a, b = model.arrays.table(m.CLOSURES)[
+        list(model.closure_order).index(number), [m.CLOSURES.site_a, m.CLOSURES.site_b]
     ]
-    wrench = _unit_wrench(built, engine, int(a), int(b), coordinate)
+    wrench = _unit_wrench(model, engine, int(a), int(b), coordinate)
     for site, sign in ((b, 1.0), (a, -1.0)):
-        for c, col in built.layout.route(int(site)):
+        for c, col in model.numbering.route(int(site)):
             row[c] += sign * wrench @ _columns(engine)[col]
     return row
 
 
-def _unit_wrench(built: Tables, engine: Engine, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
+def _unit_wrench(model: Model, engine: Engine, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
     """Moment about the kernels' origin and force of a unit force along a coordinate, shape (6,)."""
-    sites = engine.view(m.SITE_FRAMES.place, m.FRAME.size * built.packed.size(m.N_SITES)).reshape(-1, m.FRAME.size)
+    sites = engine.view(m.SITE_FRAMES.place, m.FRAME.size * model.arrays.size(m.N_SITES)).reshape(-1, m.FRAME.size)
     axes = sites[b if coordinate.side else a, m.FRAME.axes : m.FRAME.axes + 9].reshape(3, 3)
     along = axes[:, coordinate.axis]
     if coordinate.turning:

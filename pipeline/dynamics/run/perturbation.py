@@ -14,22 +14,22 @@ def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     From the velocities that unit speeds give, so that no step width enters.
     """
     engine.select_pieces_after(engine.start)
-    layout = engine.built.layout
+    numbering = engine.model.numbering
     columns = []
-    for k in range(layout.nv):
+    for k in range(numbering.nv):
         moved = y.copy()
-        moved[layout.nq : layout.nq + layout.nv] = 0.0
-        moved[layout.nq + k] = 1.0
+        moved[numbering.nq : numbering.nq + numbering.nv] = 0.0
+        moved[numbering.nq + k] = 1.0
         columns.append(_offset_rates(engine, project(engine, moved)))
     return np.array(columns).T
 
 
 def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
     engine.evaluate(y, engine.start)
-    sites = engine.view(m.SITE_FRAMES.place, m.FRAME.size * engine.built.packed.size(m.N_SITES)).reshape(
+    sites = engine.view(m.SITE_FRAMES.place, m.FRAME.size * engine.model.arrays.size(m.N_SITES)).reshape(
         -1, m.FRAME.size
     )
-    table = engine.built.packed.table(m.CONTACTS)
+    table = engine.model.arrays.table(m.CONTACTS)
     return np.concatenate(
         [
             sites[b, m.FRAME.velocity : m.FRAME.velocity + 3] - sites[a, m.FRAME.velocity : m.FRAME.velocity + 3]
@@ -41,11 +41,11 @@ def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """The start with the balls moved by `offsets` (3 per contact) as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
-    layout = engine.built.layout
+    numbering = engine.model.numbering
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
     moving = y.copy()
-    moving[layout.nq : layout.nq + layout.nv] = speeds
-    rates = engine.evaluate(project(engine, moving), engine.start)[: layout.nq]
+    moving[numbering.nq : numbering.nq + numbering.nv] = speeds
+    rates = engine.evaluate(project(engine, moving), engine.start)[: numbering.nq]
     moved = y.copy()
-    moved[: layout.nq] += rates  # rates per unit time, for one unit: a displacement of 1e-8 m is linear
+    moved[: numbering.nq] += rates  # rates per unit time, for one unit: a displacement of 1e-8 m is linear
     return project(engine, moved)

@@ -20,7 +20,7 @@ def text(engine: Engine) -> str:
     """When and why the stepper stopped, in words."""
     control, n = engine.view(m.CONTROL, m.N_CONTROLS), engine.n
     where = singular.diagnosis(engine)
-    contacts = [name for name, *_ in engine.built.system.contacts]
+    contacts = [name for name, *_ in engine.model.mechanism.contacts]
     culprit = contacts[n[m.CULPRIT]] if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
@@ -28,7 +28,7 @@ def text(engine: Engine) -> str:
         f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
     unsolvable += _other_integrator(engine)
-    if not engine.built.system.closures:
+    if not engine.model.mechanism.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
     reasons = {
         m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is used up ([solver.evaluations]); "
@@ -53,13 +53,13 @@ def text(engine: Engine) -> str:
 
 def _other_integrator(engine: Engine) -> str:
     """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
-    name = engine.built.system.scene.solver.integrator
+    name = engine.model.scene.solver.integrator
     return f"; or it moves on and {name} does not get over the pose: try dop853" if name in IMPLICIT else ""
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
     """What used the evaluations up, and what helps."""
-    name, done = engine.built.system.scene.solver.integrator, control[m.TIME] - engine.start
+    name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
     told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
     if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):

@@ -70,12 +70,12 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     start, residual = consistent_start(engine)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
-    require_closed(engine.built, trajectory, seen)
+    require_closed(engine.model, trajectory, seen)
     return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched)
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
-    if not engine.built.system.contacts:
+    if not engine.model.mechanism.contacts:
         return None
     from pipeline.dynamics.run.sensitivity import twin
 

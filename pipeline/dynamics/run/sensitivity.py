@@ -39,11 +39,11 @@ class Twin:
 
 def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     """Run the scene again from a start whose balls are offset, and compare the links' velocities."""
-    contacts = len(engine.built.system.contacts)
-    size = max(engine.rtol * engine.built.system.length, SMALLEST)
+    contacts = len(engine.model.mechanism.contacts)
+    size = max(engine.rtol * engine.model.mechanism.length, SMALLEST)
     direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
     moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
-    time = output_times(engine.breaks, engine.built.system.scene.output.interval)[::EVERY]
+    time = output_times(engine.breaks, engine.model.scene.output.interval)[::EVERY]
     one = _velocities(engine, trajectory, time)
     visible = PARTED * float(np.linalg.norm(one, axis=2).max())
 

@@ -9,8 +9,8 @@ import numpy as np
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.model import Tables
-from pipeline.dynamics.model.numbering import Layout
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from pipeline.dynamics.run.engine import Engine
@@ -35,7 +35,7 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
     engine.keep(everything)
     engine.attempt(y, t)
     spread = engine.rows(m.SPREAD)
-    scales = selection.row_scales(engine.built, spread)
+    scales = selection.row_scales(engine.model, spread)
     kept, ratio = selection.choose(spread, scales, engine.mobility.rank)
     engine.keep(kept)
     engine.view(m.ROW_SCALE, int(kept.sum()))[:] = scales[kept] ** 2
@@ -47,7 +47,7 @@ def improve(engine: Engine, t: float) -> bool:
 
     The state in Y and its slope stay as they are: the motion does not depend on the selection.
     """
-    size, rows = engine.built.packed.size(m.NY), len(engine.kept)
+    size, rows = engine.model.arrays.size(m.NY), len(engine.kept)
     row_scale = engine.view(m.ROW_SCALE, rows).copy()
     y, slope = engine.view(m.Y, size).copy(), engine.view(m.SLOPES, size).copy()
     pivots, before = engine.view(m.PIVOT, m.PIVOT_SIZE), engine.kept.copy()
@@ -63,36 +63,36 @@ def improve(engine: Engine, t: float) -> bool:
     return better
 
 
-def scaled(built: Tables, h: np.ndarray, J: np.ndarray) -> np.ndarray:
+def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`, so that all entries are pure numbers."""
-    along = built_rows(built, h) == 0
-    return J * np.where(along, 1.0 / SCALE, 1.0)[:, None] * coordinate_scales(built.layout)
+    along = built_rows(model, h) == 0
+    return J * np.where(along, 1.0 / SCALE, 1.0)[:, None] * coordinate_scales(model.numbering)
 
 
-def built_rows(built: Tables, h: np.ndarray) -> np.ndarray:
+def built_rows(model: Model, h: np.ndarray) -> np.ndarray:
     """Kind of each kept row: 0 along an axis [m], 1 of two axes [-]."""
     kinds = []
-    rows = built.packed.table(m.CLOSURE_ROWS, h)
-    for c in built.packed.table(m.CLOSURES, h):
+    rows = model.arrays.table(m.CLOSURE_ROWS, h)
+    for c in model.arrays.table(m.CLOSURES, h):
         kinds.append(rows["kind"][c["row0"] : c["row0"] + c["n_kept"]])
     return np.concatenate([*kinds, np.zeros(0, dtype=np.int64)])
 
 
-def coordinate_scales(layout: Layout) -> np.ndarray:
+def coordinate_scales(numbering: Numbering) -> np.ndarray:
     """One radian, `SCALE`, or `SCALE` times the root of a kilogram, per free coordinate."""
-    scales = np.full(layout.nv, SCALE)
-    for i, link in enumerate(layout.system.links):
-        if i and layout.driven(i) < 0:
+    scales = np.full(numbering.nv, SCALE)
+    for i, link in enumerate(numbering.mechanism.links):
+        if i and numbering.driven(i) < 0:
             for k, letter in enumerate(joint_class(link.kind).SPEEDS):
-                scales[layout.c0[i] + k] = 1.0 if letter == "r" else SCALE
+                scales[numbering.c0[i] + k] = 1.0 if letter == "r" else SCALE
     return scales
 
 
 def diagnosis(engine: Engine) -> str:
     """Condition number at the last evaluated state, and the joint whose closure is nearest to dependent."""
-    if not engine.built.system.closures:
+    if not engine.model.mechanism.closures:
         return "no loop is closed"
-    J = scaled(engine.built, engine.h, engine.rows(m.JACOBIAN))
+    J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
     if not J.size or not np.isfinite(J).all():
         return "the closures cannot be evaluated"
     U, values, _ = np.linalg.svd(J)
@@ -104,7 +104,7 @@ def diagnosis(engine: Engine) -> str:
 
 def worst_joint(engine: Engine, left: np.ndarray) -> str:
     """Joint with the largest share of a left singular vector."""
-    return selection.joints_of_rows(engine.built, engine.h)[int(np.argmax(np.abs(left)))]
+    return selection.joints_of_rows(engine.model, engine.h)[int(np.argmax(np.abs(left)))]
 
 
 def condition(values: np.ndarray) -> float:

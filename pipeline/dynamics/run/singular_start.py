@@ -63,12 +63,12 @@ def depart(engine: Engine, y0: np.ndarray) -> Departure:
 
     y0: with all loops closed.
     """
-    nq, nv = engine.built.layout.nq, engine.built.layout.nv
+    nq, nv = engine.model.numbering.nq, engine.model.numbering.nv
     engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
     engine.attempt(y0, engine.start)
     slope = engine.view(m.SLOPES, len(y0)).copy()
     slope[nq:] = 0.0
-    floors = engine.built.packed.table(m.FLOORS)["magnitude"][engine.built.packed.table(m.GROUPS)["group"]]
+    floors = engine.model.arrays.table(m.FLOORS)["magnitude"][engine.model.arrays.table(m.GROUPS)["group"]]
     fastest = float(np.max(np.abs(slope[:nq] / floors[:nq]), initial=0.0))
     if fastest > 0.0:
         span = min(FIRST / fastest, 0.5 * (engine.breaks[1] - engine.breaks[0]))
@@ -86,7 +86,7 @@ def _along(engine: Engine, y0: np.ndarray, slope: np.ndarray, span: float, size:
 
     size: of positions and speeds, that what is left is compared with.
     """
-    nq, n = engine.built.layout.nq, len(size)
+    nq, n = engine.model.numbering.nq, len(size)
     start, weights, used = y0.copy(), span * _integrals(NODES), 0
     states = y0 + span * NODES[:, None] * slope
     singular.select_rows(engine, states[-1], engine.start + span)

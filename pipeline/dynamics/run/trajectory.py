@@ -112,7 +112,7 @@ def integrate(
 
 def _begin(engine: Engine, y: np.ndarray) -> _Run:
     run = _prepare(engine, y, engine.start)
-    run.rows[0, 0], run.rows[0, 1 + 2 * engine.built.packed.size(m.N_CONTACTS) :] = engine.start, y
+    run.rows[0, 0], run.rows[0, 1 + 2 * engine.model.arrays.size(m.N_CONTACTS) :] = engine.start, y
     run.n[m.N_RECORDED], run.n[m.NEXT_OUTPUT] = 1, 1
     _begin_closed(engine, y, run.rows[0], run.events)
     return run
@@ -129,14 +129,14 @@ def _resume(engine: Engine, left: Handover) -> _Run:
 
 def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
     """Work space and record of an integration from state y at time t, nothing recorded yet."""
-    built, n = engine.built, engine.n
-    scene, contacts = built.system.scene, built.packed.size(m.N_CONTACTS)
+    model, n = engine.model, engine.n
+    scene, contacts = model.scene, model.arrays.size(m.N_CONTACTS)
     control = engine.view(m.CONTROL, m.N_CONTROLS)
     engine.select_pieces_after(t)
     control[:] = 0.0
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
-    control[m.RTOL], control[m.LENGTH] = engine.rtol, built.system.length
-    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, built.method.parameter(scene.solver)
+    control[m.RTOL], control[m.LENGTH] = engine.rtol, model.mechanism.length
+    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, model.method.parameter(scene.solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[n[m.MODE] :] = 0
     n[m.CAP] = scene.solver.evaluations
@@ -171,7 +171,7 @@ def _depart(engine: Engine, run: _Run) -> None:
 
 def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.ndarray) -> None:
     """Contacts that the start already has begin there, at the approach speeds that the scene declares."""
-    contacts = engine.built.system.contacts
+    contacts = engine.model.mechanism.contacts
     if not contacts:
         return
     n, count = engine.n, len(contacts)
@@ -193,11 +193,11 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
 
 def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
     """To the end of the segment; True when it was stopped before."""
-    packed, n = engine.built.packed, run.n
+    arrays, n = engine.model.arrays, run.n
     control = engine.view(m.CONTROL, m.N_CONTROLS)
     while True:
         n[m.BUDGET] = n[m.EVALUATIONS] + SLICE
-        engine.entry.advance(engine.h, packed.f, run.w, n, run.outputs, run.rows, run.events)
+        engine.entry.advance(engine.h, arrays.f, run.w, n, run.outputs, run.rows, run.events)
         t = control[m.TIME]
         progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
         status = n[m.STATUS]
@@ -223,7 +223,7 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
 def _crawls(engine: Engine, run: _Run) -> bool:
     """Whether stability limits the steps so much that the run would take far too long."""
     n, control = run.n, engine.view(m.CONTROL, m.N_CONTROLS)
-    if engine.built.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
+    if engine.model.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
         return False
     done = max((control[m.TIME] - engine.start) / control[m.SPAN], 1e-12)
     too_many = min(HOPELESS, n[m.CAP])
