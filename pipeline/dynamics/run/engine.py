@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -76,6 +77,10 @@ class Engine:
         """A stretch of the work space, not copied."""
         o = self.model.arrays.offset(place)
         return self.w[o : o + length]
+
+    def table(self, table: Any, count: int) -> np.ndarray:
+        """Rows of a table of the work space with named fields, not copied, shape (count,)."""
+        return m.named(table, self.view(table.place, table.size * count))
 
     def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
         """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
@@ -170,7 +175,7 @@ def may_depart(model: Model) -> bool:
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y with the angles that loads follow as they are at the start; InputError for a spring without direction."""
     _look(engine, y)
-    loads = engine.view(m.LOAD.place, m.LOAD.size * engine.model.arrays.size(m.N_LOADS)).reshape(-1, m.LOAD.size)
+    loads = engine.table(m.LOAD, engine.model.arrays.size(m.N_LOADS))
     return initial.start_loads(engine.model, y, loads.copy())
 
 
@@ -192,7 +197,7 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     if not contacts:
         return {}
     engine.evaluate(y, engine.start)
-    gaps = engine.view(m.TOUCH.place, m.TOUCH.size * len(contacts)).reshape(-1, m.TOUCH.size)[:, m.TOUCH.gap]
+    gaps = engine.table(m.TOUCH, len(contacts))["gap"]
     return {c: -float(gaps[c]) for c, (_, joint, _, _) in enumerate(contacts) if gaps[c] < -1e-9 * joint.clearance}
 
 

@@ -176,8 +176,8 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
         return
     n, count = engine.n, len(contacts)
     modes, latched = n[n[m.MODE] : n[m.MODE] + count], engine.view(m.LATCHED, count)
-    watched = engine.view(m.WATCH.place, m.WATCH.size * count).reshape(count, -1)
-    watched[:] = 0.0
+    watched = engine.table(m.WATCH, count)
+    engine.view(m.WATCH.place, m.WATCH.size * count)[:] = 0.0
     for c in overlapping(engine, y):
         speed = contacts[c][1].initial_approach_speed
         if speed is None:
@@ -186,7 +186,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
         event = events[n[m.N_EVENTS]]
         event[[m.EVENT.time, m.EVENT.contact, m.EVENT.kind]] = engine.start, c, m.CLOSING
         event[[m.EVENT.speed, m.EVENT.peak_force, m.EVENT.peak_depth]] = speed, 0.0, 0.0
-        watched[c, [m.WATCH.event_row, m.WATCH.trend0]] = n[m.N_EVENTS], m.STEEPLY
+        watched["event_row"][c], watched["trend0"][c] = n[m.N_EVENTS], m.STEEPLY
         n[m.N_EVENTS] += 1
     row[1 : 1 + count], row[1 + count : 1 + 2 * count] = modes, latched
 
