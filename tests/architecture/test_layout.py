@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import shutil
 import subprocess
@@ -133,10 +134,25 @@ def test_the_readme_names_only_commands_that_exist(root: Path):
         assert link.startswith("http") or (root / link).exists(), link
 
 
-def test_the_makefile_lists_itself(root: Path):
+@pytest.mark.parametrize("options", [(), ("-w",), ("-C", ".")], ids=["plain", "telling folders", "from elsewhere"])
+@pytest.mark.parametrize("outer", [{}, {"MAKELEVEL": "1", "MAKEFLAGS": "w"}], ids=["shell", "below make"])
+def test_the_makefile_lists_itself(root: Path, options: tuple[str, ...], outer: dict[str, str]):
+    """However make is called: below another make, as in `make test`, and with -w it tells the folders it enters."""
     make = shutil.which("make")
     assert make is not None
-    listed = subprocess.run([make, "help"], cwd=root, capture_output=True, text=True, check=True).stdout
+    shell = {name: value for name, value in os.environ.items() if not name.startswith("MAKE")} | outer
+    listed = subprocess.run([make, *options, "help"], cwd=root, env=shell, capture_output=True, text=True, check=True)
     phony = re.search(r"^\.PHONY: (.*)$", (root / "Makefile").read_text(), re.MULTILINE)
     assert phony is not None
-    assert {line.split()[1] for line in listed.splitlines()} == set(phony[1].split())
+    of_make = re.compile(r"make(\[\d+\])?: ")
+    lines = [line for line in listed.stdout.splitlines() if not of_make.match(line)]
+    assert {line.split()[1] for line in lines} == set(phony[1].split())
+
+
+def test_what_must_pass_is_what_a_user_types(root: Path):
+    """Flags of its own would hide what goes wrong without them."""
+    text = (root / ".ci" / "run").read_text()
+    assert re.findall(r"^\s*make\b(.*)$", text, re.MULTILINE) == [' "$target"']
+    run = re.search(r"^for target in (.*); do$", text, re.MULTILINE)
+    assert run is not None
+    assert run[1].split() == ["setup", "check", "test"]
