@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.progress import Progress, silent
 from stages.s4_simulate import rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 #: each scene is run so often, as the median of three is not moved by one disturbed run; but a second run that takes
 #: the same to within this share shows that nothing disturbs
@@ -98,9 +98,7 @@ def paper_scene(scene: Scene) -> Scene:
 def _simulation(bundles: Mapping[str, xr.Dataset]) -> Callable[[Scene], xr.Dataset]:
     from pipeline import dynamics
 
-    def silent(fraction: float | None, text: str) -> None:
-        """Reports would be part of what is measured."""
-
+    # reports would be part of what is measured
     return lambda scene: dynamics.simulate(scene, bundles, silent)
 
 

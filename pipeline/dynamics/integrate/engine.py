@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.dynamics.assembly import fuse, initial, selection
 from pipeline.dynamics.assembly.mobility import Mobility, analyse
 from pipeline.dynamics.assembly.numbers import Tables
@@ -15,8 +15,6 @@ from pipeline.dynamics.integrate import observe as observing
 from pipeline.dynamics.integrate import singular
 from pipeline.dynamics.integrate.method import scheme_of
 from pipeline.dynamics.tables import ACTIVE, EVALUATION, FRAME_SIZE, GAP, LOAD_SIZE, OK, TOUCH_SIZE
-
-Progress = Callable[[float | None, str], None]
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
