@@ -4,29 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
 
 from pipeline.post import figures
 from pipeline.post.discrepancies import DISCREPANCIES
-from pipeline.post.page import html_page
+from pipeline.post.page import Content, html_page
 from pipeline.post.paper import CITATION
 from pipeline.post.plotting.table import Table, from_markdown
-
-
-@dataclass(frozen=True, slots=True)
-class Content:
-    """All that a report shows. Paths are relative to the report's folder."""
-
-    figures: tuple[str, ...]  #: names with a PNG
-    tables: Mapping[str, Table]
-    assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
-    film: str | None = None
-    still: str | None = None
-    links: Mapping[str, str] = field(default_factory=dict)  #: text -> path
-    facts: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  #: scene -> run attributes
 
 
 def collect(results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str) -> Content:
