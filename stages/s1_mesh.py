@@ -15,7 +15,7 @@ from stages.families import constants, module
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 KINDS = "pipeline.structure.kinds"
 #: keys of a recipe's shape that name files

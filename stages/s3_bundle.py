@@ -12,8 +12,8 @@ from stages.families import module
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 STRESS = "pipeline.structure.stress"
 SHORTENING = "pipeline.structure.modes.geometric_stiffness"

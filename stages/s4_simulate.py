@@ -11,8 +11,8 @@ from stages.families import constants, module
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 DYNAMICS = "pipeline.dynamics"
 #: methods that may be given up for an implicit one on the way (pipeline.dynamics.run)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from pipeline.structure.closed_form import frequencies as closed_form
 from pipeline.structure.fe import beam, mesh
-from pipeline.structure.modes import closed_form
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
 
 CHECKS = Path(__file__).parents[2] / "meshes" / "checks"

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from pipeline.structure.closed_form import frequencies as closed_form
 from pipeline.structure.fe import beam, mesh
 from pipeline.structure.fe.slices import slices
-from pipeline.structure.modes import closed_form
 from tests.analytic.beam_models import RECIPE, build, order
 from tests.analytic.beam_solutions import PAPER_ROD
 from tests.analytic.stepped_rods import Lump, Piece, frequencies

@@ -113,7 +113,7 @@ def means(model: Model) -> sp.csr_array:
 def test_dense_and_sparse_solvers_agree_on_held_functionals(
     monkeypatch: pytest.MonkeyPatch, body: Flexibility, rows: Callable[[Model], sp.csr_array]
 ) -> None:
-    from pipeline.structure.kinds.kind import silent
+    from pipeline.core.progress import silent
     from pipeline.structure.modes import normal
 
     held = rows(body.model)

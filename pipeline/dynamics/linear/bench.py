@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
@@ -17,7 +18,7 @@ from pipeline.dynamics.model import initial, selection
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.engine import Engine, Progress, observe, prepare
+from pipeline.dynamics.run.engine import Engine, observe, prepare
 
 #: impact rate that a contact is given: at rest the hysteresis of an impact long past has no say
 NO_IMPACT = 1e300

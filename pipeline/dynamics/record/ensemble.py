@@ -14,12 +14,13 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import ENSEMBLE, conform
 from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress, silent
 from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.record.dataset import attributes
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start
+from pipeline.dynamics.run.engine import Engine, consistent_start
 from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.run.run import engines, observed
@@ -44,17 +45,13 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         offsets = random.normal(size=(len(scene.contacts()), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
-        last, trajectory, switched = follow(engine, moved, _quiet, other)
+        last, trajectory, switched = follow(engine, moved, silent, other)
         members.append(_member(last, trajectory, names))
         reasons += [switched] if switched else []
         progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
     return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
-
-
-def _quiet(share: float | None, text: str) -> None:
-    """Progress is told per member."""
 
 
 def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:

@@ -14,13 +14,14 @@ import numpy as np
 import xarray as xr
 from scipy.linalg import null_space
 
+from pipeline.core.progress import Progress
 from pipeline.core.scene.laws import Constant
 from pipeline.core.scene.loads import JointForce
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.drives.pieces import Piece, Pieces
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
+from pipeline.dynamics.run.engine import Engine, consistent_start, observe, prepare
 from pipeline.dynamics.run.inverse import RANK, closure_jacobian, rate, renamed
 from pipeline.dynamics.run.trajectory import integrate as step
 

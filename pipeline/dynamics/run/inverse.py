@@ -19,6 +19,7 @@ import xarray as xr
 from scipy.linalg import null_space, qr
 
 from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress
 from pipeline.core.scene.drives import JointDrive, PathDrive
 from pipeline.core.scene.laws import Constant
 from pipeline.core.scene.schema import Scene
@@ -29,7 +30,7 @@ from pipeline.dynamics.model.driving import coordinate_of
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run.coordinates import joint_coordinates, label
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
+from pipeline.dynamics.run.engine import Engine, consistent_start, observe, prepare
 from pipeline.dynamics.run.trajectory import integrate as step
 
 #: singular values below this share of the largest are zero

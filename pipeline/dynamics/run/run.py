@@ -11,13 +11,14 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import SolverError
+from pipeline.core.progress import Progress
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.run.beside import beside
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
+from pipeline.dynamics.run.engine import Engine, consistent_start, observe, prepare
 from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.switching import follow, implicit
 from pipeline.dynamics.run.trajectory import Trajectory

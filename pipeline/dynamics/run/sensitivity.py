@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.core.progress import silent
 from pipeline.core.quantities import PARTED
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run.engine import Engine, observe
@@ -56,7 +57,7 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
         return bool(np.linalg.norm(one[[k]] - two, axis=2).max() > visible)
 
     try:
-        other = integrate(engine, moved, _quiet, parted)
+        other = integrate(engine, moved, silent, parted)
     except SolverError:
         # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
         return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
@@ -71,7 +72,3 @@ def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.
     rows = trajectory.rows[np.searchsorted(trajectory.time, time)]
     frames = observe(engine, rows)["link_frame"].reshape(len(rows), -1, m.FRAME.size)
     return frames[:, :, m.FRAME.velocity : m.FRAME.velocity + 3]
-
-
-def _quiet(share: float | None, text: str) -> None:
-    """The run itself has told its progress."""

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.progress import Progress
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.run.engine import Engine, Progress
+from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.handover import StiffError
 from pipeline.dynamics.run.trajectory import Trajectory, integrate
 

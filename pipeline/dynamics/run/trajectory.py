@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.core.progress import Progress
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import refusal, singular
-from pipeline.dynamics.run.engine import Engine, Progress, overlapping
+from pipeline.dynamics.run.engine import Engine, overlapping
 from pipeline.dynamics.run.handover import Handover, StiffError, hand_over, take_over
 from pipeline.dynamics.run.singular_start import depart
 
