@@ -14,8 +14,8 @@ from benchmarks.exudyn_runs import SAMPLING, Samples
 from benchmarks.measure import once
 from pipeline import dynamics
 from pipeline.core.progress import silent
-from pipeline.dynamics.run.engine import consistent_start
 from pipeline.dynamics.run.run import observed
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import integrate
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
@@ -110,6 +110,6 @@ def _regular(motion: xr.Dataset) -> Samples:
 
 def _timer(here: Mechanism) -> Callable[[], float]:
     engine = here.engine()
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     # with the rows evaluated, as the peer evaluates its samples
     return lambda: once(lambda: observed(engine, integrate(engine, start, silent)))

@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import dynamics
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
@@ -43,7 +44,7 @@ def simulate(solver: dict[str, Any]) -> xr.Dataset:
 
 def impact_forces(run: xr.Dataset) -> np.ndarray:
     """Largest force [N] of every impact."""
-    hard = (run.event_kind.values == 1) & (run.event_approach_speed.values > IMPACT)
+    hard = (run.event_kind.values == CLOSING) & (run.event_approach_speed.values > IMPACT)
     return run.event_peak_force.values[hard]
 
 

@@ -10,7 +10,7 @@ from benchmarks.measure import interleaved, once
 from benchmarks.tables import percent, table
 from pipeline import dynamics
 from pipeline.core.progress import silent
-from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import integrate
 
 TITLE = "Seconds per warm run"
@@ -41,7 +41,7 @@ def measure() -> Iterator[dict[str, Any]]:
 
 def _integration(here: Mechanism) -> tuple[Callable[[], float], dict[str, int]]:
     engine = here.engine()
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     counters = integrate(engine, start, silent).counters
     return lambda: once(lambda: integrate(engine, start, silent)), counters
 

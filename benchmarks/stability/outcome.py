@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipeline.core.artifacts.event_kinds import CLOSING
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -54,7 +56,7 @@ def judge(run: xr.Dataset, deviation: float, seconds: float) -> Outcome:
     closure = float(run["constraint_error"].max())
     start, end = float(run["time"][0]), float(run["time"][-1])
     reason = fault(run, ledger, closure, deviation)
-    closings = run["event_kind"].values == 1
+    closings = run["event_kind"].values == CLOSING
     return Outcome(
         verdict=WRONG if reason else FINISHED,
         reason=reason,

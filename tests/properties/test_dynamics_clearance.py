@@ -118,7 +118,7 @@ class Touch:
         self.losses = w[losses : losses + 2]
         self.bending = 0.0  # power that bends the bristles at this normal force
         if self.place >= 0:
-            rate = turned @ w[losses + m.PER_CONTACT :][:3]
+            rate = turned @ w[losses + m.CONTACT_LEDGER.size :][:3]
             self.bending = 1e5 * self.touch[m.TOUCH.normal_force] * float(self.bent @ rate)
             self.out_of_plane = float(rate @ self.axis)
 

@@ -11,8 +11,8 @@ from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import trajectory as stepping
-from pipeline.dynamics.run.engine import consistent_start
 from pipeline.dynamics.run.run import observed
+from pipeline.dynamics.run.start import consistent_start
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
 FIXED = ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "generalized-alpha", "radau")
@@ -54,7 +54,7 @@ def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
 def test_a_right_hand_side_that_is_no_number_is_refused(solver: dict[str, Any]) -> None:
     scene = Scene.model_validate({**double_pendulum(), "solver": {"rtol": 1e-6, **solver}})
     engine = engine_with(scene)
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     engine.model.arrays.table(m.GRAVITY)["acceleration"] = np.nan
     with pytest.raises(SolverError, match="not a number"):
         stepping.integrate(engine, start, lambda share, text: None)
@@ -123,7 +123,7 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
             {**table, "solver": {"integrator": "generalized-alpha", "rho_inf": rho, "step": 0.05, "rtol": 1e-6}}
         )
     )
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     made = stepping.integrate(engine, start, lambda share, text: None)
     kinetic, potential, _ = observed(engine, made)["energy"].T
     total = kinetic + potential

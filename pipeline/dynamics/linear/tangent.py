@@ -70,9 +70,8 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 
 def scales(bench: Bench) -> np.ndarray:
     """Size of a large displacement of every coordinate: the mechanism's size, or a radian; shape (nv,)."""
-    arrays, numbering = bench.engine.model.arrays, bench.engine.model.numbering
-    groups = arrays.table(m.GROUPS)["group"][numbering.nq : numbering.nq + numbering.nv]
-    return arrays.table(m.FLOORS)["magnitude"][groups]
+    arrays = bench.model.arrays
+    return arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"][bench.model.speeds]]
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.model.driving import drive_laws, joint_class
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.laws import NONE, drive_laws
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.tree import PATH, Edge
-
-NONE: Mapping[str, Pieces] = {}
 
 
 @dataclass(frozen=True)
@@ -41,28 +40,21 @@ def constraints(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> lis
     """All joints but contacts and paths: those of the tree in the order of its links, then the closures."""
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
-    tree = [link.branch.edge for link in mechanism.links if link.branch.edge is not None and not massless(link)]
-    found = []
-    for edge in [*tree, *(edge for edge, _, _ in mechanism.closures)]:
+    tree = [link.branch.edge for link in mechanism.links if link.branch.edge is not None and not link.massless]
+    joints = []
+    for edge in [*tree, *(closure.edge for closure in mechanism.closures)]:
         if edge.kind == PATH:
             continue
         a, b = mechanism.site(edge.frame_a), mechanism.site(edge.frame_b)
         values = {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
-        found.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
-    return found
-
-
-def massless(link: Link) -> bool:
-    """Whether a link only stands between two freedoms of a joint, or is the ground."""
-    return link.inertia is None and not link.flexible
+        joints.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
+    return joints
 
 
 def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
     """A link's own side of its inboard joint, in the link's frame."""
-    edge = link.branch.edge
-    if edge is None or not link.flexible:
-        return Placement()
-    return mechanism.frames[edge.frame_a if link.branch.reverse else edge.frame_b].place
+    frame = link.branch.frame
+    return Placement() if frame is None or not link.flexible else mechanism.frames[frame].place
 
 
 def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:

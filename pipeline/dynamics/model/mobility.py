@@ -18,9 +18,9 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import weightless
 from pipeline.dynamics.model.assembly import close, settled
 from pipeline.dynamics.model.constraints import constraints, demands, freedoms, outboard_place
+from pipeline.dynamics.model.mechanism import Closure
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.tree import PATH
 from pipeline.dynamics.model.wiring import closure_route
 
 #: singular values below this share of the largest are zero: poses fit to 1e-11, curvature brings that to 1e-9
@@ -67,7 +67,7 @@ def analyse(model: Model) -> Mobility:
     Raises InputError for a mechanism that cannot move at all, drives that contradict each other and motions that no
     mass resists.
     """
-    poses, singular = [link.start for link in model.mechanism.links], ""
+    poses, singular = [link.start for link in model.links], ""
     J, known = jacobians(model, poses)
     rank = _rank(J)
     regular = _regular_poses(model, J, rank) if rank < len(J) else None
@@ -87,20 +87,20 @@ def jacobians(model: Model, poses: Sequence[Placement]) -> tuple[np.ndarray, np.
 
     Scaled by the mechanism's size; each joint's motions in an orthonormal basis.
     """
-    numbering, L = model.numbering, model.mechanism.length
+    numbering, L = model.numbering, model.length
     twists = _columns(model, poses)
     J = np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), numbering.nv + numbering.known))
     row = 0
-    for line, k in zip(model.arrays.table(m.CLOSURES), model.closure_order, strict=True):
-        wrenches = _scaled_wrenches(model.mechanism.closures[k][0].kind, _sites(model, poses, k), L)
+    for line, closure in zip(model.arrays.table(m.CLOSURES), model.closures, strict=True):
+        wrenches = _scaled_wrenches(closure.edge.kind, _sites(closure, poses), L)
         for coordinate, column, sign in closure_route(numbering, int(line["site_a"]), int(line["site_b"])):
             J[row : row + len(wrenches), coordinate] += sign * wrenches @ twists[column]
         row += len(wrenches)
     return J[:, : numbering.nv], J[:, numbering.nv :]
 
 
-def _sites(model: Model, poses: Sequence[Placement], k: int) -> tuple[Placement, Placement]:
-    _, a, b = model.mechanism.closures[k]
+def _sites(closure: Closure, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
+    _, a, b = closure
     return poses[a.link].of(a.place), poses[b.link].of(b.place)
 
 
@@ -115,35 +115,35 @@ def _scaled_wrenches(kind: str, frames: tuple[Placement, Placement], L: float) -
 
 def _columns(model: Model, poses: Sequence[Placement]) -> np.ndarray:
     """Twist of every column of the layout, shape (columns, 6); velocities in units of the size per second."""
-    numbering, L = model.numbering, model.mechanism.length
+    numbering, L = model.numbering, model.length
     twists = np.zeros((numbering.columns, 6))
-    for i, link in enumerate(model.mechanism.links):
+    for i, link in enumerate(model.links):
         if link.inboard is None:
             continue
         F = poses[link.inboard.link].of(link.inboard.place)
         basis = freedoms(link.kind, F, poses[i].of(outboard_place(model.mechanism, link)), L)
-        twists[numbering.c0[i] : numbering.c0[i] + len(basis)] = basis
+        twists[numbering.coordinates[i]] = basis
     for site, frame, first in numbering.ports:
         on = numbering.sites[site].link
-        twists[first : first + numbering.modes[on]] = _shape_twists(model, on, frame, poses[on])
+        twists[first : first + len(numbering.modal_positions[on])] = _shape_twists(model, on, frame, poses[on])
     return twists
 
 
 def _shape_twists(model: Model, link: int, frame: str, pose: Placement) -> np.ndarray:
     """Twists of a frame of a flexible link per mode, relative to its inboard frame, undeformed; (modes, 6)."""
-    branch = model.mechanism.links[link].branch
-    own = None if branch.edge is None else (branch.edge.frame_a if branch.reverse else branch.edge.frame_b)
+    own = model.links[link].branch.frame
     twists = _frame_twists(model, link, frame, pose)
     return twists if own is None else twists - _frame_twists(model, link, own, pose)
 
 
 def _frame_twists(model: Model, link: int, frame: str, pose: Placement) -> np.ndarray:
-    bundle = model.mechanism.bundles[str(model.mechanism.links[link].flexible)]
+    bundle = model.links[link].bundle
+    assert bundle is not None
     k = list(bundle["frame"].values).index(frame.partition(".")[2])
     turning = (pose.R @ bundle["frame_rotation_shape"].values[k]).T
     moving = (pose.R @ bundle["frame_translation_shape"].values[k]).T
     p = pose.of(Placement(bundle["frame_position"].values[k])).p
-    L = model.mechanism.length
+    L = model.length
     # per modal coordinate of the mechanism's size: sqrt(kg) m
     return L * np.hstack([turning, (moving + np.cross(p, turning)) / L])
 
@@ -157,12 +157,10 @@ def _rank(J: np.ndarray) -> int:
 
 def _regular_poses(model: Model, J: np.ndarray, rank: int) -> list[Placement] | None:
     """Poses nearby in which the closures have a higher rank than at the start, if there are any."""
-    flexible = any(link.flexible for link in model.mechanism.links)
-    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in model.mechanism.links)
-    if rank == model.numbering.nv or flexible or paths:
+    if rank == model.nv or model.mechanism.has_paths or not model.mechanism.all_rigid:
         return None
     joints = constraints(model.mechanism)
-    poses = [link.start for link in model.mechanism.links]
+    poses = [link.start for link in model.links]
     free = np.linalg.svd(J)[2][rank:]
     random = np.random.default_rng(0)
     for size in NEARBY:
@@ -179,7 +177,7 @@ def _regular_poses(model: Model, J: np.ndarray, rank: int) -> list[Placement] | 
 
 def _singular_start(model: Model, J: np.ndarray, rank: int) -> str:
     """What is said of a start in a singular pose."""
-    names = {model.mechanism.closures[k][0].name: None for k in model.closure_order}
+    names = {closure.edge.name: None for closure in model.closures}
     values = np.linalg.svd(J, compute_uv=False)
     ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
     return (
@@ -191,7 +189,7 @@ def _singular_start(model: Model, J: np.ndarray, rank: int) -> str:
 
 def _displaced(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
     """Poses after a small motion of the tree's free coordinates."""
-    numbering, L = model.numbering, model.mechanism.length
+    numbering, L = model.numbering, model.length
     twists, moved = _columns(model, poses), [poses[0]]
     for i in range(1, len(poses)):
         route = [(c, col) for c, col in numbering.joint_route(i) if c < numbering.nv]
@@ -206,12 +204,12 @@ def _undetermined(model: Model, J: np.ndarray, rank: int, poses: Sequence[Placem
     if rank == len(J):
         return frozenset()
     stress = np.linalg.svd(J.T)[2][rank:]  # (self-stresses, rows)
-    mechanism, L = model.mechanism, model.mechanism.length
+    mechanism, L = model.mechanism, model.length
     carried = np.zeros((len(mechanism.links), 6, len(stress)))  # wrench that a link takes from its closures
     found, row = set(), 0
-    for k in model.closure_order:
-        edge, a, b = mechanism.closures[k]
-        wrenches = _scaled_wrenches(edge.kind, _sites(model, poses, k), L)
+    for closure in model.closures:
+        edge, a, b = closure
+        wrenches = _scaled_wrenches(edge.kind, _sites(closure, poses), L)
         wrench = wrenches.T @ stress[:, row : row + len(wrenches)].T
         carried[a.link] -= wrench
         carried[b.link] += wrench
@@ -241,7 +239,7 @@ def _refuse_contradiction(model: Model, J: np.ndarray, known: np.ndarray, rank: 
     if not known.size or _rank(np.hstack([J, known])) == rank:
         return
     tied = _tied(J, known, rank)
-    drives = [name for k, name in enumerate(model.mechanism.drives) if k in tied]
+    drives = [name for k, name in enumerate(model.drives) if k in tied]
     moving = [name for name in drives if _moves(model, name)]
     if not moving:
         return
@@ -260,7 +258,7 @@ def _tied(J: np.ndarray, known: np.ndarray, rank: int) -> set[int]:
 
 
 def _moves(model: Model, name: str) -> bool:
-    first, count = model.arrays.table(m.LAWS)[model.mechanism.drives.index(name)]
+    first, count = model.arrays.table(m.LAWS)[model.drives.index(name)]
     pieces = slice(first, first + count)
     values = model.arrays.table(m.PIECES)["coefficients"][pieces]
     harmonics = model.arrays.table(m.PIECE_HARMONICS)["n_harmonics"][pieces]

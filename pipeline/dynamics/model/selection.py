@@ -100,6 +100,5 @@ def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
 
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
     """Name of the joint to which each kept row belongs."""
-    names = [model.mechanism.closures[k][0].name for k in model.closure_order]
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
-    return [name for name, count in zip(names, counts, strict=True) for _ in range(count)]
+    return [closure.edge.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

@@ -24,8 +24,8 @@ def refuse(model: Model, poses: Sequence[Placement], twists: np.ndarray, J: np.n
     twists: of every column of the layout, (columns, 6), velocities in units of the size; J: closure rows, (rows, nv).
     Flexible bodies are left to the engine, whose mass matrix knows their modes.
     """
-    links, nv, L = model.mechanism.links, model.numbering.nv, model.mechanism.length
-    if any(link.flexible for link in links) or rank == nv:
+    links, nv, L = model.links, model.nv, model.length
+    if rank == nv or not model.mechanism.all_rigid:
         return
     moved = np.zeros((len(links), 6, nv))
     own, even = np.zeros((nv, nv)), np.zeros((nv, nv))
@@ -59,7 +59,7 @@ def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
 def _refuse(model: Model, twists: np.ndarray) -> None:
     """twists: of every link in the motion, (links, 6)."""
     sizes = np.abs(twists).max(axis=1)
-    links = [link for link, size in zip(model.mechanism.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
+    links = [link for link, size in zip(model.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
     names = sorted({name for link in links for name in link.places})
     raise InputError(
         f"[body.{names[0]}.inertia]",

@@ -11,15 +11,18 @@ Source: line search by the power: Crisfield, *Non-linear Finite Element Analysis
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.linear.bench import Bench, closed
-from pipeline.dynamics.linear.names import leading
+from pipeline.core.progress import Progress
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
 from pipeline.dynamics.linear.tangent import Tangent, magnitude, scales, stiffness, tangent
+from pipeline.dynamics.model.model import Model
 
 #: iterations before giving up
 MOST = 200
@@ -33,18 +36,39 @@ ROUNDING = 1e-8
 LIMP = 1e-12
 #: a step may end with this share of the starting power turned against it
 OVERSHOOT = 0.5
+#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
+STEADY = 1e-9
+#: how far the drives are moved to see whether the forces stay the same [m or rad]
+PROBE = 1e-3
 
 
 @dataclass(frozen=True)
-class Settled:
-    """An equilibrium. residual: largest unbalanced force, moments divided by the mechanism's size [N]."""
+class Equilibrium:
+    """A pose in balance. residual: largest unbalanced force, moments divided by the mechanism's size [N]."""
 
     at: Tangent
     residual: float
     iterations: int
 
 
-def settle(bench: Bench, q: np.ndarray) -> Settled:
+def equilibrium(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    time: float | None,
+    drives: Mapping[str, float] | None,
+    moving: bool,
+) -> tuple[Bench, Equilibrium]:
+    """The bench of a scene and its equilibrium; see `pipeline.dynamics.equilibrium`."""
+    bench, q = hold(scene, bundles, progress, time, drives, moving)
+    progress(None, "looking for the equilibrium")
+    pose = find(bench, q)
+    if moving:
+        _require_steady(bench, pose.at)
+    return bench, pose
+
+
+def find(bench: Bench, q: np.ndarray) -> Equilibrium:
     """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
     at = tangent(bench, q)
     best, since = np.inf, 0
@@ -54,12 +78,12 @@ def settle(bench: Bench, q: np.ndarray) -> Settled:
         since = 0 if size < 0.5 * best else since + 1
         best = min(best, size)
         if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):
-            return Settled(at, residual(bench, at), iteration)
+            return Equilibrium(at, residual(bench, at), iteration)
         step = _step(bench, at, BALANCED * largest)
         if float(np.max(np.abs(at.Z @ step) / scales(bench))) <= SHORT:
-            return Settled(at, residual(bench, at), iteration)
+            return Equilibrium(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
-    loose = leading(bench, at.Z @ at.unbalanced, at.mass)
+    loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
         f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
         f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
@@ -68,15 +92,14 @@ def settle(bench: Bench, q: np.ndarray) -> Settled:
 
 def weight(bench: Bench) -> float:
     """Norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
-    arrays = bench.engine.model.arrays
-    mass = arrays.table(m.LINK_NUMBERS)["mass"].sum() + arrays.table(m.FLEX_NUMBERS)["mass"].sum()
-    return float(np.sqrt(mass) * np.linalg.norm(arrays.table(m.GRAVITY)["acceleration"][0]))
+    mass = sum(link.mass for link in bench.model.links)
+    return float(np.sqrt(mass) * np.linalg.norm(bench.model.gravity))
 
 
 def residual(bench: Bench, at: Tangent) -> float:
     """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
     forces = at.mass @ at.Z @ at.unbalanced
-    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.model.mechanism.length
+    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.model.length
 
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
@@ -107,3 +130,40 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
             return new
         share *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
+
+
+def _require_steady(bench: Bench, at: Tangent) -> None:
+    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
+    fastest = float(np.max(np.abs(bench.drives[:, 1]), initial=0.0))
+    if fastest == 0.0:
+        return
+    before = balance(bench, at.q)
+    onward = bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, np.zeros(len(bench.drives))], axis=1)
+    set_drives(bench, onward)
+    after = balance(bench, at.q)
+    set_drives(bench, bench.drives)
+    size = scales(bench)
+    change = float(np.max(np.abs(after.bias - before.bias) * size, initial=0.0))
+    largest = float(np.max(np.abs(before.bias) * size, initial=0.0))
+    loops = float(np.max(np.abs(before.slip), initial=0.0))
+    if change > STEADY * largest or loops > STEADY * fastest:
+        raise SolverError(
+            f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
+            "as they go on; hold the drives instead"
+        )
+
+
+def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
+    """What has most of the kinetic energy of a motion: a joint, a body held by none, or the deformation of one.
+
+    motion: speeds, shape (nv,).
+    """
+    energy, shares = motion * (mass @ motion), dict[str, float]()
+    for i, link in enumerate(model.links[1:], start=1):
+        edge, mine = link.branch.edge, model.numbering.coordinates[i]
+        name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
+        if not link.drives:
+            shares[name] = shares.get(name, 0.0) + float(energy[mine].sum())
+        if link.flexible:
+            shares[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
+    return max(shares, key=lambda name: shares[name])
