@@ -210,6 +210,6 @@ def test_rolling_is_no_sliding(laws: Laws, seed: int) -> None:
     touch = Touch(laws, seed, 1e-5, 1.0, together=True)
     assert touch.touch[tables.RATE] == pytest.approx(0.0, abs=1e-12)  # rounding of speeds of some m/s
     # a sliding speed of rounding, 1e-15 m/s, times slope 1.5 mu_s / v_s = 1e3 s/m, force 1e4 N, and speed; bent
-    # bristles bear up to mu_s of the force at any speed
+    # bristles bear up to mu_s of the force at any speed. The speed is a sum of some products of 10 m/s: ten times that
     bearing = 0.15 * touch.touch[tables.NORMAL_FORCE] if laws[1] == "lugre" else 1e-3
-    assert -touch.touch[tables.FRICTION_POWER] <= 1e-15 * bearing
+    assert -touch.touch[tables.FRICTION_POWER] <= 1e-14 * bearing

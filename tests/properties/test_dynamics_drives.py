@@ -114,8 +114,8 @@ def test_value_and_rate_do_not_jump_between_pieces(law: Any) -> None:
     for t in pieces(law).starts[1:]:
         for order in (0, 1):
             left, right = (value(law, t, order, side) for side in ("left", "right"))
-            # rounding of (t - start) / (end - start)
-            assert left == pytest.approx(right, abs=1e-13 * scale(law, order))
+            # some roundings of (t - start) / (end - start) and of the sum of the terms
+            assert left == pytest.approx(right, abs=1e-12 * scale(law, order))
 
 
 @every_law
@@ -140,7 +140,8 @@ def test_the_kernel_evaluates_the_pieces_and_their_exact_derivatives(law: Any) -
 @pytest.mark.parametrize("law", LAWS["spline"], ids=lambda law: f"{law.degree}-{law.ends}")
 def test_splines_pass_their_points_as_smoothly_as_they_say(law: Any) -> None:
     for t, x in zip(law.time, law.value, strict=True):
-        assert value(law, t) == pytest.approx(x, abs=1e-13)
+        # coefficients of up to `scale`, from equations whose condition is some tens
+        assert value(law, t) == pytest.approx(x, abs=1e-12)
     for t in pieces(law).starts[1:]:
         for order in range(law.degree):
             left, right = (value(law, t, order, side) for side in ("left", "right"))
@@ -205,7 +206,7 @@ def test_a_step_drive_is_the_sum_of_eq_29(steps: list[tuple[float, float, float]
 def test_the_papers_stroke_is_flat_at_its_ends_and_60_mm_high() -> None:
     # values of order 0.06 m, slopes of order 1 m/s, in rounding
     assert [value(STROKE, t) for t in (-0.1, 0.0, 0.045, 0.09, 0.135, 0.18, 1.0)] == pytest.approx(
-        [0.0, 0.0, 0.03, 0.06, 0.03, 0.0, 0.0], abs=1e-16
+        [0.0, 0.0, 0.03, 0.06, 0.03, 0.0, 0.0], abs=1e-15
     )
     assert [value(STROKE, t, 1) for t in (-0.1, 0.0, 0.045, 0.09, 0.18)] == pytest.approx(
         [0.0, 0.0, 1.5 * 0.06 / 0.09, 0.0, 0.0], abs=1e-14
