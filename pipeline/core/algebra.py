@@ -77,11 +77,6 @@ def rotation_vector_to_matrix(v: np.ndarray) -> np.ndarray:
     return quaternion_to_matrix(rotation_vector_to_quaternion(v))
 
 
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Components of v, given in the rotated frame, in the parent frame."""
-    return np.einsum("...ij,...j->...i", quaternion_to_matrix(q), v)
-
-
 def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float]]) -> np.ndarray:
     """Rotation matrix whose columns are the frame's axes in the parent.
 

@@ -212,10 +212,6 @@ class Scene(Part):
         """Flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
 
-    def ground_frames(self) -> dict[str, object]:
-        """Frames of the fixed world by name, over all bodies of type ground."""
-        return {f"{n}.{f}": p for n, b in self.body.items() if isinstance(b, Ground) for f, p in b.frames.items()}
-
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
