@@ -10,14 +10,12 @@ from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.solver import OWNERS
 from pipeline.dynamics.compile import functions as fuse
 from pipeline.dynamics.compile.sources import sources
+from pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from pipeline.dynamics.integrate import NAMES
-from pipeline.dynamics.integrate.method import Scheme, scheme_of
-from pipeline.dynamics.model.contacts import ContactKinds
-from pipeline.dynamics.model.model import Kinds
 from stages import s4_simulate
 
 PACKAGE = "pipeline.dynamics.integrate"
-KINDS = Kinds(("free",), ContactKinds(("clearance-spherical",), ("hysteretic",)), False, False)
+PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {
     "dop853": {"dop853", "dop853_coefficients", "stages"},
@@ -32,7 +30,7 @@ STEPPING = {"adaptive", "fixed"}
 
 def reached(scheme: Scheme) -> set[str]:
     """Modules of the family that the machine code of a scheme depends on."""
-    modules = {name for text in sources(KINDS, scheme).values() for name in fuse.reached(text)}
+    modules = {name for text in sources(PARTS, scheme).values() for name in fuse.reached(text)}
     return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
 
 

@@ -66,7 +66,7 @@ def tables_of(laws: Laws) -> Model:
 @cache
 def kernel(laws: Laws) -> Any:
     form = import_module(module_of(forms.__name__, tables_of(laws).laws[0].form))
-    surfaces = import_module(module_of(joints.__name__, laws[2], "CONTACTS"))
+    surfaces = import_module(module_of(joints.__name__, laws[2], table="CONTACTS"))
     rub = forces.frictionless()
     if laws[1] is not None:
         rub = forces.rubbing(dispatch.choose((lookup(friction.__name__, laws[1], where="test").traction,)))

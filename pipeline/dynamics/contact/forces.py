@@ -10,10 +10,12 @@ material points there, so that rolling is no sliding. Acting at one point keeps 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.choice import choose
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import accumulate, add, at, at9, cross, dot, put, scale, sub, turn, turn_back
 
@@ -111,8 +113,14 @@ def rubbing(traction: Callable) -> Callable:
     return rub
 
 
-def compose(separation: Callable, normal: Callable, stored: Callable, rub: Callable) -> Callable:
-    """The kernel that applies all contacts; separation, normal and stored choose by a kind, their first argument."""
+def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: tuple[Any, ...]) -> Callable:
+    """The kernel contacts(h, f, w, n) that applies all contacts, given the modules of their kinds.
+
+    surfaces: with `separation`.  forms: of normal forces, with `force` and `stored`.  frictions: laws with `traction`.
+    """
+    separation = choose(tuple(kind.separation for kind in surfaces))
+    normal, stored = choose(tuple(form.force for form in forms)), choose(tuple(form.stored for form in forms))
+    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless()
 
     @kernel
     def measure(h, f, w, c):
