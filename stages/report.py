@@ -123,6 +123,7 @@ def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Grap
         params={
             "results": str(place.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
+            "rendered": HEADLINE,
             "digests": sorted(record.digest for record in records.values()),
         },
         folder="report",

@@ -16,7 +16,7 @@ from pipeline.core.scene.load import read_toml
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 KINDS = "pipeline.structure.kinds"
 #: keys of a recipe's shape that name files

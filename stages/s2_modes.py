@@ -12,8 +12,8 @@ from stages import s1_mesh
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.parts import FlexibleBody
-    from pipeline.core.workflow.execute import Progress
 
 CONDITIONS = "pipeline.structure.modes.reference"
 

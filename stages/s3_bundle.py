@@ -11,8 +11,8 @@ from pipeline.core.registry import lookup, module_of
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 STRESS = "pipeline.structure.stress"
 SHORTENING = "pipeline.structure.modes.geometric_stiffness"

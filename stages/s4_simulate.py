@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from pipeline.core.workflow.task import Task
 from pipeline.dynamics.compile import compiler_process as companion
 from pipeline.dynamics.compile import functions as fuse
 from pipeline.dynamics.compile.generated import bring, claimed, compiled, take
+from tests.stages.conftest import PATIENCE
 
 SOURCE = """from numba import njit, types
 
@@ -64,7 +65,7 @@ def results(files: list[Path]) -> list[int]:
 def test_a_companion_leaves_the_code_on_disk(files: list[Path]) -> None:
     with companion.companion(files) as process:
         assert process is not None
-        assert process.wait(timeout=300.0) == 0
+        assert process.wait(timeout=PATIENCE) == 0
         assert all(compiled(path) for path in files)
         bring(files, nothing)
     assert results(files) == [10, 11, 12]
@@ -97,7 +98,7 @@ def test_a_companion_that_fails_is_not_missed(files: list[Path], monkeypatch: py
     told: list[Path] = []
     with companion.companion(files) as process:
         assert process is not None
-        assert process.wait(timeout=300.0) != 0
+        assert process.wait(timeout=PATIENCE) != 0
         bring(files, told.append)
     assert told == files
     assert results(files) == [10, 11, 12]
@@ -125,7 +126,7 @@ def test_a_companion_ends_with_its_parent(files: list[Path], monkeypatch: pytest
         assert process is not None
         assert process.stdin is not None
         process.stdin.close()
-        assert process.wait(timeout=300.0) == 1
+        assert process.wait(timeout=PATIENCE) == 1
 
 
 def test_there_is_one_companion_for_a_folder(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:

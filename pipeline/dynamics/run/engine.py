@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile import functions as fuse
@@ -21,7 +21,6 @@ from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
 INTEGRATORS = "pipeline.dynamics.integrate"
-Progress = Callable[[float | None, str], None]
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
