@@ -15,7 +15,7 @@ from pipeline.core.registry import module_of
 from pipeline.core.scene.load import compose, load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import loads
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
 from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
 from pipeline.dynamics.model.mechanism import build
@@ -90,7 +90,7 @@ def parts(path: Path) -> Parts:
 
 def reached(texts: dict[str, str]) -> set[str]:
     """Modules of this tower that the machine code depends on."""
-    return {name for text in texts.values() for name in fuse.reached(text)}
+    return {name for text in texts.values() for name in functions.reached(text)}
 
 
 #: effect -> word that its generated source must have, modules it must reach
@@ -172,7 +172,7 @@ def test_frictionless_clearance_reaches_no_friction_law() -> None:
 
 
 def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
-    return {name: fuse.digest(text) for name, text in sources(found, scheme).items()}
+    return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
 
 
 def digest(scene: Scene) -> str:

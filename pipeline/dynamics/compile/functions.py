@@ -26,8 +26,8 @@ import numpy as np
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.workflow.fingerprint import TREE, Sources, imported
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile.compiler_process import companion
-from pipeline.dynamics.compile.generated import bring, compiled
+from pipeline.dynamics.compile.compiler_process import second_process
+from pipeline.dynamics.compile.files import bring, compiled
 from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.effects import Parts, Scheme
 
@@ -42,7 +42,7 @@ WORDS = {
 }
 #: what others call, and where the header keeps its address
 ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
-#: what this process compiles first and a companion last: the others have kernels in common, compiled once by a process
+#: what this process compiles first and the second one last: the others have kernels in common, compiled once each
 OURS = "advance"
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 
@@ -98,7 +98,7 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     names = {path: name for name, path in files.items() if path.stem not in sys.modules}
     ours_first = sorted(names, key=lambda path: names[path] != OURS)
     ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
-    with companion(ours_last):
+    with second_process(ours_last):
         bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
     return Entry({name: sys.modules[path.stem] for name, path in files.items()})
 

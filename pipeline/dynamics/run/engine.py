@@ -11,7 +11,7 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
 from pipeline.dynamics.effects import scheme_of
 from pipeline.dynamics.equations import observation as observing
 from pipeline.dynamics.integrate.method import Method
@@ -36,7 +36,7 @@ class Engine:
     """
 
     model: Model
-    entry: fuse.Entry
+    entry: functions.Entry
     method: Method
     h: np.ndarray
     kept: np.ndarray
@@ -118,7 +118,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
     scheme = scheme_of(scene.solver)
-    entry = fuse.entry(model.parts, scheme, lambda text: progress(None, text))
+    entry = functions.entry(model.parts, scheme, lambda text: progress(None, text))
     method = lookup(INTEGRATORS, scene.solver.integrator, where="[solver.integrator]")
     h, w, n = model.arrays.work_space(method.room)
     kept = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
