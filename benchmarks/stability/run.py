@@ -16,7 +16,7 @@ from pipeline.core import quantities
 from pipeline.core.errors import FlexclearError, SolverError
 from pipeline.core.progress import silent
 from pipeline.core.scene.wanted import parse
-from pipeline.dynamics.run import engine_of
+from pipeline.dynamics.run.run import engine_of
 from stages import s1_mesh, s2_modes, s3_bundle
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from stages.__main__ import parser
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
 #: longest module; what does not fit is two things
-LINES = 300
+LINES = 450
 
 
 def sources(root: Path) -> list[Path]:
@@ -57,13 +57,15 @@ def test_import_rules_hold(root: Path):
 @pytest.mark.parametrize(
     "module, line, broken",
     [
-        ("pipeline/post/errors.py", "import pipeline.dynamics.tables", "three towers"),
+        ("pipeline/post/errors.py", "import pipeline.dynamics.memory", "three towers"),
         ("pipeline/core/units.py", "import pipeline.post.errors", "three towers"),
-        ("pipeline/dynamics/tables.py", "import stages.graph", "three towers"),
+        ("pipeline/dynamics/memory.py", "import stages.graph", "three towers"),
         ("pipeline/post/errors.py", "import meshio", "finite elements"),
         ("stages/graph.py", "import skfem", "finite elements"),
-        ("pipeline/dynamics/tables.py", "import matplotlib", "plots"),
+        ("pipeline/dynamics/memory.py", "import matplotlib", "plots"),
         ("pipeline/post/errors.py", "import pyvista", "shapes"),
+        ("pipeline/dynamics/model/tree.py", "import pipeline.dynamics.integrate.method", "dynamics follows"),
+        ("pipeline/dynamics/joints/free.py", "import pipeline.dynamics.contact.forces", "dynamics follows"),
         ("pipeline/structure/fe/model.py", "import pipeline.structure.modes.eigen", "no circles"),
     ],
 )

@@ -9,12 +9,12 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
+from stages.families import TREE
 
 from pipeline.core.artifacts.store import Record, Store
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.task import Task, facts, in_order, key
 from stages import report
-from stages.families import TREE
 from stages.run import Workplace
 
 #: what such a command may import: its own code, and what checks scenes
