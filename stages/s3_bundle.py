@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.registry import lookup
-from stages.families import module
+from pipeline.core.registry import lookup, module_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,7 +28,7 @@ def params(scene: Scene, body: str) -> dict[str, Any]:
 def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
     """Module that recovers stresses of this kind of body; InputError when there is none."""
     asked = params(scene, body)
-    stress = (module(STRESS, kind, where=WHERE),) if "stress" in asked else ()
+    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in asked else ()
     return (*stress, *((SHORTENING,) if "stiffening" in asked else ()))
 
 

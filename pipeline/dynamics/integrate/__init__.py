@@ -6,6 +6,10 @@ its steps (`step_ends` does not), `project` keeps loops closed, `observe` evalua
 """
 
 KIND = "integrator"
+#: methods that add displacements by the joints' own rule
+RETRACTING = ("generalized-alpha",)
+#: implicit methods that take over where an explicit one crawls
+HEIRS = {"dop853": "radau", "dopri5": "radau"}
 NAMES = {
     "dop853": "dop853:METHOD",
     "dopri5": "dopri5:METHOD",

@@ -193,7 +193,7 @@ def make_settle(
     return settle
 
 
-def watching(regimes: Callable) -> tuple[Callable, Callable, Callable]:
+def located(regimes: Callable) -> tuple[Callable, Callable, Callable]:
     """What the stepper calls at the start of a segment, the maker of what it calls after each step, and `closed`.
 
     regimes: whether contacts have regimes of sticking (`trace.regimes` or `trace.no_regimes`).

@@ -61,4 +61,4 @@ def make_settle(evaluate: Callable, attempt: Callable, extend: Callable, project
     return settle
 
 
-EVENTS_OF_CONTACTS = (start_watch, make_settle, closed)
+AT_STEP_ENDS = (start_watch, make_settle, closed)

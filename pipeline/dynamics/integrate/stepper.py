@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.closures import keep_scales
-from pipeline.dynamics.equations.projection import largest
+from pipeline.dynamics.equations.projection import keep_scales, largest
 from pipeline.dynamics.integrate.rows import hold_modes, snapshot
 from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
 from pipeline.dynamics.integrate.stiffness import detect
@@ -87,25 +86,25 @@ def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, proj
     return settle
 
 
-def compose(
+def make_advance(
     evaluate: Callable,
     project: Callable,
     retract: Callable,
     method: Any,
-    stepping: Callable,
-    contact_events: tuple[Callable, Callable, Callable],
+    stepping: Any,
+    events: tuple[Callable, Callable, Callable] | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
-    stepping: `compose` of `adaptive` or `fixed`.
-    contact_events: start_watch, make_settle and closed of `events` or `step_ends`, or those that do nothing.
+    stepping: the module `adaptive` or `fixed`.
+    events: start_watch, make_settle and closed of `events` or `step_ends`, ; None without contacts.
     """
     begin, attempt, error, extend, keep = method.compose(evaluate, retract)
     interpolate, last, ends = method.interpolate, method.last, method.ends
-    start_watch, make_settle, closed = contact_events
+    start_watch, make_settle, closed = events or (watch_nothing, settle_nothing, none_closed)
     settle = make_settle(evaluate, attempt, extend, project, method)
     feel = detect(method)
-    first_step, judge, after_rejection, next_step, lay, foresee = stepping(
+    first_step, judge, after_rejection, next_step, lay, foresee = stepping.compose(
         evaluate, (start_watch, closed), begin, error, method
     )
 

@@ -11,12 +11,12 @@ import numpy as np
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.effects import Parts
 from pipeline.dynamics.model import contacts as contacting
 from pipeline.dynamics.model import flexible_bodies, laws, wiring
 from pipeline.dynamics.model import loads as loading
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.contacts import ContactKinds
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.loads import Load
 from pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
@@ -25,19 +25,6 @@ from pipeline.dynamics.model.numbering import Numbering, number
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
-
-
-@dataclass(frozen=True)
-class Kinds:
-    """Which kinds of parts a mechanism has: all that its compiled code depends on."""
-
-    joints: tuple[str, ...]
-    contacts: ContactKinds
-    flexible: bool
-    closures: bool
-    harmonics: bool = False
-    loads: tuple[str, ...] = ()
-    stiffening: bool = False
 
 
 @dataclass(frozen=True)
@@ -52,7 +39,7 @@ class Model:
 
     mechanism: Mechanism
     numbering: Numbering
-    kinds: Kinds
+    parts: Parts
     arrays: Arrays
     scene: Scene
     links: list[Link]
@@ -93,15 +80,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     gravity = loading.gravity(mechanism.scene)
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
     groups, floors = _error_groups(numbering, ledger, loaded.turns)
-    kinds = Kinds(
-        joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
-        contacts=contacting.kinds(mechanism, normals),
-        flexible=not mechanism.all_rigid,
-        closures=bool(mechanism.closures),
-        harmonics=any(law.harmonic for law in [*drive_laws, *loaded.laws]),
-        loads=loaded.kinds,
-        stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
-    )
+    parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     arrays = pack(
         {
             m.NQ: numbering.nq,
@@ -112,14 +91,14 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
-            m.LINKS: _links(numbering, kinds),
+            m.LINKS: _links(numbering, parts),
             m.LINK_NUMBERS: [_link_numbers(link) for link in mechanism.links],
             m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
             m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
             **flexible_bodies.fill(numbering),
             **wiring.mass_entries(numbering),
             **closures,
-            **contacting.fill(numbering, kinds.contacts, normals, touching),
+            **contacting.fill(numbering, parts, normals, touching),
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
             m.GRAVITY: gravity,
@@ -131,7 +110,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     return Model(
         mechanism,
         numbering,
-        kinds,
+        parts,
         arrays,
         mechanism.scene,
         mechanism.links,
@@ -149,15 +128,31 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     )
 
 
+def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
+    """The kinds of parts that there are."""
+    contacts = [contact.joint for contact in mechanism.contacts]
+    return Parts(
+        joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
+        surfaces=tuple(sorted({joint.type for joint in contacts})),
+        forms=tuple(sorted({law.form for law in normals})),
+        frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
+        loads=loads,
+        closures=bool(mechanism.closures),
+        flexible=not mechanism.all_rigid,
+        stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
+        harmonics=harmonics,
+    )
+
+
 def _pose_row(place: Placement) -> np.ndarray:
     return np.concatenate([place.p, place.R.ravel()])
 
 
-def _links(numbering: Numbering, kinds: Kinds) -> list[tuple[int, ...]]:
+def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
     """Rows of the table LINKS."""
     rows: list[tuple[int, ...]] = []
     for i, link in enumerate(numbering.mechanism.links):
-        joint = kinds.joints.index(link.kind) if i else -1
+        joint = parts.joints.index(link.kind) if i else -1
         flex = numbering.flexible.index(i) if link.flexible else -1
         inboard = numbering.port_of_inboard(i) if link.flexible else -1
         port = numbering.port_of(i - 1) if i else -1

@@ -12,8 +12,9 @@ from pipeline.core.errors import SolverError
 from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile import functions as fuse
-from pipeline.dynamics.integrate.method import Method, scheme_of
+from pipeline.dynamics.compile import functions
+from pipeline.dynamics.effects import scheme_of
+from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import Model
@@ -34,7 +35,7 @@ class Engine:
     """
 
     model: Model
-    entry: fuse.Entry
+    entry: functions.Entry
     method: Method
     h: np.ndarray
     w: np.ndarray
@@ -135,7 +136,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     progress(None, mobility.text())
     if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
-    entry = fuse.entry(model.kinds, scheme_of(solver), lambda text: progress(None, text))
+    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
     method = lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]")
     space = model.arrays.work_space(method.room)
     entry.connect(space.h)

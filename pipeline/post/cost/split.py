@@ -9,7 +9,7 @@ import xarray as xr
 
 from pipeline.core import quantities
 from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.quantities import Quantity
+from pipeline.core.scene.wanted import Quantity
 from pipeline.post.cost.statistics import relative_error
 from pipeline.post.cost.study import Point, horizon_of, relative
 
