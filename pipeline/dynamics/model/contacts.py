@@ -9,16 +9,13 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
 from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.effects import Parts
+from pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
 from pipeline.dynamics.model.mechanism import Contact, Mechanism
 from pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
 
-NORMAL = "pipeline.dynamics.contact.normal"
-FRICTION = "pipeline.dynamics.contact.friction"
-SURFACES = "pipeline.dynamics.contact"
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]
 
@@ -75,14 +72,14 @@ def _bristles(mechanism: Mechanism) -> list[float | None]:
 
 def _friction(name: str, joint: Clearance) -> Any:
     assert joint.friction is not None
-    return lookup(FRICTION, joint.friction.law, where=f"[joint.{name}.friction]")
+    return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
     joint, place = contact.joint, f"[joint.{contact.name}.normal]"
     masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
-    normal = lookup(NORMAL, joint.normal.law, where=place)
-    surfaces = lookup(SURFACES, joint.type, where=place)
+    normal = lookup(NORMAL_LAWS, joint.normal.law, where=place)
+    surfaces = lookup(CONTACTS, joint.type, where=place)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
         return normal.resolve(joint.normal, surfaces.stiffness(joint, exponent), _reduced_mass(masses))

@@ -10,9 +10,8 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup, suggestion
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.effects import JOINTS
 from pipeline.dynamics.joints.coordinate import Coordinate
-
-JOINTS = "pipeline.dynamics.joints"
 
 
 @dataclass(frozen=True)

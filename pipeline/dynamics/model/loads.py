@@ -13,6 +13,7 @@ from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.effects import LOADS
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.loads.row import Row
 from pipeline.dynamics.model.driving import coordinate_of
@@ -21,7 +22,6 @@ from pipeline.dynamics.model.mechanism import Mechanism
 from pipeline.dynamics.model.merge import find_frame
 from pipeline.dynamics.model.numbering import Numbering
 
-LOADS = "pipeline.dynamics.loads"
 #: what loads add to the ledger, before the turns that they count: work done, energy lost
 LEDGER = 2
 

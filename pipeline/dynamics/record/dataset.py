@@ -12,6 +12,7 @@ import xarray as xr
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.effects import RECORDS
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.motion import Motions, quaternions
@@ -40,7 +41,7 @@ def dataset(run: Run) -> xr.Dataset:
         separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}
         parts.append((separation | horizon, {"twin_time": run.twin.time}))
     if run.scene.output.stress is not None:
-        record = lookup("pipeline.dynamics.record", "stress", where="[output]")
+        record = lookup(RECORDS, "stress", where="[output]")
         parts.append(record(motions, run.scene.output.stress))
     parts += [(ledger.series(model, seen), {}), topology(run)]
     variables, coordinates = Variables(), dict[str, object](time=trajectory.time)

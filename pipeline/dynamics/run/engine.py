@@ -13,14 +13,12 @@ from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile import functions
-from pipeline.dynamics.effects import scheme_of
+from pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
-
-INTEGRATORS = "pipeline.dynamics.integrate"
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12

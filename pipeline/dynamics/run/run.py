@@ -19,6 +19,7 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.equations import observation
 from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.integrate import HEIRS
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import trajectory as stepping
@@ -30,9 +31,6 @@ from pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
     from pipeline.dynamics.run.sensitivity import Twin
-
-#: the integrator that takes over
-IMPLICIT = "radau"
 
 
 @dataclass(frozen=True)
@@ -72,13 +70,13 @@ def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
 
 
 def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, Callable[[], Engine]]:
-    """The engine of a run, and the maker of one that goes on with an implicit method."""
+    """The engine of a run, and the maker of one that goes on with the implicit method that takes over."""
     moved, given = driven(scene, bundles, progress)
 
     def made(wanted: Scene) -> Engine:
         return prepare(tabulate(build(wanted, bundles), given), progress)
 
-    return made(moved), cache(lambda: made(edited(moved, {"solver.integrator": IMPLICIT})))
+    return made(moved), cache(lambda: made(edited(moved, {"solver.integrator": HEIRS[scene.solver.integrator]})))
 
 
 def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
@@ -105,7 +103,7 @@ def follow(
     try:
         return engine, stepping.integrate(engine, y, progress), ""
     except StiffError as stiff:
-        progress(None, f"{stiff}; going on with {IMPLICIT}")
+        progress(None, f"{stiff}; going on with {HEIRS[engine.model.scene.solver.integrator]}")
         second = other()
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
