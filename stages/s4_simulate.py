@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.integrators import INTEGRATORS
 from stages.families import constants, module
 
 if TYPE_CHECKING:
@@ -15,8 +16,6 @@ if TYPE_CHECKING:
     from pipeline.core.workflow.execute import Progress
 
 DYNAMICS = "pipeline.dynamics"
-#: methods that may be given up for an implicit one on the way (pipeline.dynamics.run)
-EXPLICIT, IMPLICIT = ("dop853", "dopri5"), "radau"
 #: what the generated files compose (pipeline.dynamics.compile.sources): for every scene, and
 #: for scenes with flexible bodies and with contacts
 KERNELS = (
@@ -68,9 +67,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
     from pipeline.core.scene.laws import law_types
 
     joints = f"{DYNAMICS}.joints"
-    found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
-    if scene.solver.integrator in EXPLICIT and scene.solver.step is None:
-        found.add(module(f"{DYNAMICS}.integrate", IMPLICIT, where="[solver]"))
+    found = {f"{DYNAMICS}.integrate.{method}" for method in _methods(scene)}
     found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
     laws = {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
     kernels: tuple[str, ...] = KERNELS + (ADAPTIVE_KERNELS if scene.solver.step is None else FIXED_KERNELS)
@@ -103,6 +100,14 @@ def modules(scene: Scene) -> tuple[str, ...]:
     for name, load in scene.load.items():
         found.add(module(f"{DYNAMICS}.loads", load.type, where=f"[load.{name}]"))
     return tuple(sorted(found))
+
+
+def _methods(scene: Scene) -> Iterator[str]:
+    """Modules of the scene's integrator, and of the one that may go on for it (pipeline.dynamics.run.switching)."""
+    traits = INTEGRATORS[scene.solver.integrator]
+    yield traits.module
+    if traits.hands_over_to and scene.solver.step is None:
+        yield INTEGRATORS[traits.hands_over_to].module
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.solver import OWNERS
 from pipeline.dynamics.compile import functions as fuse
 from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.integrate import NAMES
@@ -53,7 +53,7 @@ def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
 
 
 def test_scenes_and_family_know_the_same_names() -> None:
-    assert set(OWNERS) == set(NAMES)
+    assert set(INTEGRATORS) == set(NAMES)
 
 
 @pytest.mark.parametrize(

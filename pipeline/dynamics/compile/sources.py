@@ -7,7 +7,8 @@ the integrator and on whether there are closures and contacts, not on joints or 
 
 from __future__ import annotations
 
-from pipeline.core.registry import lookup, module_of
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.core.registry import module_of
 from pipeline.dynamics.integrate.method import Scheme
 from pipeline.dynamics.model.contacts import ContactKinds
 from pipeline.dynamics.model.model import Kinds
@@ -26,7 +27,7 @@ def sources(kinds: Kinds, scheme: Scheme) -> dict[str, str]:
     found = {"evaluate": _evaluate(kinds)}
     if kinds.closures:
         found["project"] = _project(kinds)
-    if lookup(PACKAGES["integrator"], scheme.integrator, where="solver").retracts:
+    if INTEGRATORS[scheme.integrator].retracts:
         found["retract"] = _retract(kinds)
     return found | {"observe": _observe(kinds), "advance": _advance(kinds, scheme)}
 

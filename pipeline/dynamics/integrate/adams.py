@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import hermite, rk4, stages
 from pipeline.dynamics.integrate.method import Method
@@ -82,4 +83,14 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
     return begin, attempt, None, hermite.make_extend(LAST), keep
 
 
-METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, memory=memory)
+METHOD = Method(
+    INTEGRATORS["adams-bashforth-moulton"],
+    LAST + 2,
+    LAST,
+    hermite.ROWS,
+    ORDER,
+    compose,
+    hermite.interpolate,
+    gap=0.25,
+    memory=memory,
+)

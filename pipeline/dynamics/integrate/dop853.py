@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import stages
 from pipeline.dynamics.integrate.dop853_coefficients import E3, E5, ERROR_ORDER, EXTENDED, STAGES, A, B, C, D
@@ -78,4 +79,6 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
 
 
 # 6.1: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
-METHOD = Method(EXTENDED + 1, STAGES, 8, ERROR_ORDER, compose, interpolate, stability=6.1, gap=0.467)
+METHOD = Method(
+    INTEGRATORS["dop853"], EXTENDED + 1, STAGES, 8, ERROR_ORDER, compose, interpolate, stability=6.1, gap=0.467
+)

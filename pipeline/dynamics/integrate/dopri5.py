@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import stages
 from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
@@ -99,4 +100,6 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
 
 
 # 3.25: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
-METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, gap=0.55, stability=3.25)
+METHOD = Method(
+    INTEGRATORS["dopri5"], STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, gap=0.55, stability=3.25
+)

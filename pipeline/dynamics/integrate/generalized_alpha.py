@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import alpha_newton, hermite
 from pipeline.dynamics.integrate.alpha_newton import ESTIMATE, ITERATE
@@ -120,13 +121,13 @@ def parameter(solver: Any) -> float:
 
 
 METHOD = Method(
+    INTEGRATORS["generalized-alpha"],
     ROWS,
     LAST,
     hermite.ROWS,
     2,
     compose,
     hermite.interpolate,
-    retracts=True,
     steady=1.2,
     memory=memory,
     parameter=parameter,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.core.integrators import Traits
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.memory import Room
 
@@ -34,6 +35,7 @@ def no_parameter(solver: Any) -> float:
 class Method:
     """An integration method.
 
+    traits: what is known of it elsewhere.
     slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
     error_order: the error estimate falls with this power of the step plus one; for methods without one, their order.
@@ -44,7 +46,6 @@ class Method:
         extend(h, f, w, n, step) prepares the dense output once the slope at the end is known;
         keep(h, f, w, n, step) remembers an accepted step.
     interpolate: (h, w, share of the step, out) the dense output.
-    retracts: whether `compose` uses retract.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
     gap: middle of the widest gap between the stages, as share of the step.
@@ -54,13 +55,13 @@ class Method:
         stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
     """
 
+    traits: Traits
     slopes: int
     last: int
     dense: int
     error_order: int
     compose: Callable
     interpolate: Callable
-    retracts: bool = False
     ends: bool = False
     steady: float = 1.0
     gap: float = 0.5

@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import hermite
 from pipeline.dynamics.integrate.method import Method
@@ -273,4 +274,15 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
     return begin, attempt, error, extend, keep
 
 
-METHOD = Method(ROWS, LAST, hermite.ROWS, ERROR_ORDER, compose, hermite.interpolate, steady=1.2, gap=0.4, memory=memory)
+METHOD = Method(
+    INTEGRATORS["radau"],
+    ROWS,
+    LAST,
+    hermite.ROWS,
+    ERROR_ORDER,
+    compose,
+    hermite.interpolate,
+    steady=1.2,
+    gap=0.4,
+    memory=memory,
+)

@@ -9,6 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics.integrate import hermite, stages
 from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
 
@@ -25,4 +26,6 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
 
 
 # 2.785: its stability polynomial 1 + z + z^2/2 + z^3/6 + z^4/24 is 1 there
-METHOD = Method(STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, stability=2.785)
+METHOD = Method(
+    INTEGRATORS["rk4"], STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, stability=2.785
+)
