@@ -39,10 +39,10 @@ CONTACT_KERNELS = (
     "contact.form.hysteretic",
     "contact.form.linear_damper",
     "contact.validity",
-    "integrate.events",
+    "integrate.contact_events",
 )
 #: of scenes with contacts that are noticed at step ends, and of fixed or chosen steps
-UNLOCATED_KERNELS = ("integrate.step_ends",)
+UNLOCATED_KERNELS = ("integrate.step_end_events",)
 FIXED_KERNELS, ADAPTIVE_KERNELS = ("integrate.fixed",), ("integrate.adaptive",)
 LOAD_KERNELS = ("loads.composing",)
 #: joint types that the chain of a joint with several axes, or of a path, is made of

@@ -26,8 +26,8 @@ from tests.analytic.mechanism_runs import bundles
 CONTACT = (
     "pipeline.dynamics.contact",
     "pipeline.dynamics.joints.clearance_spherical",
-    "pipeline.dynamics.integrate.events",
-    "pipeline.dynamics.integrate.trace",
+    "pipeline.dynamics.integrate.contact_events",
+    "pipeline.dynamics.integrate.contact_phases",
 )
 LOADS = ("pipeline.dynamics.loads.fields", "pipeline.dynamics.loads.composing", "pipeline.dynamics.drives.oscillation")
 FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")

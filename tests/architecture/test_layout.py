@@ -16,8 +16,8 @@ from stages.__main__ import parser
 
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
-#: longest module; what does not fit is two things
-LINES = 300
+#: longest module: a method of integration with its coefficients, its memory and its kernels is one thing
+LINES = 450
 
 
 def sources(root: Path) -> list[Path]:

@@ -176,12 +176,12 @@ def _contact_lines(kinds: ContactKinds) -> list[str]:
 
 def _event_lines(kinds: ContactKinds, scheme: Scheme) -> list[str]:
     if not kinds.surfaces:
-        return ["events = (stepper.watch_nothing, stepper.settle_nothing, stepper.none_closed)"]
+        return ["events = stepper.NO_CONTACTS"]
     if not scheme.located:
-        return ["from pipeline.dynamics.integrate.step_ends import EVENTS_OF_CONTACTS as events"]
+        return ["from pipeline.dynamics.integrate.step_end_events import EVENTS as events"]
     return [
-        "from pipeline.dynamics.integrate import events as contact_events, trace",
-        f"events = contact_events.watching(trace.{'regimes' if kinds.frictions else 'no_regimes'})",
+        "from pipeline.dynamics.integrate import contact_events, contact_phases",
+        f"events = contact_events.located(contact_phases.{'regimes' if kinds.frictions else 'no_regimes'})",
     ]
 
 
@@ -254,7 +254,9 @@ def observe(h, f, w, n, rows, pieces, tolerance, out):
     observer(h, f, w, n, rows, pieces, tolerance, out)
 """
 # one function for both tasks: each would be an object of its own to fetch
-_ADVANCE = """step = stepper.compose(calls.evaluate, project, calls.retract, METHOD, stepping.compose, events)
+_ADVANCE = """step = stepper.make_advance(
+    calls.evaluate, project, calls.retract, METHOD, stepping.make_step_control, events
+)
 
 
 @njit(
