@@ -16,6 +16,7 @@ import xarray as xr
 from pipeline import dynamics
 from pipeline.core.errors import SolverError
 from pipeline.core.integrators import INTEGRATORS
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
 
 SCENE = Path(__file__).resolve().parent.parent / "scenes" / "sps4" / "csj.toml"
@@ -40,11 +41,7 @@ def chosen() -> Iterator[dict[str, Any]]:
 
 def simulate(solver: dict[str, Any]) -> xr.Dataset:
     """One run of the scene; how far its ledger is off is one of the things to see, so that it is not refused."""
-    return dynamics.simulate(load_scene(SCENE, {"solver": {**solver, "ledger_tolerance": 1.0}}), {}, quiet)
-
-
-def quiet(share: float | None, text: str) -> None:
-    """The table tells the progress."""
+    return dynamics.simulate(load_scene(SCENE, {"solver": {**solver, "ledger_tolerance": 1.0}}), {}, silent)
 
 
 def impact_forces(run: xr.Dataset) -> np.ndarray:

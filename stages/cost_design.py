@@ -12,12 +12,11 @@ from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited, read_toml
 from pipeline.core.scene.schema import Scene
+from stages.timing import paper_solver
 
 REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
 #: another family of methods
 CONFIRMATION: Mapping[str, Any] = {"integrator": "radau", "rtol": 1e-12}
-#: Wang & Wang (2019), sec. 5: predictor-corrector, 1e-5 s, contacts noticed at the ends of steps
-PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5, "events": "at step ends"}
 #: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
 MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
 LIMITS = (0.25, 0.5, 1.0, 2.0)
@@ -80,8 +79,7 @@ def _integration(scene: Scene) -> Iterator[Design]:
     for method, traits in INTEGRATORS.items():
         for step in traits.steps:
             yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)
-    located = {k: v for k, v in PAPER.items() if k != "events"}
-    yield design("paper", PAPER if scene.contacts() else located)
+    yield design("paper", paper_solver(scene))
 
 
 def _sampling(scene: Scene) -> Iterator[Design]:

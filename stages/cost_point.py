@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.progress import Progress, silent
 from stages.kernels import warm
 from stages.s4_simulate import bundles, rebuild
 
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 #: a run is timed so often, and the median counts, but no more once this much time has been spent on it: what a
 #: longer run takes is an average by itself
@@ -41,7 +41,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     try:
         while not seconds or (len(seconds) < REPEATS and sum(seconds) < LONG):
             begun = time.process_time()
-            done = dynamics.simulate(scene, reduced, progress if not seconds else _silent)
+            # reports would be part of what is measured
+            done = dynamics.simulate(scene, reduced, progress if not seconds else silent)
             seconds.append(time.process_time() - begun)
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
@@ -81,10 +82,6 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     kept = kept.assign_coords(quantity=list(errors))
     kept["standard_error"] = (("quantity",), list(errors.values()))
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
-
-
-def _silent(fraction: float | None, text: str) -> None:
-    """Reports would be part of what is measured."""
 
 
 def _memory() -> int:

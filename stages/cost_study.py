@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 #: contact events are located to this share of the clearance (pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12

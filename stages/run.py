@@ -12,11 +12,10 @@ from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
 from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
 from pipeline.core.workflow.task import Task
-from stages.families import TREE
 from stages.graph import Graph
 
 if TYPE_CHECKING:

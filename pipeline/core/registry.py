@@ -1,4 +1,8 @@
-"""From a name in a scene to the part it names, imported only when it is asked for."""
+"""From a name in a scene to the part it names, imported only when it is asked for.
+
+A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to
+``"module:object"``; some hold further tables of that shape. It imports none of its modules.
+"""
 
 from __future__ import annotations
 
@@ -13,23 +17,28 @@ from pipeline.core.errors import InputError
 LISTED = 40
 
 
-def lookup(package: str, name: str, *, where: str) -> Any:
-    """The object that `package` lists under `name` in its NAMES, its module imported now.
+def listed(package: str, name: str, *, where: str, table: str = "NAMES") -> tuple[str, str]:
+    """Module (below the package) and object that a family lists under `name`; neither is imported.
 
-    `package` is a family folder whose ``__init__`` holds ``KIND`` (for messages) and ``NAMES``,
-    a table from the scene's name to ``"module:object"``.  Raises InputError for an unknown name.
+    Raises InputError, placed at `where`, for a name that the family does not have.
     """
     family = import_module(package)
-    names: Mapping[str, str] = family.NAMES
+    names: Mapping[str, str] = getattr(family, table)
     if name not in names:
         raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
     module, _, attribute = names[name].partition(":")
+    return module, attribute
+
+
+def module_of(package: str, name: str, *, where: str = "", table: str = "NAMES") -> str:
+    """Full name of the module that a family lists under `name`, which is not imported; InputError as of `listed`."""
+    return f"{package}.{listed(package, name, where=where, table=table)[0]}"
+
+
+def lookup(package: str, name: str, *, where: str) -> Any:
+    """The object that a family lists under `name` in its NAMES, its module imported now; InputError for others."""
+    module, attribute = listed(package, name, where=where)
     return getattr(import_module(f"{package}.{module}"), attribute)
-
-
-def module_of(package: str, name: str, table: str = "NAMES") -> str:
-    """Full name of the module that a family's table lists under `name`, without importing it."""
-    return f"{package}.{getattr(import_module(package), table)[name].partition(':')[0]}"
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-
-Progress = Callable[[float | None, str], None]
 
 __all__ = ["ensemble", "equilibrium", "frequencies", "simulate"]
 

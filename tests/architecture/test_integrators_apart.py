@@ -8,16 +8,14 @@ import pytest
 
 from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
 from pipeline.dynamics.compile.sources import sources
+from pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from pipeline.dynamics.integrate import NAMES
-from pipeline.dynamics.integrate.method import Scheme, scheme_of
-from pipeline.dynamics.model.contacts import ContactKinds
-from pipeline.dynamics.model.model import Kinds
 from stages import s4_simulate
 
 PACKAGE = "pipeline.dynamics.integrate"
-KINDS = Kinds(("free",), ContactKinds(("clearance-spherical",), ("hysteretic",)), False, False)
+PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {
     "dop853": {"dop853", "runge_kutta"},
@@ -32,7 +30,7 @@ STEPPING = {"adaptive", "fixed"}
 
 def reached(scheme: Scheme) -> set[str]:
     """Modules of the family that the machine code of a scheme depends on."""
-    modules = {name for text in sources(KINDS, scheme).values() for name in fuse.reached(text)}
+    modules = {name for text in sources(PARTS, scheme).values() for name in functions.reached(text)}
     return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
 
 
@@ -74,5 +72,5 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
 @pytest.mark.parametrize("solver", [{}, {"step": 1e-5}, {"integrator": "rk4", "step": 1e-5, "events": "at step ends"}])
 def test_the_key_of_a_run_holds_what_its_code_reaches(root: Path, solver: dict) -> None:
     scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": solver})
-    known = fuse.SOURCES.closure(["stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
+    known = functions.SOURCES.closure(["stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
     assert {f"{PACKAGE}.{name}" for name in reached(scheme_of(scene.solver))} <= set(known)

@@ -192,11 +192,9 @@ def test_it_makes_no_other_integrator_compile_anew(root: Path, python: Command) 
     code = """
 from pipeline.dynamics.compile.functions import digest
 from pipeline.dynamics.compile.sources import sources
-from pipeline.dynamics.integrate.method import Scheme
-from pipeline.dynamics.model.contacts import ContactKinds
-from pipeline.dynamics.model.model import Kinds
-kinds = Kinds(("free",), ContactKinds(("clearance-spherical",), ("hysteretic",)), False, False)
-print(json.dumps({name: digest(text) for name, text in sources(kinds, Scheme("dop853")).items()}))
+from pipeline.dynamics.effects import Parts, Scheme
+parts = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
+print(json.dumps({name: digest(text) for name, text in sources(parts, Scheme("dop853")).items()}))
 """
     here = subprocess.run(
         [sys.executable, "-c", f"import json\n{code}"], cwd=root, capture_output=True, text=True, check=True

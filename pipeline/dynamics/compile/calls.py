@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from llvmlite import ir
-from numba import carray, cfunc, config, types
+from numba import cfunc, config, njit, types
 from numba.extending import intrinsic
 
 from pipeline.dynamics import memory as m
@@ -26,12 +26,12 @@ SIGNATURES = {
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(_INTEGERS, _FLOATS, _PLACE, _PLACE, _PLACE, _PLACE),
 }
-#: types of h, f, w and n, and of tables with rows, in functions that are called from Python
-ARRAYS = (types.int64[::1], types.float64[::1], types.float64[::1], types.int64[::1])
-TABLE, WHOLE_TABLE = types.float64[:, ::1], types.int64[:, ::1]
-#: length of an array behind a pointer: the header knows it, and no kernel asks the array
-SOME = 1 << 40
-array = carray
+_ARRAYS = (types.int64[::1], types.float64[::1], types.float64[::1], types.int64[::1])
+_TABLE = types.float64[:, ::1]
+#: signatures of what Python calls: (h, f, w, n, rows, pieces, tolerance, out); (h, f, w, n, t, repeat, outputs, rows,
+#: events)
+OBSERVE = types.void(*_ARRAYS, _TABLE, types.int64[:, ::1], types.float64, _TABLE)
+ADVANCE = types.void(*_ARRAYS, types.float64, types.int64, types.float64[::1], _TABLE, _TABLE)
 
 
 @intrinsic
@@ -63,6 +63,11 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 def exported(name: str) -> Callable[[Callable], Any]:
     """Decorator: a C function with an `address`, fetched from disk or compiled at once."""
     return cfunc(SIGNATURES[name], cache=True, error_model="numpy")
+
+
+def called(signature: Any) -> Callable[[Callable], Any]:
+    """Decorator: a function that Python calls, fetched from disk or compiled at once."""
+    return njit(signature, cache=True, nogil=True)
 
 
 if config.DISABLE_JIT:  # for debugging: the same calls between functions of Python

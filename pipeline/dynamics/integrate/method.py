@@ -78,17 +78,3 @@ class Method:
     def room(self, nq: int, nv: int, ny: int) -> m.Room:
         """What it needs of the work space, from the numbers of positions, speeds and state variables."""
         return m.Room(self.slopes, self.dense, self.memory(nq, nv, ny))
-
-
-@dataclass(frozen=True)
-class Scheme:
-    """Which stepper is compiled: method, fixed or chosen steps, events located or noticed at step ends."""
-
-    integrator: str
-    fixed: bool = False
-    located: bool = True
-
-
-def scheme_of(solver: Any) -> Scheme:
-    """The scheme that a scene's solver table asks for."""
-    return Scheme(solver.integrator, solver.step is not None, solver.events == "located")

@@ -61,4 +61,4 @@ def make_resolve_events(
     return resolve_events
 
 
-EVENTS = (watch_start, make_resolve_events, any_closed)
+AT_STEP_ENDS = (watch_start, make_resolve_events, any_closed)

@@ -11,8 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.closures import keep_scales
-from pipeline.dynamics.equations.projection import largest
+from pipeline.dynamics.equations.projection import keep_scales, largest
 from pipeline.dynamics.integrate.norms import finite
 from pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
 from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
@@ -53,7 +52,7 @@ def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, proj
     return resolve_events
 
 
-#: `contact_events` of scenes without contacts
+#: `events` of scenes without contacts
 NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
 
 
@@ -62,22 +61,21 @@ def make_advance(
     project: Callable,
     retract: Callable,
     method: Any,
-    step_control: Callable,
-    contact_events: tuple[Callable, Callable, Callable],
+    stepping: Any,
+    events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
-    step_control: `make_step_control` of `adaptive` or `fixed`.
-    contact_events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`, or
-        `NO_CONTACTS`.
+    stepping: the module `adaptive` or `fixed`.
+    events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
     begin, attempt, error, extend, keep = method.make_kernels(evaluate, retract)
     last, ends = method.last, method.ends
-    watch_start, make_resolve_events, any_closed = contact_events
+    watch_start, make_resolve_events, any_closed = events
     resolve_events = make_resolve_events(evaluate, attempt, extend, project, method)
     record_outputs = make_record_outputs(extend, method.interpolate)
     detect_stiffness = make_detect_stiffness(method)
-    first_step, error_norm, after_rejection, next_step, choose_step, foresee = step_control(
+    first_step, error_norm, after_rejection, next_step, choose_step, foresee = stepping.make_step_control(
         evaluate, (watch_start, any_closed), begin, error, method
     )
 

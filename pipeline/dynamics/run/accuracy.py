@@ -18,11 +18,10 @@ import xarray as xr
 
 from pipeline.core import quantities
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.core.quantities import Quantity
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
-
-Progress = Callable[[float | None, str], None]
 
 #: the estimate compares with a run at this share of the tolerance
 FINER = 1e-2

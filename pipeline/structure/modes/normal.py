@@ -11,8 +11,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.structure.fe.model import Model, own_dofs
-from pipeline.structure.kinds.kind import Progress
 from pipeline.structure.modes import eigen, select
 from pipeline.structure.modes.statics import Flexibility, border
 from pipeline.structure.sparse.multifrontal import negative_pivots

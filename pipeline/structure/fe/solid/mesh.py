@@ -11,7 +11,7 @@ import xarray as xr
 from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.core.artifacts.schema import SOLID, conform
 from pipeline.core.errors import InputError
-from pipeline.structure.fe.recipe import sources
+from pipeline.structure.fe.recipe_sources import sources
 from pipeline.structure.fe.solid import geometry as geometries
 from pipeline.structure.fe.solid import imported, ties
 from pipeline.structure.fe.solid.elements import ELEMENTS
