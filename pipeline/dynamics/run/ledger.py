@@ -41,7 +41,7 @@ def series(model: Model, seen: Seen) -> Variables:
         load_work, load_loss = ledger[:, model.arrays.size(m.LOAD_SLOT) :].T[:2]
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
-    found: Variables = {
+    variables: Variables = {
         "kinetic": (("time",), kinetic),
         "potential": (("time",), potential),
         "elastic": (("time",), elastic),
@@ -52,13 +52,13 @@ def series(model: Model, seen: Seen) -> Variables:
         **loaded,
     }
     if model.numbering.modes:
-        found["modal_damping_loss"] = (("time",), modal)
+        variables["modal_damping_loss"] = (("time",), modal)
     if contacts:
-        found["contact_elastic"] = (("time", "contact"), touch[..., m.TOUCH.stored] + touch[..., m.TOUCH.bent])
-        found["contact_damping_loss"] = (("time", "contact"), damping)
-        found["contact_impulse"] = (("time", "contact"), slots[..., m.IMPULSE])
-        found["contact_friction_loss"] = (("time", "contact"), friction)
-    return found
+        variables["contact_elastic"] = (("time", "contact"), touch[..., m.TOUCH.stored] + touch[..., m.TOUCH.bent])
+        variables["contact_damping_loss"] = (("time", "contact"), damping)
+        variables["contact_impulse"] = (("time", "contact"), slots[..., m.IMPULSE])
+        variables["contact_friction_loss"] = (("time", "contact"), friction)
+    return variables
 
 
 def usual(solver: Solver) -> float:
@@ -72,12 +72,12 @@ def usual(solver: Solver) -> float:
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
     """SolverError when the ledger is off by more than the scene's tolerance times the energy turned over."""
-    found = {name: values for name, (_, values) in series(model, seen).items()}
-    error = np.abs(found["energy_error"])
-    turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in found]
-    turned = max(float(np.ptp(found[n])) for n in turning)
-    turned = max(turned, float(found["kinetic"].max()))
-    largest = max(float(np.abs(found[n]).max()) for n in turning)
+    ledger = {name: values for name, (_, values) in series(model, seen).items()}
+    error = np.abs(ledger["energy_error"])
+    turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in ledger]
+    turned = max(float(np.ptp(ledger[n])) for n in turning)
+    turned = max(turned, float(ledger["kinetic"].max()))
+    largest = max(float(np.abs(ledger[n]).max()) for n in turning)
     solver = model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
     worst = int(np.argmax(error)) if np.isfinite(error).all() else int(np.argmin(np.isfinite(error)))
@@ -87,18 +87,18 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
     raise SolverError(
         f"at t = {trajectory.time[first]:.6g} s: the ledger of energy does not close: it is off by up to "
         f"{error[worst]:.3g} J where {turned:.3g} J are turned over (tolerance {tolerance:g}, "
-        f"[solver.ledger_tolerance]); lost so far: {_losses(model, found, first)}; "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(model, ledger, first)}; "
         "a smaller rtol or step is the remedy, or the scene is beyond this integrator"
     )
 
 
-def _losses(model: Model, found: dict[str, np.ndarray], k: int) -> str:
+def _losses(model: Model, ledger: dict[str, np.ndarray], k: int) -> str:
     parts = []
     for c, (name, *_) in enumerate(model.mechanism.contacts):
         for cause in ("damping", "friction"):
-            parts.append(f"{found[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
-    if "modal_damping_loss" in found:
-        parts.append(f"{found['modal_damping_loss'][k]:.3g} J to modal damping")
-    if "load_loss" in found:
-        parts.append(f"{found['load_loss'][k]:.3g} J to the loads")
+            parts.append(f"{ledger[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
+    if "modal_damping_loss" in ledger:
+        parts.append(f"{ledger['modal_damping_loss'][k]:.3g} J to modal damping")
+    if "load_loss" in ledger:
+        parts.append(f"{ledger['load_loss'][k]:.3g} J to the loads")
     return ", ".join(parts) or "nothing"
