@@ -21,6 +21,7 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
 from pipeline.dynamics.integrate.method import slope
 from pipeline.dynamics.integrate.recording import add_event
+from pipeline.dynamics.integrate.stepper import RESTART
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import at, dot, sub
 
@@ -367,7 +368,7 @@ def make_resolve_events(
             return give_up(n, m.STEPPED_OVER, c)
         w[m.WATCH.row(h, c) + m.WATCH.rate1] = w[m.TOUCH.row(h, c) + m.TOUCH.rate]
         change_mode(h, w, n, events, c, t)
-        return give_up(n, m.STUCK_EVENT, c) if n[m.IMMEDIATE] > MOST_IMMEDIATE else 1
+        return give_up(n, m.STUCK_EVENT, c) if n[m.IMMEDIATE] > MOST_IMMEDIATE else RESTART
 
     @kernel
     def resolve_events(h, f, w, n, step, t_new, events):
@@ -394,7 +395,7 @@ def make_resolve_events(
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
         follow_contacts(h, f, w, n, length, True, events)
         change_mode(h, w, n, events, which, t + length)
-        return 1, True, t + length, length
+        return RESTART, True, t + length, length
 
     return resolve_events
 
