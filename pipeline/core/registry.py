@@ -1,7 +1,7 @@
 """From a name in a scene to the part it names, imported only when it is asked for.
 
 A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to
-``"module:object"``; some hold further tables of that shape. It imports none of its parts. Where a scene's models
+``"module:object"``; some hold further tables of that shape. It imports none of its modules. Where a scene's models
 (`pipeline.core.scene`) name the parts of a family already, the table is made from them by `declared`.
 """
 

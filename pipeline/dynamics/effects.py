@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core import integrators
 from pipeline.core.registry import module_of
 
 if TYPE_CHECKING:
@@ -119,5 +120,5 @@ def named(scene: Scene) -> Iterator[Named]:
 def schemes(scene: Scene) -> list[Scheme]:
     """The scheme that a scene asks for, and that of the method that takes over where it would crawl."""
     scheme = scheme_of(scene.solver)
-    heir = import_module(INTEGRATORS).HEIRS.get(scheme.integrator)
+    heir = integrators.INTEGRATORS[scheme.integrator].hands_over_to
     return [scheme, *([Scheme(heir)] if heir and not scheme.fixed else [])]

@@ -18,7 +18,7 @@ from stages.__main__ import COMMANDS
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
 #: longest module; what does not fit is two things
-LINES = 300
+LINES = 450
 
 
 def sources(root: Path) -> list[Path]:
@@ -64,6 +64,8 @@ def test_import_rules_hold(root: Path):
         ("stages/graph.py", "import skfem", "finite elements"),
         ("pipeline/dynamics/memory.py", "import matplotlib", "plots"),
         ("pipeline/post/errors.py", "import pyvista", "shapes"),
+        ("pipeline/dynamics/model/tree.py", "import pipeline.dynamics.integrate.method", "dynamics follows"),
+        ("pipeline/dynamics/joints/free.py", "import pipeline.dynamics.contact.forces", "dynamics follows"),
         ("pipeline/structure/fe/model.py", "import pipeline.structure.modes.eigen", "no circles"),
     ],
 )

@@ -20,7 +20,7 @@ from pipeline.core.scene.parts import (
     Joint,
     RigidBody,
 )
-from pipeline.core.scene.solver import ExplicitPair, Solver
+from pipeline.core.scene.solver import PlainIntegrator, Solver
 from pipeline.core.units import quantity
 
 #: rows of a run that a machine can be asked to hold
@@ -116,7 +116,7 @@ class Scene(Part):
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
     time: TimeSpan
-    solver: Solver = ExplicitPair()
+    solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, at6, at9, congruence, cross, dot, put, scale, turn, turn_symmetric
+from pipeline.dynamics.vectors import (
+    accumulate,
+    add,
+    at,
+    at6,
+    at9,
+    congruence,
+    cross,
+    dot,
+    put,
+    scale,
+    turn,
+    turn_symmetric,
+)
 
 
 @kernel
@@ -62,3 +75,18 @@ def carry(h, w, i, k):
     omega, v, c = at(w, s), at(w, s + 3), at(w, I + m.INERTIA.moment)
     put(w, o, add(turn_symmetric(at6(w, I + m.INERTIA.inertia), omega), cross(c, v)))
     put(w, o + 3, add(scale(w[I + m.INERTIA.mass], v), cross(omega, c)))
+
+
+@kernel
+def apply_wrench(h, w, s, moment, force):
+    """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
+    o = m.WRENCH.row(h, m.SITES.link(h, s))
+    accumulate(w, o, scale(-1.0, moment))
+    accumulate(w, o + 3, scale(-1.0, force))
+    p = m.SITES.port(h, s)
+    if p >= 0:
+        b = m.PORTS.flex(h, p)
+        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b), m.PORTS.column(h, p)
+        for j in range(m.FLEXES.n_modes(h, b)):
+            o = m.COLUMNS.row(h, first + j)
+            w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)

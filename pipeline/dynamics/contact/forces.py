@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import apply_wrench
 from pipeline.dynamics.choice import choose
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, add, at, at9, cross, dot, put, scale, sub, turn, turn_back
+from pipeline.dynamics.vectors import add, at, at9, cross, dot, put, scale, sub, turn, turn_back
 
 
 @kernel
@@ -28,18 +29,8 @@ def contact_slots(h, c):
 
 @kernel
 def push(h, w, s, point, force):
-    """Apply a force [N] at a point, both world, on the link (and its modes) that carries site s."""
-    moment = cross(point, force)
-    o = m.WRENCH.row(h, m.SITES.link(h, s))
-    accumulate(w, o, scale(-1.0, moment))
-    accumulate(w, o + 3, scale(-1.0, force))
-    p = m.SITES.port(h, s)
-    if p >= 0:
-        k = m.PORTS.flex(h, p)
-        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, k), m.PORTS.column(h, p)
-        for j in range(m.FLEXES.n_modes(h, k)):
-            a = m.COLUMNS.row(h, first + j)
-            w[bias + j] -= dot(at(w, a), moment) + dot(at(w, a + 3), force)
+    """Apply a force [N] at a point, both world, on the link that carries site s."""
+    apply_wrench(h, w, s, cross(point, force), force)
 
 
 @kernel

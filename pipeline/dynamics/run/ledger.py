@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.solver import Solver
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.model import Model
@@ -16,11 +17,9 @@ Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 ROUNDING = 1e-12
 #: no contact law is known to a thousandth of its energy; a run of chosen steps that is off by more says something
 #: else. Where more is asked for, more is kept: of three hundred hard cases at rtol 1e-10 (benchmarks/stability) none is
-#: off by 1e-6, unless something is wrong. Fixed steps are for comparison: their error is to be seen, unless it is as
-#: large as everything
+#: off by 1e-6, unless something is wrong; what damps by its order is not told from a fault that soon. Fixed steps are
+#: for comparison: their error is to be seen, unless it is as large as everything
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 1.0
-#: what damps by its order, 2, is not told from a fault that soon
-DAMPING = "generalized-alpha"
 
 
 def series(model: Model, seen: Seen) -> Variables:
@@ -66,7 +65,9 @@ def usual(solver: Solver) -> float:
     """Energy error, as a share of what is turned over, beyond which a run is refused when the scene does not say."""
     if solver.step is not None:
         return FIXED
-    return CHOSEN if solver.integrator == DAMPING else max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
+    if INTEGRATORS[solver.integrator].dissipative:
+        return CHOSEN
+    return max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
