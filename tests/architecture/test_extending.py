@@ -75,7 +75,7 @@ def ran(root: Path, tree: Path, name: str) -> xr.Dataset:
 
 
 def test_an_integrator(root: Path, tmp_path: Path) -> None:
-    """N steps of a linear system multiply its state by the n-th power of the method's stability polynomial."""
+    """In n steps the state of a linear system is multiplied by the n-th power of the method's stability polynomial."""
     run = ran(root, tmp_path, "kutta3")
     step, A = 0.005, np.array([[0.0, 1.0], [-100.0, -2.0]])
     R = np.eye(2) + step * A + (step * A) @ (step * A) / 2.0 + np.linalg.matrix_power(step * A, 3) / 6.0
@@ -112,17 +112,17 @@ def test_a_normal_law(root: Path, tmp_path: Path) -> None:
 def test_a_friction_law(root: Path, tmp_path: Path) -> None:
     """I w' = -mu R N tanh(w R/v_s) gives sinh(w R/v_s) = sinh(w0 R/v_s) exp(-mu N R^2 t/(I v_s))."""
     run = ran(root, tmp_path, "smooth_coulomb")
-    mu, v_s, force, radius, inertia = 0.1, 0.2, 10.0, 0.1, 0.02
+    mu, v_s, force, radius, inertia = 0.4, 0.2, 10.0, 0.1, 0.02
     spin = run["angular_velocity"].sel(body="ball").values[:, 1]
     decay = mu * force * radius**2 / (inertia * v_s)
     known = [sinh(3.0 * radius / v_s) * exp(-decay * t) for t in run["time"].values]
-    # the point of contact is 1e-5 of the radius deeper than the ball's surface
-    np.testing.assert_allclose(np.sinh(spin * radius / v_s), known, rtol=1e-3)
-    assert spin[-1] < 1.7
+    # the contact is 1e-4 of the radius deep, which is that much of the arm of friction
+    np.testing.assert_allclose(np.sinh(spin * radius / v_s), known, rtol=2e-3)
+    assert known[-1] < 0.7 * known[0]
 
 
 def test_a_load(root: Path, tmp_path: Path) -> None:
-    """M v' = -c v^2 gives v = v0/(1 + c v0 t/m) along the first direction."""
+    """Of m v' = -c v^2: v = v0/(1 + c v0 t/m) along the first direction."""
     run = ran(root, tmp_path, "quadratic_drag")
     speed = 5.0 / (1.0 + 0.4 * 5.0 * run["time"].values / 2.0)
     # the integrator's tolerance is 1e-10
@@ -157,7 +157,7 @@ def test_a_command(root: Path, tmp_path: Path) -> None:
     scene = examples(root) / "smooth_coulomb.toml"
     shutil.copy(scene, tree / "two.toml")
     (tree / "two.toml").write_text(scene.read_text().replace("smooth-coulomb", "ambrosio").replace("v_smooth", "v1"))
-    (tree / "two.toml").write_text((tree / "two.toml").read_text().replace("dynamic = 0.1", "dynamic = 0.1, v0 = 0.0"))
+    (tree / "two.toml").write_text((tree / "two.toml").read_text().replace("dynamic = 0.4", "dynamic = 0.4, v0 = 0.0"))
     assert flexclear(tree, "mass", "two.toml").endswith(": 1 kg\n")
     assert "mass of the rigid bodies" in flexclear(tree, "--help")
 
