@@ -33,6 +33,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline import dynamics
     from pipeline.core import quantities
     from pipeline.core.errors import SolverError
+    from pipeline.core.scene.wanted import parse
 
     scene = rebuild(params["simulate"])
     reduced = bundles(inputs)
@@ -46,7 +47,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
             seconds.append(time.process_time() - begun)
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
-    chosen = [quantities.parse(name, scene.owners()) for name in params["quantities"]]
+    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     kept = quantities.keep(done, chosen)
     kept["cpu_repeat"] = (("repeat",), seconds, {"units": "s", "long_name": "processor time of a warm run"})
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": _memory()}
@@ -67,6 +68,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     from pipeline import dynamics
     from pipeline.core import quantities
     from pipeline.core.errors import SolverError
+    from pipeline.core.scene.wanted import parse
 
     scene, reduced = rebuild(params["simulate"]), bundles(inputs)
     warm(scene, reduced, progress)
@@ -77,7 +79,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     seconds = (time.process_time() - begun) / done.sizes["member"]
     kept = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
-    chosen = [quantities.parse(name, scene.owners()) for name in params["quantities"]]
+    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
     kept = kept.assign_coords(quantity=list(errors))
     kept["standard_error"] = (("quantity",), list(errors.values()))

@@ -15,6 +15,7 @@ from pipeline import dynamics
 from pipeline.core import quantities
 from pipeline.core.errors import FlexclearError, SolverError
 from pipeline.core.progress import silent
+from pipeline.core.scene.wanted import parse
 from pipeline.dynamics.run.run import engine_of
 from stages import s1_mesh, s2_modes, s3_bundle
 
@@ -80,6 +81,6 @@ def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> flo
         tight = dynamics.simulate(tight_scene, bundles(tight_scene), silent)
     except FlexclearError:
         return float("nan")
-    velocity = quantities.parse("platform.velocity", described.owners())
+    velocity = parse("platform.velocity", described.owners())
     until = min(float(run["horizon"]), float(tight["horizon"]))
     return quantities.error(run, tight, velocity, until) / quantities.scale(run, velocity)

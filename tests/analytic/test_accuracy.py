@@ -9,6 +9,7 @@ import pytest
 from pipeline import dynamics, load_scene
 from pipeline.core import quantities
 from pipeline.core.errors import InputError
+from pipeline.core.scene.wanted import parse
 from tests.analytic.mechanism_runs import TREE, bundles
 
 CSJ = TREE / "scenes" / "sps4" / "csj.toml"
@@ -29,7 +30,7 @@ def reference():
 def test_the_delivered_error_is_the_wanted_one(reference, wanted):
     scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": wanted}}}})
     run = dynamics.simulate(scene, {}, quiet)
-    velocity = quantities.parse("platform.velocity", scene.owners())
+    velocity = parse("platform.velocity", scene.owners())
     delivered = quantities.error(run, reference, velocity) / quantities.scale(reference, velocity)
     assert run.attrs["accuracy_verdict"] == "met"
     # a run is accepted whose estimate is at most what is wanted; estimates are good to some per cent, and at 1e-9 the
@@ -44,7 +45,7 @@ def test_several_quantities_are_met_together(reference):
     scene = load_scene(CSJ, {"accuracy": asked})
     run = dynamics.simulate(scene, {}, quiet)
     for name, limit in (("A1.impact_times", 1e-6), ("platform.position", 1e-7)):
-        quantity = quantities.parse(name, scene.owners())
+        quantity = parse(name, scene.owners())
         assert quantities.error(run, reference, quantity) < 3.0 * limit
     assert float(json.loads(run.attrs["accuracy_estimated"])["A1.impact_times"]) <= 1e-6
 
@@ -53,7 +54,7 @@ def test_what_cannot_be_had_is_said_with_the_best_there_is(reference):
     scene = load_scene(CSJ, {"accuracy": {"platform.velocity": {"relative": 1e-15}}})
     run = dynamics.simulate(scene, {}, quiet)
     assert "times what is wanted" in run.attrs["accuracy_verdict"]
-    velocity = quantities.parse("platform.velocity", scene.owners())
+    velocity = parse("platform.velocity", scene.owners())
     assert quantities.error(run, reference, velocity) < 1e-8 * quantities.scale(reference, velocity)
 
 

@@ -82,7 +82,7 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, An
         where = f"{place} [frames.{name}.on]"
         nodes = ties.chosen(geometry, frame.on, where)
         x, weight = geometry.nodes[nodes], ties.areas(geometry, nodes)
-        ties.check_rank(frame, x, where)
+        ties.check_rank(x, where)
         if frame.tie == "rigid":
             other = taken[nodes].max()
             if other >= 0:
