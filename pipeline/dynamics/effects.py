@@ -21,6 +21,8 @@ JOINTS, CONTACTS = "pipeline.dynamics.joints", "pipeline.dynamics.contact"
 NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
 LOADS, LAWS, RECORDS = "pipeline.dynamics.loads", "pipeline.dynamics.drives", "pipeline.dynamics.record"
 INTEGRATORS = "pipeline.dynamics.integrate"
+#: laws of time that are polynomials throughout, or made of others
+WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated"}
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,7 @@ def most_parts(scene: Scene) -> Parts:
         closures=True,
         flexible=bool(scene.flexible()),
         stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
-        harmonics="harmonic" in _laws(scene),
+        harmonics=bool(_laws(scene) - WITHOUT_SINES),
     )
 
 
@@ -111,8 +113,8 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(LAWS, law, "law")
     for name, load in scene.load.items():
         yield Named(LOADS, load.type, f"[load.{name}]")
-    if scene.output.stress is not None:
-        yield Named(RECORDS, "stress", "[output]")
+    for name in scene.output.requests():
+        yield Named(RECORDS, name, "[output]")
 
 
 def schemes(scene: Scene) -> list[Scheme]:
