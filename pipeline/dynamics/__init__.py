@@ -77,5 +77,5 @@ def frequencies(
     from pipeline.dynamics.linear.equilibrium import equilibrium as find
     from pipeline.dynamics.linear.vibrations import vibrations
 
-    bench, pose = find(scene, bundles, progress, time, drives, moving)
-    return dataset.linear(bench, pose, vibrations(bench, pose.at), moving)
+    bench, rest = find(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)

@@ -62,13 +62,13 @@ def equilibrium(
     """The bench of a scene and its equilibrium; see `pipeline.dynamics.equilibrium`."""
     bench, q = hold(scene, bundles, progress, time, drives, moving)
     progress(None, "looking for the equilibrium")
-    pose = find(bench, q)
+    rest = find_equilibrium(bench, q)
     if moving:
-        _require_steady(bench, pose.at)
-    return bench, pose
+        _require_steady(bench, rest.at)
+    return bench, rest
 
 
-def find(bench: Bench, q: np.ndarray) -> Equilibrium:
+def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
     """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
     at = tangent(bench, q)
     best, since = np.inf, 0

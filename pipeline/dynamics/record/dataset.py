@@ -40,9 +40,9 @@ def dataset(run: Run) -> xr.Dataset:
         horizon: Variables = {"horizon": ((), np.array(run.twin.horizon))}
         separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}
         parts.append((separation | horizon, {"twin_time": run.twin.time}))
-    if run.scene.output.stress is not None:
-        record = lookup(RECORDS, "stress", where="[output]")
-        parts.append(record(motions, run.scene.output.stress))
+    for name, asked in run.scene.output.requests().items():
+        record = lookup(RECORDS, name, where="[output]")
+        parts.append(record(motions, asked))
     parts += [(ledger.series(model, seen), {}), topology(run)]
     variables, coordinates = Variables(), dict[str, object](time=trajectory.time)
     for part in parts:

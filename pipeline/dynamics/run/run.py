@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import SolverError
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.progress import Progress
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.load import edited
@@ -19,7 +20,6 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.equations import observation
 from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.integrate import HEIRS
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import trajectory as stepping
@@ -76,7 +76,8 @@ def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress)
     def made(wanted: Scene) -> Engine:
         return prepare(tabulate(build(wanted, bundles), given), progress)
 
-    return made(moved), cache(lambda: made(edited(moved, {"solver.integrator": HEIRS[scene.solver.integrator]})))
+    heir = INTEGRATORS[scene.solver.integrator].hands_over_to
+    return made(moved), cache(lambda: made(edited(moved, {"solver.integrator": heir})))
 
 
 def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
@@ -103,7 +104,7 @@ def follow(
     try:
         return engine, stepping.integrate(engine, y, progress), ""
     except StiffError as stiff:
-        progress(None, f"{stiff}; going on with {HEIRS[engine.model.scene.solver.integrator]}")
+        progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
         second = other()
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
