@@ -18,7 +18,8 @@ from typing import Any
 
 from pipeline.core.artifacts.store import write_dataset
 from pipeline.structure.kinds.kind import of_recipe
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
 
 MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
 FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}

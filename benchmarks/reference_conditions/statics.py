@@ -11,7 +11,7 @@ from benchmarks.reference_conditions.design import FULL, PLACES, ROD, TOP, Case,
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import read_toml
 from pipeline.structure.fe import mesh
-from pipeline.structure.modes import solve
+from pipeline.structure.modes.solution import solve
 
 #: directions in the axes of the rod's frames, z along the rod
 AXIAL, BENDING, TORSION = "z", "x", "rz"

@@ -23,7 +23,7 @@ def bundle(recipe: str, modes: Any) -> xr.Dataset:
     """One reduced body, through stages 1 to 3."""
     from pipeline.structure.fe import mesh
     from pipeline.structure.modes import bundle as bundling
-    from pipeline.structure.modes import solve
+    from pipeline.structure.modes.solution import solve
     from pipeline.structure.stress.beam import recover
 
     grid = mesh.build(read_toml(Path(recipe)))

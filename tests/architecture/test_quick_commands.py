@@ -9,10 +9,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from stages.families import TREE
 
 from pipeline.core.artifacts.store import Record, Store
-from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.task import Task, facts, in_order, key
 from stages import report
 from stages.run import Workplace
