@@ -8,20 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.core.errors import InputError
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited, read_toml
 from pipeline.core.scene.schema import Scene
 from stages.timing import paper_solver
 
-#: tolerances of the methods that choose their steps, and steps [s] of those that do not
-TOLERANCES: Mapping[str, tuple[int, int]] = {"dop853": (-3, -13), "dopri5": (-3, -13), "radau": (-3, -9)}
-STEPS: Mapping[str, tuple[float, ...]] = {
-    "rk4": (1e-4, 3e-5, 1e-5, 3e-6),
-    "adams-bashforth-moulton": (1e-4, 3e-5, 1e-5, 3e-6),
-    "generalized-alpha": (1e-4, 3e-5, 1e-5, 3e-6),
-}
 REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
-#: another family of methods, and SciPy's own steps
+#: another family of methods
 CONFIRMATION: Mapping[str, Any] = {"integrator": "radau", "rtol": 1e-12}
 #: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
 MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
@@ -50,7 +44,7 @@ def runs(scene: Scene, highest: float | None, integrators: Collection[str] = ())
     are compared, all when empty; reference, confirmation and the paper's choice are always there.
     Raises InputError for a method that is not compared.
     """
-    known = [*TOLERANCES, *STEPS]
+    known = [name for name, traits in INTEGRATORS.items() if traits.tolerances or traits.steps]
     for name in integrators:
         if name not in known:
             raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
@@ -78,13 +72,12 @@ def _integration(scene: Scene) -> Iterator[Design]:
 
     yield design("reference", REFERENCE)
     yield design("confirmation", CONFIRMATION)
-    for method, (loosest, tightest) in TOLERANCES.items():
-        for power in range(loosest, tightest - 1, -1):
-            rtol = 10.0**power
+    for method, traits in INTEGRATORS.items():
+        for rtol in traits.tolerances:
             solver = {"integrator": method, "rtol": rtol}
             yield design("tolerance", solver, adaptive_integrator=method, rtol=rtol)
-    for method, steps in STEPS.items():
-        for step in steps:
+    for method, traits in INTEGRATORS.items():
+        for step in traits.steps:
             yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)
     yield design("paper", paper_solver(scene))
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from pipeline.core.progress import Progress
 
-#: contact events are located to this share of the clearance (pipeline.dynamics.integrate.events)
+#: contact events are located to this share of the clearance (pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
 
 

@@ -1,7 +1,8 @@
-"""The report: every figure and table of the paper with all that they need, and the page that shows them."""
+"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them."""
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,10 +18,19 @@ from pipeline.core.workflow.task import Task
 from stages import kernels, s4_simulate, s6_render, timing
 from stages.figure import FIGURES
 from stages.graph import Graph
-from stages.run import Workplace, check
+from stages.run import Workplace, check, workplace
 
 #: the scene whose film and pictures the page shows: the paper's full model
 HEADLINE = "sps4/far_csj_cb"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """It takes nothing."""
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring it up to date and say where it is."""
+    print(make(workplace()))
 
 
 @dataclass(frozen=True)

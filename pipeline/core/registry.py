@@ -1,15 +1,16 @@
 """From a name in a scene to the part it names, imported only when it is asked for.
 
 A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to
-``"module:object"``; some hold further tables of that shape. It imports nothing.
+``"module:object"``; some hold further tables of that shape. It imports none of its modules. Where a scene's models
+(`pipeline.core.scene`) name the parts of a family already, the table is made from them by `declared`.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, get_args
 
 from pipeline.core.errors import InputError
 
@@ -39,6 +40,20 @@ def lookup(package: str, name: str, *, where: str) -> Any:
     """The object that a family lists under `name` in its NAMES, its module imported now; InputError for others."""
     module, attribute = listed(package, name, where=where)
     return getattr(import_module(f"{package}.{module}"), attribute)
+
+
+def declared(models: Iterable[Any], key: str = "type", made: str = "") -> dict[str, str]:
+    """The table of a family whose parts a scene's models declare: 'point-force' is in the module `point_force`.
+
+    The object there is called like the model, or `made`.  key: field of the models that holds the name.
+    """
+    names = {name: model for model in models for name in get_args(model.model_fields[key].annotation)}
+    return {name: f"{module_name(name)}:{made or model.__name__}" for name, model in names.items()}
+
+
+def module_name(name: str) -> str:
+    """Module of a part that a scene calls `name`."""
+    return name.replace("-", "_")
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:

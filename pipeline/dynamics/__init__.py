@@ -74,5 +74,5 @@ def frequencies(
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from pipeline.dynamics.linear import dataset, solve, vibrations
 
-    bench, found = solve.equilibrium(scene, bundles, progress, time, drives, moving)
-    return dataset.linear(bench, found, vibrations.vibrations(bench, found.at), moving)
+    bench, rest = solve.equilibrium(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, vibrations.vibrations(bench, rest.at), moving)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core import integrators
 from pipeline.core.registry import module_of
 
 if TYPE_CHECKING:
@@ -20,6 +21,8 @@ JOINTS, CONTACTS = "pipeline.dynamics.joints", "pipeline.dynamics.contact"
 NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
 LOADS, LAWS, RECORDS = "pipeline.dynamics.loads", "pipeline.dynamics.drives", "pipeline.dynamics.record"
 INTEGRATORS = "pipeline.dynamics.integrate"
+#: laws of time that are polynomials throughout, or made of others
+WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated"}
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def most_parts(scene: Scene) -> Parts:
         closures=True,
         flexible=bool(scene.flexible()),
         stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
-        harmonics="harmonic" in _laws(scene),
+        harmonics=bool(_laws(scene) - WITHOUT_SINES),
     )
 
 
@@ -110,12 +113,12 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(LAWS, law, "law")
     for name, load in scene.load.items():
         yield Named(LOADS, load.type, f"[load.{name}]")
-    if scene.output.stress is not None:
-        yield Named(RECORDS, "stress", "[output]")
+    for name in scene.output.requests():
+        yield Named(RECORDS, name, "[output]")
 
 
 def schemes(scene: Scene) -> list[Scheme]:
     """The scheme that a scene asks for, and that of the method that takes over where it would crawl."""
     scheme = scheme_of(scene.solver)
-    heir = import_module(INTEGRATORS).HEIRS.get(scheme.integrator)
+    heir = integrators.INTEGRATORS[scheme.integrator].hands_over_to
     return [scheme, *([Scheme(heir)] if heir and not scheme.fixed else [])]

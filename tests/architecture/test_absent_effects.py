@@ -25,8 +25,8 @@ from tests.analytic.mechanism_runs import bundles
 CONTACT = (
     "pipeline.dynamics.contact",
     "pipeline.dynamics.joints.clearance_spherical",
-    "pipeline.dynamics.integrate.events",
-    "pipeline.dynamics.integrate.trace",
+    "pipeline.dynamics.integrate.contact_events",
+    "pipeline.dynamics.integrate.contact_phases",
 )
 APPLIED = (
     "pipeline.dynamics.loads.fields",

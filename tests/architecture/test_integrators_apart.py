@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.solver import OWNERS
 from pipeline.dynamics.compile import functions
 from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.effects import Parts, Scheme, scheme_of
@@ -18,12 +18,12 @@ PACKAGE = "pipeline.dynamics.integrate"
 PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {
-    "dop853": {"dop853", "dop853_coefficients", "stages"},
-    "dopri5": {"dopri5", "stages"},
-    "rk4": {"rk4", "stages", "hermite"},
-    "adams-bashforth-moulton": {"adams", "rk4", "stages", "hermite"},
-    "generalized-alpha": {"generalized_alpha", "alpha_newton", "alpha_system", "newton", "lu", "hermite"},
-    "radau": {"radau", "radau_systems", "newton", "lu", "hermite"},
+    "dop853": {"dop853", "runge_kutta"},
+    "dopri5": {"dopri5", "runge_kutta"},
+    "rk4": {"rk4", "runge_kutta", "hermite"},
+    "adams-bashforth-moulton": {"adams", "rk4", "runge_kutta", "hermite"},
+    "generalized-alpha": {"generalized_alpha", "newton", "hermite"},
+    "radau": {"radau", "newton", "hermite"},
 }
 STEPPING = {"adaptive", "fixed"}
 
@@ -46,12 +46,12 @@ def test_chosen_and_fixed_steps_are_different_code() -> None:
 
 
 def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
-    assert "step_ends" not in reached(Scheme("rk4", fixed=True))
-    assert "step_ends" in reached(Scheme("rk4", fixed=True, located=False))
+    assert "step_end_events" not in reached(Scheme("rk4", fixed=True))
+    assert "step_end_events" in reached(Scheme("rk4", fixed=True, located=False))
 
 
 def test_scenes_and_family_know_the_same_names() -> None:
-    assert set(OWNERS) == set(NAMES)
+    assert set(INTEGRATORS) == set(NAMES)
 
 
 @pytest.mark.parametrize(

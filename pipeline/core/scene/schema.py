@@ -11,6 +11,7 @@ from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, Clearanc
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
 from pipeline.core.scene.loads import Gravity, Load
+from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
@@ -18,7 +19,7 @@ from pipeline.core.scene.parts import (
     Joint,
     RigidBody,
 )
-from pipeline.core.scene.solver import ExplicitPair, Solver
+from pipeline.core.scene.solver import PlainIntegrator, Solver
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
@@ -37,16 +38,6 @@ class TimeSpan(Part):
         if not self.end > self.start:
             raise ValueError(f"time.end = {self.end} s must lie after time.start = {self.start} s")
         return self
-
-
-class Output(Part):
-    """Regular output interval; drive breaks and events are always added.
-
-    stress: flexible bodies whose section forces and peak stresses are recorded.
-    """
-
-    interval: Annotated[Time, Field(gt=0.0)] = 1e-4
-    stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
 
 
 class Ensemble(Part):
@@ -125,7 +116,7 @@ class Scene(Part):
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
     time: TimeSpan
-    solver: Solver = ExplicitPair()
+    solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None

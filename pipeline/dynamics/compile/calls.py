@@ -93,17 +93,17 @@ if config.DISABLE_JIT:  # for debugging: the same calls between functions of Pyt
 
 @kernel
 def evaluate(h, f, w, n, t, y, dy):
-    """The right-hand side: `equations.compose`."""
+    """The right-hand side: `equations.right_hand_side`."""
     call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
 
 
 @kernel
 def project(h, f, w, n, t, y, dy, tolerance):
-    """Back onto the closures: `project.compose`."""
+    """Back onto the closures: `equations.projection`."""
     return call(h[m.PROJECT], (h, f, w, n, float(t), y, dy, tolerance))
 
 
 @kernel
 def retract(h, w, y, retractment, out, total):
-    """Positions after a retractment: `retract.compose`."""
+    """Positions after a retractment: `equations.retraction`."""
     call(h[m.RETRACT], (h, w, y, retractment, out, total))

@@ -8,9 +8,9 @@ the integrator and on whether there are closures and contacts, not on joints or 
 from __future__ import annotations
 
 from functools import cache
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+from pipeline.core import integrators
 from pipeline.core.registry import listed
 from pipeline.core.workflow.fingerprint import TREE, imported, source_file
 from pipeline.dynamics.effects import (
@@ -40,7 +40,7 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     found = {"evaluate": _evaluate(parts)}
     if parts.closures:
         found["project"] = _project(parts)
-    if scheme.integrator in import_module(INTEGRATORS).RETRACTING:
+    if integrators.INTEGRATORS[scheme.integrator].retracts:
         found["retract"] = _retract(parts)
     return found | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
@@ -106,11 +106,11 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
     if parts.surfaces and scheme.located:
-        located = _import(imports, f"{INTEGRATORS}.events", "located")
-        regimes = _import(imports, f"{INTEGRATORS}.trace", "regimes" if parts.frictions else "no_regimes")
+        located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
+        regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
         given["events"] = f"{located}({regimes})"
     elif parts.surfaces:
-        given["events"] = _import(imports, f"{INTEGRATORS}.step_ends", "AT_STEP_ENDS")
+        given["events"] = _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
     _import(imports, DYNAMICS, "memory as m")
     maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
     return _file(f"steps of {scheme}", imports, "steps", maker, given, ADVANCE)

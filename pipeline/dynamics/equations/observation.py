@@ -111,7 +111,7 @@ def make_observation(
         return column + 3
 
     @kernel
-    def settle(h, f, w, n, t, tolerance):
+    def evaluate_closed(h, f, w, n, t, tolerance):
         """Evaluate the state in Y with its loops closed to `tolerance`."""
         evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
         if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
@@ -131,7 +131,7 @@ def make_observation(
                 w[h[m.Y] + k] = row[1 + 2 * contacts_count + k]
             for k in range(h[m.N_LAWS]):
                 n[n[m.ACTIVE] + k] = pieces[r, k]
-            settle(h, f, w, n, row[0], tolerance)
+            evaluate_closed(h, f, w, n, row[0], tolerance)
             if n[m.EVALUATION] == m.OK:
                 keep_scales(h, w)
             status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
