@@ -44,6 +44,7 @@ def test_pauses_change_no_bit(solver: dict[str, Any], monkeypatch: pytest.Monkey
 def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
     made = run(double_pendulum(), solver)
     assert made.counters["evaluations"] > made.counters["steps"] > 0
+    assert (made.counters["jacobians"] > 0) is INTEGRATORS[solver["integrator"]].implicit
     with pytest.raises(SolverError, match="limit of 40 evaluations") as told:
         run(double_pendulum(), {**solver, "evaluations": 40})
     # what used them up, and what to do about it
