@@ -23,6 +23,8 @@ WORST_GUESS = 0.05
 #: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end
 EXACT, CLOSED = 1e-13, 1e-11
 ITERATIONS = 60
+#: least damping, as a share of the mean of the normal matrix: without any, that of redundant joints has no inverse
+ROUNDING = 1e-15
 #: least cosine between axes that a joint keeps parallel
 SAME_WAY = 0.5
 #: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
@@ -84,7 +86,7 @@ def close(system: System, joints: list[Constraint], poses: Sequence[Placement]) 
     for _ in range(ITERATIONS):
         G = now.gradient @ mobility
         normal, rows = G @ now.gradient.T, len(now.values)
-        scale = damping * float(np.linalg.norm(now.values)) * normal.trace() / rows
+        scale = max(damping * float(np.linalg.norm(now.values)), ROUNDING) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
         there = _moved(system, here, step)
         then = misfit(system, joints, there)

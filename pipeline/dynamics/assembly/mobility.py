@@ -16,19 +16,20 @@ from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.dynamics.assembly import weightless
 from pipeline.dynamics.assembly.closing import close, settled
-from pipeline.dynamics.assembly.constraints import constraints, demands, freedoms, outboard_place
+from pipeline.dynamics.assembly.constraints import constraints
 from pipeline.dynamics.assembly.merge import Placement
 from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.assembly.rates import Rates, motions, rates, row_axes, sites
 from pipeline.dynamics.assembly.tree import PATH
-from pipeline.dynamics.assembly.wiring import closure_route
-from pipeline.dynamics.tables import SITE_A, SITE_B
 
-#: singular values below this share of the largest are zero: poses fit to 1e-11, curvature brings that to 1e-9
-ZERO = 1e-7
 #: displacements, in radians and shares of the mechanism's size, of the poses nearby
 NEARBY = (0.03, 0.01)
 #: share of a self-stress that a joint must carry for its reaction to count as undetermined
 CARRIES = 1e-6
+#: condition numbers are not told apart from infinity above this
+INFINITE = 1e15
+#: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
+SLIGHT = 1e-3
 
 
 @dataclass(frozen=True)
@@ -68,120 +69,46 @@ def analyse(built: Tables) -> Mobility:
     mass resists.
     """
     poses, singular = [link.start for link in built.system.links], ""
-    J, known = jacobians(built, poses)
-    rank = _rank(J)
-    regular = _regular_poses(built, J, rank) if rank < len(J) else None
+    here = rates(built, poses)
+    regular = _regular_poses(built, here) if here.rank < len(here.J) else None
     if regular is not None:
-        poses, singular = regular, _singular_start(built, J, rank)
-        J, known = jacobians(built, poses)
-        rank = _rank(J)
-    found = Mobility(built.layout.nv, len(J), rank, _undetermined(built, J, rank, poses), singular)
-    _refuse_locked(built, found)
-    _refuse_contradiction(built, J, known, rank)
-    weightless.refuse(built, poses, _columns(built, poses), J, rank)
+        poses, singular = regular, _singular_start(built, here)
+        here = rates(built, poses)
+    found = Mobility(built.layout.nv, len(here.J), here.rank, _undetermined(built, here, poses), singular)
+    _refuse_locked(built, found, here)
+    _refuse_contradiction(built, here)
+    if here.rank < built.layout.nv:
+        weightless.refuse(built, poses, motions(built, poses).twists, here.free)
     return found
 
 
-def jacobians(built: Tables, poses: Sequence[Placement]) -> tuple[np.ndarray, np.ndarray]:
-    """Closure rows against the free motions of the tree, (rows, nv), and against the driven ones, (rows, drives).
-
-    Scaled by the mechanism's size; each joint's motions in an orthonormal basis.
-    """
-    layout, L = built.layout, built.system.length
-    twists = _columns(built, poses)
-    J = np.zeros((built.packed.sizes["N_CLOSURE_ROWS"], layout.nv + layout.known))
-    row = 0
-    for line, k in zip(built.packed.table("CLOSURES"), built.closure_order, strict=True):
-        wrenches = _scaled_wrenches(built.system.closures[k][0].kind, _sites(built, poses, k), L)
-        for coordinate, column, sign in closure_route(layout, int(line[SITE_A]), int(line[SITE_B])):
-            J[row : row + len(wrenches), coordinate] += sign * wrenches @ twists[column]
-        row += len(wrenches)
-    return J[:, : layout.nv], J[:, layout.nv :]
-
-
-def _sites(built: Tables, poses: Sequence[Placement], k: int) -> tuple[Placement, Placement]:
-    _, a, b = built.system.closures[k]
-    return poses[a.link].of(a.place), poses[b.link].of(b.place)
-
-
-def _scaled_wrenches(kind: str, frames: tuple[Placement, Placement], L: float) -> np.ndarray:
-    """Wrenches of a closure that give dimensionless rows with twists in units of L."""
-    _, wrenches = demands(kind, *frames)
-    force = np.any(wrenches[:, 3:] != 0.0, axis=1)
-    scaled = wrenches.copy()
-    scaled[force, :3] /= L
-    return scaled
-
-
-def _columns(built: Tables, poses: Sequence[Placement]) -> np.ndarray:
-    """Twist of every column of the layout, shape (columns, 6); velocities in units of the size per second."""
-    layout, L = built.layout, built.system.length
-    twists = np.zeros((layout.columns, 6))
-    for i, link in enumerate(built.system.links):
-        if link.inboard is None:
-            continue
-        F = poses[link.inboard.link].of(link.inboard.place)
-        basis = freedoms(link.kind, F, poses[i].of(outboard_place(built.system, link)), L)
-        twists[layout.c0[i] : layout.c0[i] + len(basis)] = basis
-    for site, frame, first in layout.ports:
-        on = layout.sites[site].link
-        twists[first : first + layout.modes[on]] = _shape_twists(built, on, frame, poses[on])
-    return twists
-
-
-def _shape_twists(built: Tables, link: int, frame: str, pose: Placement) -> np.ndarray:
-    """Twists of a frame of a flexible link per mode, relative to its inboard frame, undeformed; (modes, 6)."""
-    branch = built.system.links[link].branch
-    own = None if branch.edge is None else (branch.edge.frame_a if branch.reverse else branch.edge.frame_b)
-    twists = _frame_twists(built, link, frame, pose)
-    return twists if own is None else twists - _frame_twists(built, link, own, pose)
-
-
-def _frame_twists(built: Tables, link: int, frame: str, pose: Placement) -> np.ndarray:
-    bundle = built.system.bundles[str(built.system.links[link].flexible)]
-    k = list(bundle["frame"].values).index(frame.partition(".")[2])
-    turning = (pose.R @ bundle["frame_rotation_shape"].values[k]).T
-    moving = (pose.R @ bundle["frame_translation_shape"].values[k]).T
-    p = pose.of(Placement(bundle["frame_position"].values[k])).p
-    L = built.system.length
-    # per modal coordinate of the mechanism's size: sqrt(kg) m
-    return L * np.hstack([turning, (moving + np.cross(p, turning)) / L])
-
-
-def _rank(J: np.ndarray) -> int:
-    if not J.size:
-        return 0
-    values = np.linalg.svd(J, compute_uv=False)
-    return int(np.sum(values > ZERO * values[0]))
-
-
-def _regular_poses(built: Tables, J: np.ndarray, rank: int) -> list[Placement] | None:
+def _regular_poses(built: Tables, here: Rates) -> list[Placement] | None:
     """Poses nearby in which the closures have a higher rank than at the start, if there are any."""
     flexible = any(link.flexible for link in built.system.links)
     paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in built.system.links)
-    if rank == built.layout.nv or flexible or paths:
+    if here.rank == built.layout.nv or flexible or paths:
         return None
     joints = constraints(built.system)
     poses = [link.start for link in built.system.links]
-    free = np.linalg.svd(J)[2][rank:]
     random = np.random.default_rng(0)
     for size in NEARBY:
-        motion = random.normal(size=len(free)) @ free
-        start = _displaced(built, poses, size * motion / np.linalg.norm(motion))
+        share = random.normal(size=here.free.shape[1])
+        motion = here.free @ (share / np.linalg.norm(share))
+        start = _displaced(built, poses, size * motion / max(1.0, float(np.linalg.norm(motion))))
         closed = close(built.system, joints, start)
         if closed is None:
             continue
         there = [link.start for link in settled(built.system, closed).links]
-        if _rank(jacobians(built, there)[0]) > rank:
+        if rates(built, there).rank > here.rank:
             return there
     return None
 
 
-def _singular_start(built: Tables, J: np.ndarray, rank: int) -> str:
+def _singular_start(built: Tables, here: Rates) -> str:
     """What is said of a start in a singular pose."""
     names = {built.system.closures[k][0].name: None for k in built.closure_order}
-    values = np.linalg.svd(J, compute_uv=False)
-    ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
+    values = here.values
+    ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
     return (
         f"at t = {built.system.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
         f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
@@ -191,31 +118,35 @@ def _singular_start(built: Tables, J: np.ndarray, rank: int) -> str:
 
 def _displaced(built: Tables, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
     """Poses after a small motion of the tree's free coordinates."""
-    layout, L = built.layout, built.system.length
-    twists, moved = _columns(built, poses), [poses[0]]
+    layout, twists, moved = built.layout, motions(built, poses).twists, [poses[0]]
     for i in range(1, len(poses)):
         route = [(c, col) for c, col in layout.joint_route(i) if c < layout.nv]
         twist = sum((motion[c] * twists[col] for c, col in route), np.zeros(6))
         turn = rotation_vector_to_matrix(twist[:3])
-        moved.append(Placement(turn @ poses[i].p + L * twist[3:], turn @ poses[i].R))
+        moved.append(Placement(turn @ poses[i].p + twist[3:], turn @ poses[i].R))
     return moved
 
 
-def _undetermined(built: Tables, J: np.ndarray, rank: int, poses: Sequence[Placement]) -> frozenset[str]:
+def _undetermined(built: Tables, here: Rates, poses: Sequence[Placement]) -> frozenset[str]:
     """Joints that carry part of a self-stress: reactions in balance with each other, without any load."""
-    if rank == len(J):
+    if here.rank == len(here.J):
         return frozenset()
-    stress = np.linalg.svd(J.T)[2][rank:]  # (self-stresses, rows)
     system, L = built.system, built.system.length
-    carried = np.zeros((len(system.links), 6, len(stress)))  # wrench that a link takes from its closures
+    stresses = here.stresses / np.max(np.abs(here.stresses), axis=1, keepdims=True)
+    carried = np.zeros((len(system.links), 6, len(stresses)))  # wrench that a link takes from its closures
     found, row = set(), 0
     for k in built.closure_order:
         edge, a, b = system.closures[k]
-        wrenches = _scaled_wrenches(edge.kind, _sites(built, poses, k), L)
-        wrench = wrenches.T @ stress[:, row : row + len(wrenches)].T
+        along, about, force = row_axes(built, poses, k)
+        point = sites(built, poses, k)[1].p
+        wrenches = np.where(
+            force[:, None], np.hstack([np.cross(point, along) / L, along]), np.hstack([about, 0 * along])
+        )
+        share = stresses[:, row : row + len(wrenches)]
+        wrench = wrenches.T @ share.T
         carried[a.link] -= wrench
         carried[b.link] += wrench
-        if np.max(np.abs(wrench)) > CARRIES:
+        if np.max(np.abs(share), initial=0.0) > CARRIES:
             found.add(edge.name)
         row += len(wrenches)
     for i in range(len(system.links) - 1, 0, -1):
@@ -226,37 +157,37 @@ def _undetermined(built: Tables, J: np.ndarray, rank: int, poses: Sequence[Place
     return frozenset(found)
 
 
-def _refuse_locked(built: Tables, found: Mobility) -> None:
-    if found.mobility == 0 and built.layout.known == 0:
-        raise InputError(
-            "[joint]",
-            f"the mechanism is locked: {found.coordinates} free coordinates of its tree against {found.rank} "
-            "independent closure rows leave it no motion",
-            "remove a joint, choose one with more freedom, or drive one",
-        )
-
-
-def _refuse_contradiction(built: Tables, J: np.ndarray, known: np.ndarray, rank: int) -> None:
-    """Drives that the loops tie to each other can follow their laws only if these happen to agree."""
-    if not known.size or _rank(np.hstack([J, known])) == rank:
+def _refuse_locked(built: Tables, found: Mobility, here: Rates) -> None:
+    if found.mobility > 0 or built.layout.known > 0:
         return
-    tied = _tied(J, known, rank)
-    drives = [name for k, name in enumerate(built.system.drives) if k in tied]
+    least = float(here.values[here.rank - 1])
+    hardly = (
+        f"; one of these rows is only {least:.1g} of its natural size, as of joints whose axes hardly miss each other"
+        if least < SLIGHT
+        else ""
+    )
+    raise InputError(
+        "[joint]",
+        f"the mechanism is locked: {found.coordinates} free coordinates of its tree against {found.rank} "
+        f"independent closure rows leave it no motion{hardly}",
+        "write frames and poses with more digits, or let one of the joints give way"
+        if hardly
+        else "remove a joint, choose one with more freedom, or drive one",
+    )
+
+
+def _refuse_contradiction(built: Tables, here: Rates) -> None:
+    """Drives that the loops tie to each other can follow their laws only if these happen to agree."""
+    drives = [name for name, tied in zip(built.system.drives, here.tied, strict=True) if tied]
     moving = [name for name in drives if _moves(built, name)]
     if not moving:
         return
     raise InputError(
         f"[drive.{moving[0].partition('.')[0]}]",
         f"the mechanism is over-driven: its loops tie the coordinates of {', '.join(drives)} to each other "
-        f"({built.layout.nv} free coordinates, {rank} independent closure rows, {built.layout.known} drives)",
+        f"({built.layout.nv} free coordinates, {here.rank} independent closure rows, {built.layout.known} drives)",
         "remove a drive, or a joint",
     )
-
-
-def _tied(J: np.ndarray, known: np.ndarray, rank: int) -> set[int]:
-    """Drives that appear in what the closures demand of drives alone."""
-    left = np.linalg.svd(J.T)[2][rank:] @ known if len(J) > rank else np.zeros((0, known.shape[1]))
-    return {k for k in range(known.shape[1]) if np.max(np.abs(left[:, k]), initial=0.0) > ZERO}
 
 
 def _moves(built: Tables, name: str) -> bool:
