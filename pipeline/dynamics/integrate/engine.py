@@ -88,6 +88,14 @@ class Engine:
         self.entry.evaluate(self.h, self.built.packed.f, self.w, self.n, t, repeat)
         return bool(self.n[EVALUATION] == OK)
 
+    def mass_factor(self) -> np.ndarray:
+        """L of the mass matrix M = L L^T that the last evaluation left in its envelope, shape (nv, nv)."""
+        nv = self.built.layout.nv
+        L, entries = np.zeros((nv, nv)), self.view("MASS", self.built.packed.sizes["MASS_SIZE"])
+        for i, (first, start) in enumerate(self.built.packed.table("ENVELOPE")):
+            L[i, first : i + 1] = entries[start : start + i + 1 - first]
+        return L
+
     def rows(self, stored: str) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
         size = self.built.packed.sizes["JACOBIAN_SIZE"]

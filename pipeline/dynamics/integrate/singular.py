@@ -36,11 +36,19 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
     engine.keep(everything)
     engine.attempt(y, t)
     spread = engine.rows("SPREAD")
-    scales = selection.row_scales(engine.built, spread)
+    scales = selection.row_scales(engine.built, spread, _natural_lengths(engine))
     kept, ratio = selection.choose(spread, scales, engine.mobility.rank)
     engine.keep(kept)
     engine.view("ROW_SCALE", int(kept.sum()))[:] = scales[kept] ** 2
     return ratio
+
+
+def _natural_lengths(engine: Engine) -> np.ndarray:
+    built = engine.built
+    columns = engine.view("COLUMNS", 6 * built.layout.columns).reshape(-1, 6)
+    sites = engine.view("SITE_FRAMES", tables.FRAME_SIZE * built.packed.sizes["N_SITES"])
+    points = sites.reshape(-1, tables.FRAME_SIZE)[:, tables.ORIGIN : tables.ORIGIN + 3]
+    return selection.natural_lengths(built, columns, points, engine.mass_factor())
 
 
 def improve(engine: Engine, t: float) -> bool:
@@ -94,7 +102,9 @@ def diagnosis(engine: Engine) -> str:
     if not engine.built.system.closures:
         return "no loop is closed"
     J = scaled(engine.built, engine.h, engine.rows("JACOBIAN"))
-    if not J.size or not np.isfinite(J).all():
+    if not J.size:
+        return "no closure holds anything that the tree's joints leave free"
+    if not np.isfinite(J).all():
         return "the closures cannot be evaluated"
     U, values, _ = np.linalg.svd(J)
     if len(values) < len(J):

@@ -196,19 +196,11 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
     sizes, nv = engine.built.packed.sizes, engine.built.layout.nv
+    L = engine.mass_factor()
     return Balance(
         engine.view("BIAS", nv).copy(),
-        _mass(engine),
+        L @ L.T,
         engine.rows("JACOBIAN"),
         engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"])[selection.kept_places(engine.built, engine.h)],
     )
 
-
-def _mass(engine: Engine) -> np.ndarray:
-    """M = L L^T from the factor that the last evaluation left in its envelope."""
-    packed = engine.built.packed
-    L = np.zeros((engine.built.layout.nv,) * 2)
-    entries = engine.view("MASS", packed.sizes["MASS_SIZE"])
-    for i, (first, start) in enumerate(packed.table("ENVELOPE")):
-        L[i, first : i + 1] = entries[start : start + i + 1 - first]
-    return L @ L.T
