@@ -13,9 +13,9 @@ from benchmarks.engines import Mechanism, silent, with_tolerance
 from benchmarks.exudyn_runs import SAMPLING, Samples
 from benchmarks.measure import once
 from pipeline import dynamics
-from pipeline.dynamics.integrate.engine import consistent_start
-from pipeline.dynamics.integrate.trajectory import integrate
-from pipeline.dynamics.run import observed
+from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.run import observed
+from pipeline.dynamics.run.trajectory import integrate
 
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 #: the reference; its rows are so dense that cubic interpolation between them does not show

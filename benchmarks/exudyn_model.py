@@ -29,8 +29,8 @@ from benchmarks import exudyn_contact
 from benchmarks.laws import derivative, holds_at_zero, joint_laws
 from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
 from pipeline.dynamics.drives.pieces import Piece
+from pipeline.dynamics.model.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
 
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
 X_FROM_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

@@ -9,8 +9,8 @@ from benchmarks.engines import SCENES, Mechanism, mechanism, silent
 from benchmarks.measure import interleaved, once
 from benchmarks.tables import percent, table
 from pipeline import dynamics
-from pipeline.dynamics.integrate.engine import consistent_start
-from pipeline.dynamics.integrate.trajectory import integrate
+from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.trajectory import integrate
 
 TITLE = "Seconds per warm run"
 ROUNDS = 5

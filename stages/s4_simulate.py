@@ -17,19 +17,19 @@ if TYPE_CHECKING:
 DYNAMICS = "pipeline.dynamics"
 #: methods that may be given up for an implicit one on the way (pipeline.dynamics.run)
 EXPLICIT, IMPLICIT = ("dop853", "dopri5"), "radau"
-#: what the generated files compose (pipeline.dynamics.assembly.sources): for every scene, and
+#: what the generated files compose (pipeline.dynamics.compile.sources): for every scene, and
 #: for scenes with flexible bodies and with contacts
 KERNELS = (
-    "assembly.calls",
-    "assembly.closures",
-    "assembly.dispatch",
-    "assembly.equations",
-    "assembly.known",
-    "assembly.kinematics",
+    "compile.calls",
+    "equations.closures",
+    "equations.choice",
+    "equations.right_hand_side",
+    "equations.prescribed_motion",
+    "equations.kinematics",
     "bodies.rigid",
-    "integrate.displace",
-    "integrate.observe",
-    "integrate.project",
+    "equations.retraction",
+    "equations.observation",
+    "equations.projection",
     "integrate.stepper",
 )
 FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")

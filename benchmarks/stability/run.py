@@ -14,7 +14,7 @@ from benchmarks.stability.outcome import REFUSED, WRONG, Outcome, judge
 from pipeline import dynamics
 from pipeline.core import quantities
 from pipeline.core.errors import FlexclearError, SolverError
-from pipeline.dynamics.run import engine_of
+from pipeline.dynamics.run.run import engine_of
 from stages import s1_mesh, s2_modes, s3_bundle
 
 if TYPE_CHECKING:

@@ -23,17 +23,17 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
     from pipeline.dynamics.record.dataset import dataset, warnings
-    from pipeline.dynamics.run import integrate
+    from pipeline.dynamics.run.run import integrate
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
-        for sentence in warnings(done.engine.built, done.trajectory):
+        for sentence in warnings(done.engine.model, done.trajectory):
             progress(None, f"warning: {sentence}")
         return dataset(done)
 
     if scene.accuracy is None or not scene.accuracy.quantities:
         return once(scene)
-    from pipeline.dynamics.accuracy import deliver
+    from pipeline.dynamics.run.accuracy import deliver
 
     return deliver(scene, once, progress)
 

@@ -15,12 +15,12 @@ from pipeline.core.registry import module_of
 from pipeline.core.scene.load import compose, load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import loads
-from pipeline.dynamics.assembly import fuse
-from pipeline.dynamics.assembly.contact_numbers import ContactKinds
-from pipeline.dynamics.assembly.numbers import Kinds, tabulate
-from pipeline.dynamics.assembly.sources import PACKAGES, sources
-from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile.sources import PACKAGES, sources
 from pipeline.dynamics.integrate.method import Scheme, scheme_of
+from pipeline.dynamics.model.contacts import ContactKinds
+from pipeline.dynamics.model.mechanism import build
+from pipeline.dynamics.model.model import Kinds, tabulate
 from tests.analytic.mechanism_runs import bundles
 
 CONTACT = (
@@ -96,7 +96,7 @@ EFFECTS = {
     "normal law": ("import force as form_force", "pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
-    "closures": ("assembly.closures", "pipeline.dynamics.assembly.closures"),
+    "closures": ("assembly.closures", "pipeline.dynamics.equations.closures"),
     "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
     "loads": ("import composing", "pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),

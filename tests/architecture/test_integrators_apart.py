@@ -8,12 +8,12 @@ import pytest
 
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.solver import OWNERS
-from pipeline.dynamics.assembly import fuse
-from pipeline.dynamics.assembly.contact_numbers import ContactKinds
-from pipeline.dynamics.assembly.numbers import Kinds
-from pipeline.dynamics.assembly.sources import sources
+from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.integrate import NAMES
 from pipeline.dynamics.integrate.method import Scheme, scheme_of
+from pipeline.dynamics.model.contacts import ContactKinds
+from pipeline.dynamics.model.model import Kinds
 from stages import s4_simulate
 
 PACKAGE = "pipeline.dynamics.integrate"

@@ -56,12 +56,12 @@ def test_import_rules_hold(root: Path):
 @pytest.mark.parametrize(
     "module, line, broken",
     [
-        ("pipeline/post/errors.py", "import pipeline.dynamics.tables", "three towers"),
+        ("pipeline/post/errors.py", "import pipeline.dynamics.memory", "three towers"),
         ("pipeline/core/units.py", "import pipeline.post.errors", "three towers"),
-        ("pipeline/dynamics/tables.py", "import stages.graph", "three towers"),
+        ("pipeline/dynamics/memory.py", "import stages.graph", "three towers"),
         ("pipeline/post/errors.py", "import meshio", "finite elements"),
         ("stages/graph.py", "import skfem", "finite elements"),
-        ("pipeline/dynamics/tables.py", "import matplotlib", "plots"),
+        ("pipeline/dynamics/memory.py", "import matplotlib", "plots"),
         ("pipeline/post/errors.py", "import pyvista", "shapes"),
     ],
 )

@@ -13,10 +13,11 @@ from pydantic import TypeAdapter
 
 from pipeline.core.scene.laws import Law, Step
 from pipeline.dynamics import drives
-from pipeline.dynamics.assembly import known, laws
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.oscillation import oscillate
 from pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from pipeline.dynamics.tables import ACTIVE, HEADER, LAW, N_LAWS, PIECES, place
+from pipeline.dynamics.equations import prescribed_motion as known
+from pipeline.dynamics.model import laws
 from tests.analytic.mechanism_runs import run
 from tests.properties.kernels import from_python
 
@@ -75,11 +76,15 @@ def value(law: Any, t: float, order: int = 0, side: str = "right") -> float:
 
 def compiled(law: Any, t: float, piece: int) -> np.ndarray:
     """Value, rate and second rate from the kernel, with this piece in force."""
-    wiring, numbers = laws.fill([pieces(law)])
-    shares, h, n = wiring["PIECE_HARMONICS"].ravel(), np.zeros(HEADER, dtype=np.int64), np.zeros(8, dtype=np.int64)
-    f = np.concatenate([numbers["PIECES"].ravel(), numbers["HARMONICS"].ravel()])
-    h[N_LAWS], h[LAW], h[PIECES], h[place("HARMONICS")] = 1, 0, 0, numbers["PIECES"].size
-    h[place("PIECE_HARMONICS")], n[ACTIVE], n[7] = HEADER, 7, piece
+    tables = laws.fill([pieces(law)])
+    shares, h, n = (
+        np.array(tables[m.PIECE_HARMONICS]).ravel(),
+        np.zeros(m.HEADER, dtype=np.int64),
+        np.zeros(m.INTEGERS + 1, dtype=np.int64),
+    )
+    f = np.concatenate([tables[m.PIECES].ravel(), np.array(tables[m.HARMONICS]).ravel()])
+    h[m.N_LAWS], h[m.LAW.place], h[m.PIECES.place], h[m.HARMONICS.place] = 1, 0, 0, tables[m.PIECES].size
+    h[m.PIECE_HARMONICS.place], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
     w = np.zeros(3)
     KNOWN_MOTION(np.concatenate([h, shares]), f, w, n, t)
     return w

@@ -12,20 +12,12 @@ from hypothesis import strategies as st
 from pipeline.core.algebra import rotation_vector_to_quaternion, skew
 from pipeline.core.registry import lookup
 from pipeline.dynamics import joints
-from pipeline.dynamics.tables import (
-    J_ACCELERATION,
-    J_ALPHA,
-    J_COLUMNS,
-    J_OMEGA,
-    J_POSITION,
-    J_VELOCITY,
-    JOINT_SIZE,
-)
+from pipeline.dynamics import memory as m
 from tests.properties.kernels import from_python
 
 #: places in a work space of the tests' own
 AT_X, AT_U, AT_DU, AT_RATE, AT_JOINT = 0, 7, 13, 19, 26
-SIZE = AT_JOINT + JOINT_SIZE
+SIZE = AT_JOINT + m.JOINT.size
 STEP = 1e-3
 #: fourth-order differences over STEP: angular rates of some rad/s give 3^5 (1e-3)^4 / 30 = 1e-11, rounding 1e-12
 DIFFERENCE = 1e-9
@@ -96,7 +88,7 @@ def vector(record: np.ndarray, place: int) -> np.ndarray:
 def columns(name: str, record: np.ndarray) -> np.ndarray:
     """Twist (angular; linear) per unit of each speed, shape (6, speeds)."""
     n = len(declared(name).SPEEDS)
-    return record[J_COLUMNS : J_COLUMNS + 6 * n].reshape(n, 6).T
+    return record[m.JOINT.columns : m.JOINT.columns + 6 * n].reshape(n, 6).T
 
 
 def seeds(test: Any) -> Any:
@@ -109,9 +101,9 @@ def seeds(test: Any) -> Any:
 def test_rates_are_the_derivatives_of_the_pose(name: str, seed: int) -> None:
     found = records(name, *coordinates(name, seed))
     turning = slope({k: rotation(r) for k, r in found.items()}) @ rotation(found[0]).T
-    assert turning == pytest.approx(skew(vector(found[0], J_OMEGA)), abs=DIFFERENCE)
-    sliding = slope({k: vector(r, J_POSITION) for k, r in found.items()})
-    assert sliding == pytest.approx(vector(found[0], J_VELOCITY), abs=DIFFERENCE)
+    assert turning == pytest.approx(skew(vector(found[0], m.JOINT.omega)), abs=DIFFERENCE)
+    sliding = slope({k: vector(r, m.JOINT.position) for k, r in found.items()})
+    assert sliding == pytest.approx(vector(found[0], m.JOINT.velocity), abs=DIFFERENCE)
 
 
 @every_joint
@@ -121,7 +113,7 @@ def test_second_rates_are_the_derivatives_of_the_rates(name: str, seed: int) -> 
     x, u, du = coordinates(name, seed)
     for second in (0.0 * du, du):
         found = records(name, x, u, second)
-        for rate, place in ((J_OMEGA, J_ALPHA), (J_VELOCITY, J_ACCELERATION)):
+        for rate, place in ((m.JOINT.omega, m.JOINT.alpha), (m.JOINT.velocity, m.JOINT.acceleration)):
             change = slope({k: vector(r, rate) for k, r in found.items()})
             assert change == pytest.approx(vector(found[0], place), abs=DIFFERENCE)
 
@@ -133,11 +125,13 @@ def test_columns_are_the_rates_per_unit_of_each_speed(name: str, seed: int) -> N
     record, _ = move(name, x, u, du)
     twist = columns(name, record) @ u
     # products with zeros and ones
-    assert np.concatenate([vector(record, J_OMEGA), vector(record, J_VELOCITY)]) == pytest.approx(twist, abs=1e-15)
+    assert np.concatenate([vector(record, m.JOINT.omega), vector(record, m.JOINT.velocity)]) == pytest.approx(
+        twist, abs=1e-15
+    )
     for k, unit in enumerate(np.eye(len(u))):
         found = records(name, x, unit, 0.0 * du)
         turning = slope({j: rotation(r) for j, r in found.items()}) @ rotation(found[0]).T
-        sliding = slope({j: vector(r, J_POSITION) for j, r in found.items()})
+        sliding = slope({j: vector(r, m.JOINT.position) for j, r in found.items()})
         known = columns(name, record)[:, k]
         assert turning == pytest.approx(skew(known[:3]), abs=DIFFERENCE)
         assert sliding == pytest.approx(known[3:], abs=DIFFERENCE)
@@ -148,7 +142,7 @@ def test_columns_are_the_rates_per_unit_of_each_speed(name: str, seed: int) -> N
 def test_coordinates_invert_the_motion(name: str, seed: int) -> None:
     x, u, du = coordinates(name, seed)
     record, _ = move(name, x, u, du)
-    R, p = rotation(record), vector(record, J_POSITION)
+    R, p = rotation(record), vector(record, m.JOINT.position)
     # rounding of R, at angles of 3.1 rad divided by cos(1.55) = 0.02
     assert declared(name).coordinates(R, p) == pytest.approx(x, abs=1e-13)
 
@@ -181,7 +175,7 @@ def test_a_closure_forbids_exactly_what_the_tree_joint_does_not_allow(name: str,
     """Residuals vanish on all its motions, and rows and columns together fill the six dimensions."""
     part = declared(name)
     record, _ = move(name, *coordinates(name, seed))
-    R, p = rotation(record), vector(record, J_POSITION)
+    R, p = rotation(record), vector(record, m.JOINT.position)
     rows = [np.concatenate([np.zeros(3), np.eye(3)[k]]) for k in part.TRANSLATIONS]
     rows += [np.concatenate([np.cross(R[:, b], np.eye(3)[a]), np.zeros(3)]) for a, b in part.ROTATIONS]
     # rounding

@@ -13,8 +13,8 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.fields import Inertia, Position
 from pipeline.core.scene.load import load_scene
 from pipeline.core.units import UNITS, quantity, unit
-from pipeline.dynamics.assembly.closing import assembled
-from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics.model.assembly import assembled
+from pipeline.dynamics.model.mechanism import build
 
 BASE = """
 title = "sound"

@@ -16,8 +16,9 @@ from pipeline.core.workflow import cores, schedule
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import Task
-from pipeline.dynamics.assembly import companion, fuse
-from pipeline.dynamics.assembly.generated import bring, claimed, compiled, take
+from pipeline.dynamics.compile import compiler_process as companion
+from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile.generated import bring, claimed, compiled, take
 
 SOURCE = """from numba import njit, types
 
@@ -29,7 +30,7 @@ def add(x):
 #: holds the lock of a file, says so, and stays
 HOLDER = """import sys, time
 from pathlib import Path
-from pipeline.dynamics.assembly.generated import claimed
+from pipeline.dynamics.compile.generated import claimed
 with claimed(Path(sys.argv[1]), wait=True):
     print("held", flush=True)
     time.sleep(600.0)

@@ -2,33 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics.tables import (
-    ACCELERATION,
-    ALPHA,
-    AXES,
-    INERTIA_SIZE,
-    LINK_NUMBERS,
-    OMEGA,
-    ORIGIN,
-    OWN,
-    VELOCITY,
-    link_frame,
-    wrench,
-)
-from pipeline.dynamics.vectors import (
-    add,
-    at,
-    at6,
-    at9,
-    congruence,
-    cross,
-    dot,
-    kernel,
-    put,
-    scale,
-    turn,
-    turn_symmetric,
-)
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import add, at, at6, at9, congruence, cross, dot, put, scale, turn, turn_symmetric
 
 MASS, COM, TENSOR, NUMBERS = 0, 1, 4, 10  # fields of LINK_NUMBERS
 
@@ -54,18 +30,18 @@ def inertia(h, f, w, i):
     The wrench is what the accelerations now in its frame need, gravity being an acceleration of
     the ground.
     """
-    frame, numbers = link_frame(h, i), h[LINK_NUMBERS] + NUMBERS * i
-    R = at9(w, frame + AXES)
-    omega, alpha = at(w, frame + OMEGA), at(w, frame + ALPHA)
+    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
+    R = at9(w, frame + m.FRAME.axes)
+    omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
     arm = turn(R, at(f, numbers + COM))
-    c = add(at(w, frame + ORIGIN), arm)
+    c = add(at(w, frame + m.FRAME.origin), arm)
     mass = f[numbers + MASS]
     J = congruence(R, at6(f, numbers + TENSOR))
-    spatial(w, h[OWN] + INERTIA_SIZE * i, mass, c, J)
-    a = add(at(w, frame + ACCELERATION), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+    spatial(w, m.OWN.row(h, i), mass, c, J)
+    a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
     force = scale(mass, a)
     moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
-    o = wrench(h, i)
+    o = m.WRENCH.row(h, i)
     put(w, o, add(moment, cross(c, force)))
     put(w, o + 3, force)
 
@@ -73,9 +49,9 @@ def inertia(h, f, w, i):
 @kernel
 def kinetic_energy(h, f, w, i):
     """Kinetic energy [J] of a rigid link."""
-    frame, numbers = link_frame(h, i), h[LINK_NUMBERS] + NUMBERS * i
-    R = at9(w, frame + AXES)
-    omega = at(w, frame + OMEGA)
-    v = add(at(w, frame + VELOCITY), cross(omega, turn(R, at(f, numbers + COM))))
+    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
+    R = at9(w, frame + m.FRAME.axes)
+    omega = at(w, frame + m.FRAME.omega)
+    v = add(at(w, frame + m.FRAME.velocity), cross(omega, turn(R, at(f, numbers + COM))))
     J = congruence(R, at6(f, numbers + TENSOR))
     return 0.5 * (f[numbers + MASS] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))

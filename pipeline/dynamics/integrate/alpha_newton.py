@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate.alpha_system import (
     A_STEP,
     BY_POSITION,
@@ -35,24 +36,7 @@ from pipeline.dynamics.integrate.alpha_system import (
     vector,
 )
 from pipeline.dynamics.integrate.newton import converged, limit
-from pipeline.dynamics.integrate.state import EVALUATIONS, FIXED, JACOBIANS, RTOL, TIME
-from pipeline.dynamics.tables import (
-    CONTROL,
-    EVALUATION,
-    FLOORS,
-    GROUPS,
-    MAGNITUDE,
-    MEMORY,
-    NQ,
-    NV,
-    NY,
-    OK,
-    SLOPES,
-    Y_NEW,
-    Y_STAGE,
-    Y,
-)
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 # rows of SLOPES: Newton's iterate, and what is tried beside it
 ITERATE, ESTIMATE = 1, 3
@@ -61,81 +45,81 @@ MOST_ITERATIONS, SLOW, MOST_CORRECTIONS, MOST_HALVINGS = 10, 4, 30, 12
 NUDGE = 1e-8
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]:
+def compose(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
     """The kernels place(h, w, step, out) and converge(h, f, w, n, step)."""
 
     @kernel
     def column(h, f, w, n, t, slope, k, nudge, target):
         """Column k of a Jacobian of the rates, from the nudged state in Y_STAGE."""
-        m, nq, near = rates(h), h[NQ], h[SLOPES] + h[NY] * ESTIMATE
-        evaluate(h, f, w, n, t, h[Y_STAGE], near)
-        n[EVALUATIONS] += 1
-        for i in range(m):
-            w[index(target + m * i + k)] = (w[index(near + nq + i)] - w[index(slope + nq + i)]) / nudge
-        return n[EVALUATION] == OK
+        n_rates, nq, near = rates(h), h[m.NQ], h[m.SLOPES] + h[m.NY] * ESTIMATE
+        evaluate(h, f, w, n, t, h[m.Y_STAGE], near)
+        n[m.EVALUATIONS] += 1
+        for i in range(n_rates):
+            w[target + n_rates * i + k] = (w[near + nq + i] - w[slope + nq + i]) / nudge
+        return n[m.EVALUATION] == m.OK
 
     @kernel
     def jacobian(h, f, w, n, t, y, slope):
         """Change of the rates with speeds and what follows them, and with displacements, at the state in y."""
-        nv, nq, shift = h[NV], h[NQ], vector(h, SHIFT)
-        for c in range(h[NY]):
-            w[index(h[Y_STAGE] + c)] = w[index(y + c)]
+        nv, nq, shift = h[m.NV], h[m.NQ], vector(h, SHIFT)
+        for c in range(h[m.NY]):
+            w[h[m.Y_STAGE] + c] = w[y + c]
         for k in range(rates(h)):
-            size, value = f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])], w[index(y + nq + k)]
+            size, value = f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k))], w[y + nq + k]
             nudged = value + NUDGE * (size + abs(value))
-            w[index(h[Y_STAGE] + nq + k)] = nudged
+            w[h[m.Y_STAGE] + nq + k] = nudged
             if not column(h, f, w, n, t, slope, k, nudged - value, matrix(h, BY_STATE)):
                 return False
-            w[index(h[Y_STAGE] + nq + k)] = value
+            w[h[m.Y_STAGE] + nq + k] = value
         for k in range(nv):
-            nudge = NUDGE * f[index(h[FLOORS] + h[index(h[GROUPS] + nq + k)])]
+            nudge = NUDGE * f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k))]
             for j in range(nv):
-                w[index(shift + j)] = nudge if j == k else 0.0
-            displace(h, w, y, shift, h[Y_STAGE], positions(h))
+                w[shift + j] = nudge if j == k else 0.0
+            retract(h, w, y, shift, h[m.Y_STAGE], positions(h))
             if not column(h, f, w, n, t, slope, k, nudge, matrix(h, BY_POSITION)):
                 return False
-        n[JACOBIANS] += 1
-        w[index(h[MEMORY] + VALID)], w[index(h[MEMORY] + LU_STEP)] = 1.0, 0.0
+        n[m.JACOBIANS] += 1
+        w[h[m.MEMORY] + VALID], w[h[m.MEMORY] + LU_STEP] = 1.0, 0.0
         return True
 
     @kernel
     def place(h, w, step, out):
         """State at the end of the step for the rates in NEW."""
         _, _, beta, gamma = constants(h, w)
-        nq, nv, old, new, shift = h[NQ], h[NV], vector(h, SCALED), vector(h, NEW), vector(h, SHIFT)
+        nq, nv, old, new, shift = h[m.NQ], h[m.NV], vector(h, SCALED), vector(h, NEW), vector(h, SHIFT)
         for k in range(nv):
-            a, b, u = w[index(old + k)], w[index(new + k)], w[index(h[Y] + nq + k)]
-            w[index(shift + k)] = step * (u + step * ((0.5 - beta) * a + beta * b))
-            w[index(out + nq + k)] = u + step * ((1.0 - gamma) * a + gamma * b)
+            a, b, u = w[old + k], w[new + k], w[h[m.Y] + nq + k]
+            w[shift + k] = step * (u + step * ((0.5 - beta) * a + beta * b))
+            w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
         for k in range(nv, rates(h)):
-            w[index(out + nq + k)] = w[index(h[Y] + nq + k)] + step * w[index(new + k)]
-        displace(h, w, h[Y], shift, out, positions(h))
+            w[out + nq + k] = w[h[m.Y] + nq + k] + step * w[new + k]
+        retract(h, w, h[m.Y], shift, out, positions(h))
 
     @kernel
     def misfit(h, f, w, n, step):
         """What the rates in NEW leave of the method's equations, into RESIDUAL; False without a slope."""
         alpha_m, alpha_f, _, _ = constants(h, w)
-        nq, old, start_slope, slope = h[NQ], vector(h, SCALED), h[SLOPES], h[SLOPES] + h[NY] * ITERATE
-        place(h, w, step, h[Y_NEW])
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope)
-        n[EVALUATIONS] += 1
+        nq, old, start_slope, slope = h[m.NQ], vector(h, SCALED), h[m.SLOPES], h[m.SLOPES] + h[m.NY] * ITERATE
+        place(h, w, step, h[m.Y_NEW])
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], slope)
+        n[m.EVALUATIONS] += 1
         for i in range(rates(h)):
-            first, last = w[index(start_slope + nq + i)], w[index(slope + nq + i)]
-            if i < h[NV]:
-                wanted = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * w[index(old + i)]
+            first, last = w[start_slope + nq + i], w[slope + nq + i]
+            if i < h[m.NV]:
+                wanted = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * w[old + i]
             else:
                 wanted = 0.5 * (first + last)
-            w[index(vector(h, RESIDUAL) + i)] = wanted - diagonal(h, w, i) * w[index(vector(h, NEW) + i)]
-        return n[EVALUATION] == OK
+            w[vector(h, RESIDUAL) + i] = wanted - diagonal(h, w, i) * w[vector(h, NEW) + i]
+        return n[m.EVALUATION] == m.OK
 
     @kernel
     def size_of(h, w, step, a):
         """What rates from place a make of the state, in units of the tolerance."""
-        total, m = 0.0, rates(h)
-        for i in range(m):
-            scale = w[index(h[MAGNITUDE] + h[index(h[GROUPS] + h[NQ] + i)])]
-            total += (reach(h, w, step, i) * w[index(a + i)] / scale) ** 2
-        return np.sqrt(total / m)
+        total, n_rates = 0.0, rates(h)
+        for i in range(n_rates):
+            scale = w[h[m.MAGNITUDE] + m.GROUPS.group(h, h[m.NQ] + i)]
+            total += (reach(h, w, step, i) * w[a + i] / scale) ** 2
+        return np.sqrt(total / n_rates)
 
     @kernel
     def iterate(h, f, w, n, step):
@@ -146,9 +130,9 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
                 return 0
             solve(h, w, residual)
             for i in range(rates(h)):
-                w[index(vector(h, NEW) + i)] += w[index(residual + i)]
+                w[vector(h, NEW) + i] += w[residual + i]
             norm = size_of(h, w, step, residual)
-            verdict = converged(k, norm, last_norm, w[index(h[CONTROL] + RTOL)])
+            verdict = converged(k, norm, last_norm, w[h[m.CONTROL] + m.RTOL])
             if verdict != 0:
                 return k + 1 if verdict > 0 else 0
             last_norm = norm
@@ -161,7 +145,7 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
         share, there = 1.0, 0.0
         for _ in range(MOST_HALVINGS):
             for i in range(rates(h)):
-                w[index(new + i)] += (share - there) * w[index(correction + i)]
+                w[new + i] += (share - there) * w[correction + i]
             if misfit(h, f, w, n, step):
                 left = size_of(h, w, step, residual)
                 if left < (1.0 - 0.1 * share) * norm:
@@ -173,16 +157,16 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
     @kernel
     def persist(h, f, w, n, step):
         """Damped Newton iterations with a new matrix each: for friction that saturates within a step."""
-        t, enough = w[index(h[CONTROL] + TIME)] + step, limit(w[index(h[CONTROL] + RTOL)])
+        t, enough = w[h[m.CONTROL] + m.TIME] + step, limit(w[h[m.CONTROL] + m.RTOL])
         correction, residual = vector(h, CORRECTION), vector(h, RESIDUAL)
         if not misfit(h, f, w, n, step):
             return False
         left = size_of(h, w, step, residual)
         for _ in range(MOST_CORRECTIONS):
-            if not jacobian(h, f, w, n, t, h[Y_NEW], h[SLOPES] + h[NY] * ITERATE) or not factorise(h, w, step):
+            if not jacobian(h, f, w, n, t, h[m.Y_NEW], h[m.SLOPES] + h[m.NY] * ITERATE) or not factorise(h, w, step):
                 return False
             for i in range(rates(h)):
-                w[index(correction + i)] = w[index(residual + i)]
+                w[correction + i] = w[residual + i]
             solve(h, w, correction)
             norm = size_of(h, w, step, correction)
             left = shorten(h, f, w, n, step, left)
@@ -195,15 +179,15 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
     @kernel
     def start(h, w, step):
         """Rates at the start for a step of this length, and a first guess of those at its end."""
-        o, nq = h[MEMORY], h[NQ]
-        share, on = step / w[index(o + A_STEP)], step / w[index(o + STEP_BEFORE)]
-        for k in range(h[NV]):
-            now = w[index(h[SLOPES] + nq + k)]
-            a = now + share * (w[index(vector(h, OLD) + k)] - now)
-            w[index(vector(h, SCALED) + k)] = a
-            w[index(vector(h, NEW) + k)] = a + on * (now - w[index(before(h) + nq + k)])
-        for k in range(h[NV], rates(h)):
-            w[index(vector(h, NEW) + k)] = w[index(h[SLOPES] + nq + k)]
+        o, nq = h[m.MEMORY], h[m.NQ]
+        share, on = step / w[o + A_STEP], step / w[o + STEP_BEFORE]
+        for k in range(h[m.NV]):
+            now = w[h[m.SLOPES] + nq + k]
+            a = now + share * (w[vector(h, OLD) + k] - now)
+            w[vector(h, SCALED) + k] = a
+            w[vector(h, NEW) + k] = a + on * (now - w[before(h) + nq + k])
+        for k in range(h[m.NV], rates(h)):
+            w[vector(h, NEW) + k] = w[h[m.SLOPES] + nq + k]
 
     @kernel
     def converge(h, f, w, n, step):
@@ -211,22 +195,22 @@ def compose(evaluate: Callable, displace: Callable) -> tuple[Callable, Callable]
 
         With chosen steps a shorter one is the better remedy, with fixed steps it is patience.
         """
-        o = h[MEMORY]
+        o = h[m.MEMORY]
         for _ in range(2):
-            fresh = w[index(o + VALID)] == 0.0
-            if fresh and not jacobian(h, f, w, n, w[index(h[CONTROL] + TIME)], h[Y], h[SLOPES]):
+            fresh = w[o + VALID] == 0.0
+            if fresh and not jacobian(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], h[m.SLOPES]):
                 return False
-            if w[index(o + LU_STEP)] != step and not factorise(h, w, step):
+            if w[o + LU_STEP] != step and not factorise(h, w, step):
                 return False
             start(h, w, step)
             count = iterate(h, f, w, n, step)
             if count > 0:
-                w[index(o + VALID)] = 1.0 if count <= SLOW else 0.0
+                w[o + VALID] = 1.0 if count <= SLOW else 0.0
                 return True
-            w[index(o + VALID)] = 0.0
+            w[o + VALID] = 0.0
             if fresh:
                 break
-        if w[index(h[CONTROL] + FIXED)] > 0.0:
+        if w[h[m.CONTROL] + m.FIXED] > 0.0:
             start(h, w, step)
             return persist(h, f, w, n, step)
         return False

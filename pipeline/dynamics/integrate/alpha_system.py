@@ -8,10 +8,9 @@ Source: Chung & Hulbert (1993), *J. Appl. Mech.* 60, 371-375, eqs. 17, 20 and 25
 
 from __future__ import annotations
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import lu
-from pipeline.dynamics.integrate.state import PARAMETER
-from pipeline.dynamics.tables import CONTROL, MEMORY, NQ, NV, NY
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 # memory: step of the stored accelerations, step of the factors, whether the Jacobian holds, step before;
 # then rates (old, new, old for this step's length), displacement, residual, correction, pivots,
@@ -29,13 +28,13 @@ def memory(nq: int, nv: int, ny: int) -> int:
 @kernel
 def rates(h):
     """Number of unknowns."""
-    return h[NY] - h[NQ]
+    return h[m.NY] - h[m.NQ]
 
 
 @kernel
 def vector(h, k):
     """Where w holds one of the vectors."""
-    return h[MEMORY] + VECTORS + rates(h) * k
+    return h[m.MEMORY] + VECTORS + rates(h) * k
 
 
 @kernel
@@ -47,19 +46,19 @@ def positions(h):
 @kernel
 def before(h):
     """Where w holds the slope before the last step."""
-    return positions(h) + h[NQ]
+    return positions(h) + h[m.NQ]
 
 
 @kernel
 def matrix(h, k):
     """Where w holds a matrix."""
-    return before(h) + h[NY] + rates(h) * rates(h) * k
+    return before(h) + h[m.NY] + rates(h) * rates(h) * k
 
 
 @kernel
 def constants(h, w):
     """alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
-    r = w[index(h[CONTROL] + PARAMETER)]
+    r = w[h[m.CONTROL] + m.PARAMETER]
     alpha_m, alpha_f = (2.0 * r - 1.0) / (r + 1.0), r / (r + 1.0)
     gamma = 0.5 - alpha_m + alpha_f
     return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
@@ -68,31 +67,31 @@ def constants(h, w):
 @kernel
 def diagonal(h, w, i):
     """Weight of unknown i itself in its equation."""
-    return 1.0 - constants(h, w)[0] if i < h[NV] else 1.0
+    return 1.0 - constants(h, w)[0] if i < h[m.NV] else 1.0
 
 
 @kernel
 def reach(h, w, step, i):
     """Change of speed or variable i at the end of the step with its rate there."""
-    return constants(h, w)[3] * step if i < h[NV] else step
+    return constants(h, w)[3] * step if i < h[m.NV] else step
 
 
 @kernel
 def factorise(h, w, step):
     """Newton's matrix for a step, factorised; False when it is singular."""
     _, alpha_f, beta, _ = constants(h, w)
-    m, nv = rates(h), h[NV]
+    size, nv = rates(h), h[m.NV]
     S, by_state, by_position = matrix(h, NEWTON), matrix(h, BY_STATE), matrix(h, BY_POSITION)
-    for i in range(m):
+    for i in range(size):
         weight = 1.0 - alpha_f if i < nv else 0.5
-        for k in range(m):
-            change = reach(h, w, step, k) * w[index(by_state + m * i + k)]
+        for k in range(size):
+            change = reach(h, w, step, k) * w[by_state + size * i + k]
             if k < nv:
-                change += beta * step * step * w[index(by_position + m * i + k)]
-            w[index(S + m * i + k)] = -weight * change
-        w[index(S + (m + 1) * i)] += diagonal(h, w, i)
-    w[index(h[MEMORY] + LU_STEP)] = step
-    return lu.factor(w, S, vector(h, PIVOTS), m)
+                change += beta * step * step * w[by_position + size * i + k]
+            w[S + size * i + k] = -weight * change
+        w[S + (size + 1) * i] += diagonal(h, w, i)
+    w[h[m.MEMORY] + LU_STEP] = step
+    return lu.factor(w, S, vector(h, PIVOTS), size)
 
 
 @kernel

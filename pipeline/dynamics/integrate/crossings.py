@@ -12,10 +12,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.integrate.state import GAP0, GAP1, LENGTH, RATE0, RATE1
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate.trace import watch
-from pipeline.dynamics.tables import CLEARANCE, CONTROL, GAP, MODE, RATE, TOUCH_OFFSET, contact_numbers, touch
-from pipeline.dynamics.vectors import at, dot, kernel, sub
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import at, dot, sub
 
 #: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
 #: of the sites' positions has no digits below, which matters where clearances are of micrometres
@@ -39,26 +39,26 @@ DIP = 0.05
 @kernel
 def side(n, c):
     """+1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
-    return 1.0 if n[n[MODE] + c] == 0 else -1.0
+    return 1.0 if n[n[m.MODE] + c] == 0 else -1.0
 
 
 @kernel
 def clearance(h, f, c):
     """Clearance of contact c."""
-    return f[contact_numbers(h, c) + CLEARANCE]
+    return f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.clearance]
 
 
 @kernel
 def zero_gap(h, f, w, c):
     """Size [m] below which the gap of contact c is zero."""
-    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[CONTROL] + LENGTH]
+    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[m.CONTROL] + m.LENGTH]
 
 
 @kernel
 def turning(h, w, n, c):
     """Whether the ends of a step show a mode change, or one turn that may hold one."""
     o, s = watch(h, c), side(n, c)
-    return s * w[o + GAP1] < 0.0 or (s * w[o + RATE0] > 0.0 and s * w[o + RATE1] <= 0.0)
+    return s * w[o + m.WATCH.gap1] < 0.0 or (s * w[o + m.WATCH.rate0] > 0.0 and s * w[o + m.WATCH.rate1] <= 0.0)
 
 
 @kernel
@@ -92,7 +92,12 @@ def apart(a, b):
 def waving(h, w, n, c, step):
     """Whether the distance to the mode change may fall below zero inside the step, by the cubic through its ends."""
     o, s = watch(h, c), side(n, c)
-    d0, d1, r0, r1 = s * w[o + GAP0], s * w[o + GAP1], -s * w[o + RATE0] * step, -s * w[o + RATE1] * step
+    d0, d1, r0, r1 = (
+        s * w[o + m.WATCH.gap0],
+        s * w[o + m.WATCH.gap1],
+        -s * w[o + m.WATCH.rate0] * step,
+        -s * w[o + m.WATCH.rate1] * step,
+    )
     return lowest(d0, d1, r0, r1) < TRUST * departure(d0, d1, r0, r1)
 
 
@@ -107,7 +112,7 @@ def compose(peek: Callable) -> Callable:
     def look(h, f, w, n, step, theta, c):
         """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
         peek(h, f, w, n, step, theta)
-        return side(n, c) * w[touch(h, c) + GAP], -side(n, c) * w[touch(h, c) + RATE] * step
+        return side(n, c) * w[m.TOUCH.row(h, c) + m.TOUCH.gap], -side(n, c) * w[m.TOUCH.row(h, c) + m.TOUCH.rate] * step
 
     @kernel
     def turning_point(h, f, w, n, step, c, sign, low, high):
@@ -170,7 +175,7 @@ def compose(peek: Callable) -> Callable:
     def search(h, f, w, n, step, c):
         """First mode change in the step, stretch by stretch: 0 at once, NEVER not at all."""
         zero, room = zero_gap(h, f, w, c), clearance(h, f, c)
-        here = touch(h, c) + TOUCH_OFFSET
+        here = m.TOUCH.row(h, c) + m.TOUCH.offset
         d0, r0 = look(h, f, w, n, step, 0.0, c)
         p0 = at(w, here)
         d1, r1 = look(h, f, w, n, step, WIDEST, c)
@@ -206,8 +211,8 @@ def compose(peek: Callable) -> Callable:
         if waving(h, w, n, c, step):
             return search(h, f, w, n, step, c)
         o, s = watch(h, c), side(n, c)
-        start, falling = s * w[o + GAP0], s * w[o + RATE0] > 0.0
-        end, rising = s * w[o + GAP1], s * w[o + RATE1] <= 0.0
+        start, falling = s * w[o + m.WATCH.gap0], s * w[o + m.WATCH.rate0] > 0.0
+        end, rising = s * w[o + m.WATCH.gap1], s * w[o + m.WATCH.rate1] <= 0.0
         return within(h, f, w, n, step, c, 0.0, 1.0, start, falling, end, rising)
 
     return find

@@ -10,12 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import stages
 from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
 from pipeline.dynamics.integrate.stages import slope
-from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
-from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 STAGES, ERROR_ORDER = 6, 4
 A = np.zeros((STAGES, STAGES))
@@ -46,7 +45,7 @@ def weighted(h, w, weights, c):
     """Weighted sum of the slopes of state variable c."""
     total = 0.0
     for j in range(STAGES + 1):
-        total += weights[j] * w[index(h[SLOPES] + h[NY] * j + c)]
+        total += weights[j] * w[h[m.SLOPES] + h[m.NY] * j + c]
     return total
 
 
@@ -54,36 +53,36 @@ def weighted(h, w, weights, c):
 def error(h, f, w, n, step):
     """Norm of the local error, 1 at the tolerance; MAGNITUDE holds each group's scale."""
     total = 0.0
-    for c in range(h[NY]):
-        total += (step * weighted(h, w, E, c) / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
-    return np.sqrt(total / h[NY])
+    for c in range(h[m.NY]):
+        total += (step * weighted(h, w, E, c) / w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]) ** 2
+    return np.sqrt(total / h[m.NY])
 
 
 @kernel
 def extend(h, f, w, n, step):
     """Prepare the dense output of the step to Y_NEW."""
-    size, F = h[NY], h[DENSE]
+    size, F = h[m.NY], h[m.DENSE]
     for c in range(size):
-        delta = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
-        bend = step * w[index(h[SLOPES] + c)] - delta
-        w[index(F + c)] = w[index(h[Y] + c)]
-        w[index(F + size + c)] = delta
-        w[index(F + 2 * size + c)] = bend
-        w[index(F + 3 * size + c)] = delta - step * w[index(slope(h, STAGES) + c)] - bend
-        w[index(F + 4 * size + c)] = step * weighted(h, w, D, c)
+        delta = w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
+        bend = step * w[h[m.SLOPES] + c] - delta
+        w[F + c] = w[h[m.Y] + c]
+        w[F + size + c] = delta
+        w[F + 2 * size + c] = bend
+        w[F + 3 * size + c] = delta - step * w[slope(h, STAGES) + c] - bend
+        w[F + 4 * size + c] = step * weighted(h, w, D, c)
 
 
 @kernel
 def interpolate(h, w, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, F, s = h[NY], h[DENSE], 1.0 - theta
+    size, F, s = h[m.NY], h[m.DENSE], 1.0 - theta
     for c in range(size):
-        v = w[index(F + 3 * size + c)] + s * w[index(F + 4 * size + c)]
-        v = w[index(F + size + c)] + s * (w[index(F + 2 * size + c)] + theta * v)
-        w[index(out + c)] = w[index(F + c)] + theta * v
+        v = w[F + 3 * size + c] + s * w[F + 4 * size + c]
+        v = w[F + size + c] + s * (w[F + 2 * size + c] + theta * v)
+        w[out + c] = w[F + c] + theta * v
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple:
+def compose(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
     _, advance = stages.compose(evaluate, A, B, C)
 
@@ -92,9 +91,9 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
         """A step with the slope at its end, which the error estimate needs."""
         if not advance(h, f, w, n, step):
             return False
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope(h, STAGES))
-        n[EVALUATIONS] += 1
-        return n[EVALUATION] == OK
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], slope(h, STAGES))
+        n[m.EVALUATIONS] += 1
+        return n[m.EVALUATION] == m.OK
 
     return begin_afresh, attempt, error, extend, keep_nothing
 

@@ -11,57 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import crossings
 from pipeline.dynamics.integrate.crossings import NEVER, clearance, turning, waving, zero_gap
-from pipeline.dynamics.integrate.state import (
-    CLOSING,
-    CULPRIT,
-    DURATION,
-    EVALUATIONS,
-    EVENT_ROW,
-    EVENT_TIME,
-    FORCE0,
-    GAP0,
-    IMMEDIATE,
-    LENGTH,
-    LOST_CLOSURE,
-    OPENING,
-    PEAK_DEPTH,
-    PEAK_FORCE,
-    RATE0,
-    RATE1,
-    RTOL,
-    SLIP0,
-    SLIP_RATE0,
-    SPEED,
-    STATUS,
-    STEEPLY,
-    STEPPED_OVER,
-    STUCK_EVENT,
-    TIME,
-    TREND0,
-)
 from pipeline.dynamics.integrate.trace import compose as compose_trace
 from pipeline.dynamics.integrate.trace import note, remember_end, watch
-from pipeline.dynamics.tables import (
-    BRISTLE,
-    CONTROL,
-    GAP,
-    LATCHED,
-    MODE,
-    N_CONTACTS,
-    NORMAL_FORCE,
-    NY,
-    RATE,
-    SLIP,
-    SLOPES,
-    Y_NEW,
-    Y_STAGE,
-    Y,
-    contact,
-    touch,
-)
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
@@ -75,55 +30,59 @@ DEEP, ERRORS = 1e-6, 100.0
 @kernel
 def start_watch(h, w):
     """Note what the contacts do where a segment starts, which has just been evaluated."""
-    for c in range(h[N_CONTACTS]):
-        o, now = watch(h, c), touch(h, c)
-        w[o + GAP0], w[o + RATE0] = w[now + GAP], w[now + RATE]
-        w[o + FORCE0], w[o + SLIP0], w[o + SLIP_RATE0] = w[now + NORMAL_FORCE], w[now + SLIP], 0.0
+    for c in range(h[m.N_CONTACTS]):
+        o, now = watch(h, c), m.TOUCH.row(h, c)
+        w[o + m.WATCH.gap0], w[o + m.WATCH.rate0] = w[now + m.TOUCH.gap], w[now + m.TOUCH.rate]
+        w[o + m.WATCH.force0], w[o + m.WATCH.slip0], w[o + m.WATCH.slip_rate0] = (
+            w[now + m.TOUCH.normal_force],
+            w[now + m.TOUCH.slip],
+            0.0,
+        )
 
 
 @kernel
 def closed(h, n):
     """Whether some contact is closed."""
     found = False
-    for c in range(h[N_CONTACTS]):
-        found |= n[n[MODE] + c] == 1
+    for c in range(h[m.N_CONTACTS]):
+        found |= n[n[m.MODE] + c] == 1
     return found
 
 
 @kernel
 def straighten(h, w, c):
     """The bristles of a contact that begins bear nothing yet."""
-    place = contact(h, c, BRISTLE)
+    place = m.CONTACTS.bristle(h, c)
     if place >= 0:
         for k in range(3):
-            w[h[Y_NEW] + place + k] = 0.0
+            w[h[m.Y_NEW] + place + k] = 0.0
 
 
 @kernel
 def switch(h, w, n, events, c, t):
     """Change the mode of contact c at time t, latch its impact rate, and write the event down."""
     o = watch(h, c)
-    rate = w[o + RATE1]
-    if n[n[MODE] + c] == 0:
-        n[n[MODE] + c] = 1
-        w[h[LATCHED] + c] = max(rate, 0.0)
+    rate = w[o + m.WATCH.rate1]
+    if n[n[m.MODE] + c] == 0:
+        n[n[m.MODE] + c] = 1
+        w[h[m.LATCHED] + c] = max(rate, 0.0)
         straighten(h, w, c)
-        row = note(events, n, c, CLOSING, t)
+        row = note(events, n, c, m.CLOSING, t)
         event = events[row]
-        event[SPEED], event[PEAK_FORCE], event[PEAK_DEPTH] = rate, 0.0, 0.0
-        w[o + EVENT_ROW], w[o + TREND0] = row, STEEPLY
+        event[m.EVENT.speed], event[m.EVENT.peak_force], event[m.EVENT.peak_depth] = rate, 0.0, 0.0
+        w[o + m.WATCH.event_row], w[o + m.WATCH.trend0] = row, m.STEEPLY
     else:
-        n[n[MODE] + c] = 0
-        ended = events[note(events, n, c, OPENING, t)]
-        ended[SPEED] = -rate
-        begun = events[int(w[o + EVENT_ROW])]
-        begun[DURATION] = t - begun[EVENT_TIME]
+        n[n[m.MODE] + c] = 0
+        ended = events[note(events, n, c, m.OPENING, t)]
+        ended[m.EVENT.speed] = -rate
+        begun = events[int(w[o + m.WATCH.event_row])]
+        begun[m.EVENT.duration] = t - begun[m.EVENT.time]
 
 
 @kernel
 def give_up(n, status, c):
     """What settle returns when contact c ends the run."""
-    n[STATUS], n[CULPRIT] = status, c
+    n[m.STATUS], n[m.CULPRIT] = status, c
     return -1
 
 
@@ -137,9 +96,9 @@ def make_settle(
     @kernel
     def peek(h, f, w, n, step, theta):
         """Evaluate the state at a share of the step."""
-        interpolate(h, w, theta, h[Y_STAGE])
-        evaluate(h, f, w, n, w[h[CONTROL] + TIME] + theta * step, h[Y_STAGE], h[SLOPES] + h[NY] * spare)
-        n[EVALUATIONS] += 1
+        interpolate(h, w, theta, h[m.Y_STAGE])
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE], h[m.SLOPES] + h[m.NY] * spare)
+        n[m.EVALUATIONS] += 1
 
     trace = compose_trace(evaluate, peek, extend, method, regimes)
     find = crossings.compose(peek)
@@ -147,13 +106,13 @@ def make_settle(
     @kernel
     def repeat(h, f, w, n, step):
         """Make the step again with another length, loops closed at its end; False when it cannot be done."""
-        n[EVALUATIONS] += 1
+        n[m.EVALUATIONS] += 1
         if not attempt(h, f, w, n, step):
             return False
-        t, slope = w[h[CONTROL] + TIME] + step, h[SLOPES] + h[NY] * last
-        evaluate(h, f, w, n, t, h[Y_NEW], slope)
-        used = project(h, f, w, n, t, h[Y_NEW], slope, 1e-3 * w[h[CONTROL] + RTOL] * w[h[CONTROL] + LENGTH])
-        n[EVALUATIONS] += max(used, 0)
+        t, slope = w[h[m.CONTROL] + m.TIME] + step, h[m.SLOPES] + h[m.NY] * last
+        evaluate(h, f, w, n, t, h[m.Y_NEW], slope)
+        used = project(h, f, w, n, t, h[m.Y_NEW], slope, 1e-3 * w[h[m.CONTROL] + m.RTOL] * w[h[m.CONTROL] + m.LENGTH])
+        n[m.EVALUATIONS] += max(used, 0)
         return used >= 0
 
     @kernel
@@ -162,7 +121,7 @@ def make_settle(
         for _ in range(3):
             if not repeat(h, f, w, n, step):
                 return -1.0, False
-            gap, rate = w[touch(h, c) + GAP], w[touch(h, c) + RATE]
+            gap, rate = w[m.TOUCH.row(h, c) + m.TOUCH.gap], w[m.TOUCH.row(h, c) + m.TOUCH.rate]
             if abs(gap) <= zero_gap(h, f, w, c):
                 return step, True
             if not abs(gap) < 0.1 * abs(rate) * step:
@@ -174,7 +133,7 @@ def make_settle(
     def first_event(h, f, w, n, step):
         """Contact and share of the step of its first mode change, and whether the dense output is ready."""
         ready, first, which = False, NEVER, -1
-        for c in range(h[N_CONTACTS]):
+        for c in range(h[m.N_CONTACTS]):
             if not (turning(h, w, n, c) or waving(h, w, n, c, step)):
                 continue
             if not ready:
@@ -188,40 +147,43 @@ def make_settle(
     @kernel
     def at_once(h, f, w, n, c, events):
         """A mode change where the step starts: no step is made."""
-        n[IMMEDIATE] += 1
-        t = w[h[CONTROL] + TIME]
-        for k in range(h[NY]):
-            w[h[Y_NEW] + k] = w[h[Y] + k]
-        evaluate(h, f, w, n, t, h[Y_NEW], h[SLOPES] + h[NY] * last)
-        n[EVALUATIONS] += 1
-        o, now = h[CONTROL], touch(h, c)
-        if w[now + GAP] < -DEEP * clearance(h, f, c) - ERRORS * w[o + RTOL] * w[o + LENGTH] and n[n[MODE] + c] == 0:
-            return give_up(n, STEPPED_OVER, c)
-        w[watch(h, c) + RATE1] = w[now + RATE]
+        n[m.IMMEDIATE] += 1
+        t = w[h[m.CONTROL] + m.TIME]
+        for k in range(h[m.NY]):
+            w[h[m.Y_NEW] + k] = w[h[m.Y] + k]
+        evaluate(h, f, w, n, t, h[m.Y_NEW], h[m.SLOPES] + h[m.NY] * last)
+        n[m.EVALUATIONS] += 1
+        o, now = h[m.CONTROL], m.TOUCH.row(h, c)
+        if (
+            w[now + m.TOUCH.gap] < -DEEP * clearance(h, f, c) - ERRORS * w[o + m.RTOL] * w[o + m.LENGTH]
+            and n[n[m.MODE] + c] == 0
+        ):
+            return give_up(n, m.STEPPED_OVER, c)
+        w[watch(h, c) + m.WATCH.rate1] = w[now + m.TOUCH.rate]
         switch(h, w, n, events, c, t)
-        return give_up(n, STUCK_EVENT, c) if n[IMMEDIATE] > MOST_IMMEDIATE else 1
+        return give_up(n, m.STUCK_EVENT, c) if n[m.IMMEDIATE] > MOST_IMMEDIATE else 1
 
     @kernel
     def settle(h, f, w, n, step, t_new, events):
-        t = w[h[CONTROL] + TIME]
+        t = w[h[m.CONTROL] + m.TIME]
         for shortened in range(MOST_SHORTENED + 1):
             remember_end(h, w)
             which, first, ready = first_event(h, f, w, n, step)
             if which < 0:
-                n[IMMEDIATE] = 0
+                n[m.IMMEDIATE] = 0
                 return 0, trace(h, f, w, n, step, ready, events), t_new, step
             if first * step <= 1e-15 * max(abs(t), step):
                 return at_once(h, f, w, n, which, events), True, t, step
             length, there = end_at(h, f, w, n, first * step, which)
             if length < 0.0:
-                return give_up(n, LOST_CLOSURE, which), ready, t_new, step
+                return give_up(n, m.LOST_CLOSURE, which), ready, t_new, step
             if there or shortened == MOST_SHORTENED:
                 break
             step *= min(0.5, max(SHORTER, 2.0 * first))
             t_new = t + step
             if not repeat(h, f, w, n, step):
-                return give_up(n, LOST_CLOSURE, which), ready, t_new, step
-        n[IMMEDIATE] = 0
+                return give_up(n, m.LOST_CLOSURE, which), ready, t_new, step
+        n[m.IMMEDIATE] = 0
         remember_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
         trace(h, f, w, n, length, True, events)

@@ -5,7 +5,7 @@ r"""Generalized-alpha: implicit structural integrator of second order that damps
           u_{n+1} = u_n + h[(1-\gamma)a_n + \gamma a_{n+1}]
 
 with u' from the equations of motion, closures included: index reduction, so that no multiplier is an unknown; drift
-is left to the projection of every integrator. Rotations are composed (`displace`), not added. a belongs to the time
+is left to the projection of every integrator. Rotations are composed (`retract`), not added. a belongs to the time
 t_n + (alpha_m - alpha_f) h, so it is started there and rescaled when the step changes. First-order variables (ledger,
 friction's own states) follow the trapezoidal rule, coupled. The error estimate compares the step with the integral of
 the parabola through the last three slopes; its speeds are passed through Newton's matrix, as otherwise damped modes
@@ -23,6 +23,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import alpha_newton, hermite
 from pipeline.dynamics.integrate.alpha_newton import ESTIMATE, ITERATE
 from pipeline.dynamics.integrate.alpha_system import (
@@ -40,24 +41,8 @@ from pipeline.dynamics.integrate.alpha_system import (
     vector,
 )
 from pipeline.dynamics.integrate.method import Method
-from pipeline.dynamics.integrate.state import EVALUATIONS, STEP, TIME
 from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
-from pipeline.dynamics.tables import (
-    CONTROL,
-    EVALUATION,
-    GROUPS,
-    MAGNITUDE,
-    MEMORY,
-    NQ,
-    NV,
-    NY,
-    OK,
-    SLOPES,
-    Y_NEW,
-    Y_STAGE,
-    Y,
-)
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 # rows of SLOPES beside those of `alpha_newton`: where the step ends, and how many there are
 LAST, ROWS = 2, 5
@@ -66,64 +51,64 @@ LAST, ROWS = 2, 5
 @kernel
 def keep(h, f, w, n, step):
     """The end of an accepted step is the start of the next."""
-    o = h[MEMORY]
-    for k in range(h[NV]):
-        w[index(vector(h, OLD) + k)] = w[index(vector(h, NEW) + k)]
-    for c in range(h[NY]):
-        w[index(before(h) + c)] = w[index(h[SLOPES] + c)]
-    w[index(o + A_STEP)] = w[index(o + STEP_BEFORE)] = step
+    o = h[m.MEMORY]
+    for k in range(h[m.NV]):
+        w[vector(h, OLD) + k] = w[vector(h, NEW) + k]
+    for c in range(h[m.NY]):
+        w[before(h) + c] = w[h[m.SLOPES] + c]
+    w[o + A_STEP] = w[o + STEP_BEFORE] = step
 
 
 @kernel
 def error(h, f, w, n, step):
     """Norm of the local error, 1 at the tolerance."""
-    size, first, earlier = h[NY], h[SLOPES], before(h)
-    est, length = first + size * ESTIMATE, w[index(h[MEMORY] + STEP_BEFORE)]
+    size, first, earlier = h[m.NY], h[m.SLOPES], before(h)
+    est, length = first + size * ESTIMATE, w[h[m.MEMORY] + STEP_BEFORE]
     for c in range(size):
-        f0, f1 = w[index(first + c)], w[index(first + size * ITERATE + c)]
-        bend = ((f1 - f0) / step - (f0 - w[index(earlier + c)]) / length) / (step + length)
+        f0, f1 = w[first + c], w[first + size * ITERATE + c]
+        bend = ((f1 - f0) / step - (f0 - w[earlier + c]) / length) / (step + length)
         integral = 0.5 * step * (f0 + f1) - step**3 / 6.0 * bend
-        w[index(est + c)] = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)] - integral
+        w[est + c] = w[h[m.Y_NEW] + c] - w[h[m.Y] + c] - integral
     for k in range(rates(h)):
-        w[index(est + h[NQ] + k)] *= diagonal(h, w, k)
-    solve(h, w, est + h[NQ])
+        w[est + h[m.NQ] + k] *= diagonal(h, w, k)
+    solve(h, w, est + h[m.NQ])
     total = 0.0
     for c in range(size):
-        total += (w[index(est + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
+        total += (w[est + c] / w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]) ** 2
     return np.sqrt(total / size)
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple:
+def compose(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
-    place, converge = alpha_newton.compose(evaluate, displace)
+    place, converge = alpha_newton.compose(evaluate, retract)
 
     @kernel
     def begin(h, f, w, n):
         """Accelerations at their own time, from a look ahead along the tangent."""
         alpha_m, alpha_f, _, _ = constants(h, w)
-        o, size, first, step = h[MEMORY], h[NY], h[SLOPES], w[index(h[CONTROL] + STEP)]
+        o, size, first, step = h[m.MEMORY], h[m.NY], h[m.SLOPES], w[h[m.CONTROL] + m.STEP]
         ahead = first + size * ITERATE
         for c in range(size):
-            w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + step * w[index(first + c)]
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_STAGE], ahead)
-        n[EVALUATIONS] += 1
-        seen = n[EVALUATION] == OK and finite(h, w, ahead)
+            w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step * w[first + c]
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], ahead)
+        n[m.EVALUATIONS] += 1
+        seen = n[m.EVALUATION] == m.OK and finite(h, w, ahead)
         for c in range(size):
-            change = w[index(ahead + c)] - w[index(first + c)] if seen else 0.0
-            w[index(before(h) + c)] = w[index(first + c)] - change
-            if h[NQ] <= c < h[NQ] + h[NV]:
-                w[index(vector(h, OLD) + c - h[NQ])] = w[index(first + c)] + (alpha_m - alpha_f) * change
-        w[index(o + A_STEP)] = w[index(o + STEP_BEFORE)] = step
-        w[index(o + VALID)] = 0.0
-        n[EVALUATION] = OK
+            change = w[ahead + c] - w[first + c] if seen else 0.0
+            w[before(h) + c] = w[first + c] - change
+            if h[m.NQ] <= c < h[m.NQ] + h[m.NV]:
+                w[vector(h, OLD) + c - h[m.NQ]] = w[first + c] + (alpha_m - alpha_f) * change
+        w[o + A_STEP] = w[o + STEP_BEFORE] = step
+        w[o + VALID] = 0.0
+        n[m.EVALUATION] = m.OK
 
     @kernel
     def attempt(h, f, w, n, step):
         """State Y_NEW after a step from Y; False when no iteration converges."""
-        set_magnitudes(h, f, w, h[Y])
+        set_magnitudes(h, f, w, h[m.Y])
         if not converge(h, f, w, n, step):
             return False
-        place(h, w, step, h[Y_NEW])
+        place(h, w, step, h[m.Y_NEW])
         return True
 
     return begin, attempt, error, hermite.make_extend(LAST), keep
@@ -141,7 +126,7 @@ METHOD = Method(
     2,
     compose,
     hermite.interpolate,
-    displaces=True,
+    retracts=True,
     steady=1.2,
     memory=memory,
     parameter=parameter,

@@ -6,36 +6,36 @@ Matrices are stored row by row, complex ones as a real and an imaginary matrix. 
 
 from __future__ import annotations
 
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def exchange(w, a, b, n):
     """Exchange two stretches of w."""
     for k in range(n):
-        w[index(a + k)], w[index(b + k)] = w[index(b + k)], w[index(a + k)]
+        w[a + k], w[b + k] = w[b + k], w[a + k]
 
 
 @kernel
 def factor(w, a, pivots, n):
     """Overwrite the matrix from place a by its factors; False when it is singular or no number."""
     for k in range(n):
-        best, row = abs(w[index(a + n * k + k)]), k
+        best, row = abs(w[a + n * k + k]), k
         for i in range(k + 1, n):
-            if abs(w[index(a + n * i + k)]) > best:
-                best, row = abs(w[index(a + n * i + k)]), i
-        w[index(pivots + k)] = row
+            if abs(w[a + n * i + k]) > best:
+                best, row = abs(w[a + n * i + k]), i
+        w[pivots + k] = row
         if not 0.0 < best < 1e300:
             return False
         if row != k:
             exchange(w, a + n * k, a + n * row, n)
-        inverse = 1.0 / w[index(a + n * k + k)]
+        inverse = 1.0 / w[a + n * k + k]
         for i in range(k + 1, n):
-            left = w[index(a + n * i + k)] * inverse
-            w[index(a + n * i + k)] = left
+            left = w[a + n * i + k] * inverse
+            w[a + n * i + k] = left
             if left != 0.0:
                 for j in range(k + 1, n):
-                    w[index(a + n * i + j)] -= left * w[index(a + n * k + j)]
+                    w[a + n * i + j] -= left * w[a + n * k + j]
     return True
 
 
@@ -43,18 +43,18 @@ def factor(w, a, pivots, n):
 def solve(w, a, pivots, n, b):
     """Solve in place for the right-hand side from place b."""
     for k in range(n):
-        row = int(w[index(pivots + k)])
-        w[index(b + k)], w[index(b + row)] = w[index(b + row)], w[index(b + k)]
+        row = int(w[pivots + k])
+        w[b + k], w[b + row] = w[b + row], w[b + k]
     for i in range(n):
-        total = w[index(b + i)]
+        total = w[b + i]
         for j in range(i):
-            total -= w[index(a + n * i + j)] * w[index(b + j)]
-        w[index(b + i)] = total
+            total -= w[a + n * i + j] * w[b + j]
+        w[b + i] = total
     for i in range(n - 1, -1, -1):
-        total = w[index(b + i)]
+        total = w[b + i]
         for j in range(i + 1, n):
-            total -= w[index(a + n * i + j)] * w[index(b + j)]
-        w[index(b + i)] = total / w[index(a + n * i + i)]
+            total -= w[a + n * i + j] * w[b + j]
+        w[b + i] = total / w[a + n * i + i]
 
 
 @kernel
@@ -64,25 +64,25 @@ def factor_complex(w, a, pivots, n):
     for k in range(n):
         best, row = -1.0, k
         for i in range(k, n):
-            x, y = w[index(a + n * i + k)], w[index(c + n * i + k)]
+            x, y = w[a + n * i + k], w[c + n * i + k]
             if x * x + y * y > best:
                 best, row = x * x + y * y, i
-        w[index(pivots + k)] = row
+        w[pivots + k] = row
         if not 0.0 < best < 1e300:
             return False
         if row != k:
             exchange(w, a + n * k, a + n * row, n)
             exchange(w, c + n * k, c + n * row, n)
-        re, im = w[index(a + n * k + k)] / best, -w[index(c + n * k + k)] / best
+        re, im = w[a + n * k + k] / best, -w[c + n * k + k] / best
         for i in range(k + 1, n):
-            x, y = w[index(a + n * i + k)], w[index(c + n * i + k)]
+            x, y = w[a + n * i + k], w[c + n * i + k]
             p, q = x * re - y * im, x * im + y * re
-            w[index(a + n * i + k)], w[index(c + n * i + k)] = p, q
+            w[a + n * i + k], w[c + n * i + k] = p, q
             if p != 0.0 or q != 0.0:
                 for j in range(k + 1, n):
-                    x, y = w[index(a + n * k + j)], w[index(c + n * k + j)]
-                    w[index(a + n * i + j)] -= p * x - q * y
-                    w[index(c + n * i + j)] -= p * y + q * x
+                    x, y = w[a + n * k + j], w[c + n * k + j]
+                    w[a + n * i + j] -= p * x - q * y
+                    w[c + n * i + j] -= p * y + q * x
     return True
 
 
@@ -91,22 +91,22 @@ def solve_complex(w, a, pivots, n, b, d):
     """Solve in place for a right-hand side with its real part from place b, its imaginary part from d."""
     c = a + n * n
     for k in range(n):
-        row = int(w[index(pivots + k)])
-        w[index(b + k)], w[index(b + row)] = w[index(b + row)], w[index(b + k)]
-        w[index(d + k)], w[index(d + row)] = w[index(d + row)], w[index(d + k)]
+        row = int(w[pivots + k])
+        w[b + k], w[b + row] = w[b + row], w[b + k]
+        w[d + k], w[d + row] = w[d + row], w[d + k]
     for i in range(n):
-        p, q = w[index(b + i)], w[index(d + i)]
+        p, q = w[b + i], w[d + i]
         for j in range(i):
-            x, y = w[index(a + n * i + j)], w[index(c + n * i + j)]
-            p -= x * w[index(b + j)] - y * w[index(d + j)]
-            q -= x * w[index(d + j)] + y * w[index(b + j)]
-        w[index(b + i)], w[index(d + i)] = p, q
+            x, y = w[a + n * i + j], w[c + n * i + j]
+            p -= x * w[b + j] - y * w[d + j]
+            q -= x * w[d + j] + y * w[b + j]
+        w[b + i], w[d + i] = p, q
     for i in range(n - 1, -1, -1):
-        p, q = w[index(b + i)], w[index(d + i)]
+        p, q = w[b + i], w[d + i]
         for j in range(i + 1, n):
-            x, y = w[index(a + n * i + j)], w[index(c + n * i + j)]
-            p -= x * w[index(b + j)] - y * w[index(d + j)]
-            q -= x * w[index(d + j)] + y * w[index(b + j)]
-        x, y = w[index(a + n * i + i)], w[index(c + n * i + i)]
+            x, y = w[a + n * i + j], w[c + n * i + j]
+            p -= x * w[b + j] - y * w[d + j]
+            q -= x * w[d + j] + y * w[b + j]
+        x, y = w[a + n * i + i], w[c + n * i + i]
         size = x * x + y * y
-        w[index(b + i)], w[index(d + i)] = (p * x + q * y) / size, (q * x - p * y) / size
+        w[b + i], w[d + i] = (p * x + q * y) / size, (q * x - p * y) / size

@@ -6,7 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.memory import Room
 
 
 @kernel
@@ -36,14 +37,14 @@ class Method:
     slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
     error_order: the error estimate falls with this power of the step plus one; for methods without one, their order.
-    compose: (evaluate, displace) -> kernels that count their evaluations themselves:
+    compose: (evaluate, retract) -> kernels that count their evaluations themselves:
         begin(h, f, w, n) after every restart, with the slope and the length of the first step known;
         attempt(h, f, w, n, step) fills Y_NEW, False when it could not;
         error(h, f, w, n, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
         extend(h, f, w, n, step) prepares the dense output once the slope at the end is known;
         keep(h, f, w, n, step) remembers an accepted step.
     interpolate: (h, w, share of the step, out) the dense output.
-    displaces: whether `compose` uses displace.
+    retracts: whether `compose` uses retract.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
     gap: middle of the widest gap between the stages, as share of the step.
@@ -59,13 +60,17 @@ class Method:
     error_order: int
     compose: Callable
     interpolate: Callable
-    displaces: bool = False
+    retracts: bool = False
     ends: bool = False
     steady: float = 1.0
     gap: float = 0.5
     memory: Callable[[int, int, int], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
     stability: float | None = None
+
+    def room(self, nq: int, nv: int, ny: int) -> Room:
+        """What it needs of the work space, from the numbers of positions, speeds and state variables."""
+        return Room(self.slopes, self.dense, self.memory(nq, nv, ny))
 
 
 @dataclass(frozen=True)

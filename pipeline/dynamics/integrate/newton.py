@@ -5,7 +5,7 @@ Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (
 
 from __future__ import annotations
 
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 #: what is left may be this share of the tolerance, or ten roundings if that is more
 SHARE, ROUNDING = 1e-2, 2.2e-15

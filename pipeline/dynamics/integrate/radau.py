@@ -13,6 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import hermite
 from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.integrate.newton import converged
@@ -34,25 +35,8 @@ from pipeline.dynamics.integrate.radau_systems import (
     solve_real,
     stage_vector,
 )
-from pipeline.dynamics.integrate.state import EVALUATIONS, JACOBIANS, RTOL, TIME
 from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
-from pipeline.dynamics.tables import (
-    CONTROL,
-    DENSE,
-    EVALUATION,
-    FLOORS,
-    GROUPS,
-    MAGNITUDE,
-    MEMORY,
-    NQ,
-    NY,
-    OK,
-    SLOPES,
-    Y_NEW,
-    Y_STAGE,
-    Y,
-)
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 # rows of SLOPES: start of the step, three stages, its end, error estimate, events
 LAST, ESTIMATE, ROWS, ERROR_ORDER = 4, 5, 7, 3
@@ -92,46 +76,46 @@ NUDGE = 1e-8
 def polynomial(h, w, c, k):
     """Coefficient of theta^(k + 1) for state variable c."""
     return (
-        P[0, k] * w[index(stage_vector(h, Z, 0) + c)]
-        + P[1, k] * w[index(stage_vector(h, Z, 1) + c)]
-        + P[2, k] * w[index(stage_vector(h, Z, 2) + c)]
+        P[0, k] * w[stage_vector(h, Z, 0) + c]
+        + P[1, k] * w[stage_vector(h, Z, 1) + c]
+        + P[2, k] * w[stage_vector(h, Z, 2) + c]
     )
 
 
 @kernel
 def begin(h, f, w, n):
     """Nothing is known."""
-    w[index(h[MEMORY] + VALID)] = w[index(h[MEMORY] + OLD_STEP)] = 0.0
+    w[h[m.MEMORY] + VALID] = w[h[m.MEMORY] + OLD_STEP] = 0.0
 
 
 @kernel
 def keep(h, f, w, n, step):
     """The polynomial of an accepted step predicts the next one's stages."""
-    for c in range(h[NY]):
-        w[index(old(h) + c)] = w[index(h[Y] + c)]
+    for c in range(h[m.NY]):
+        w[old(h) + c] = w[h[m.Y] + c]
         for k in range(3):
-            w[index(old(h) + h[NY] * (k + 1) + c)] = polynomial(h, w, c, k)
-    w[index(h[MEMORY] + OLD_STEP)] = step
+            w[old(h) + h[m.NY] * (k + 1) + c] = polynomial(h, w, c, k)
+    w[h[m.MEMORY] + OLD_STEP] = step
 
 
 @kernel
 def extend(h, f, w, n, step):
     """Prepare the dense output: the collocation polynomial, a cubic."""
-    for c in range(h[NY]):
-        w[index(h[DENSE] + c)] = w[index(h[Y] + c)]
+    for c in range(h[m.NY]):
+        w[h[m.DENSE] + c] = w[h[m.Y] + c]
         for k in range(3):
-            w[index(h[DENSE] + h[NY] * (k + 1) + c)] = polynomial(h, w, c, k)
+            w[h[m.DENSE] + h[m.NY] * (k + 1) + c] = polynomial(h, w, c, k)
 
 
 @kernel
 def mix(h, w, matrix, source, target):
     """Three vectors as combinations of three others."""
-    for c in range(h[NY]):
-        a = w[index(stage_vector(h, source, 0) + c)]
-        b = w[index(stage_vector(h, source, 1) + c)]
-        d = w[index(stage_vector(h, source, 2) + c)]
+    for c in range(h[m.NY]):
+        a = w[stage_vector(h, source, 0) + c]
+        b = w[stage_vector(h, source, 1) + c]
+        d = w[stage_vector(h, source, 2) + c]
         for i in range(3):
-            w[index(stage_vector(h, target, i) + c)] = matrix[i, 0] * a + matrix[i, 1] * b + matrix[i, 2] * d
+            w[stage_vector(h, target, i) + c] = matrix[i, 0] * a + matrix[i, 1] * b + matrix[i, 2] * d
 
 
 @kernel
@@ -141,26 +125,26 @@ def predict(h, w, step):
     Not speeds, whose rates at the start may be far from those of a stiff step. Places must: at rest where a contact
     begins the first iterate would not touch, and the force, seen by the second one only, would look like divergence.
     """
-    length, o, size = w[index(h[MEMORY] + OLD_STEP)], old(h), h[NY]
+    length, o, size = w[h[m.MEMORY] + OLD_STEP], old(h), h[m.NY]
     for i in range(3):
         x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
         for c in range(size):
-            rise = (w[index(o + 3 * size + c)] * x + w[index(o + 2 * size + c)]) * x + w[index(o + size + c)]
-            ahead = w[index(o + c)] + rise * x - w[index(h[Y] + c)]
-            along = C[i] * step * w[index(h[SLOPES] + c)] if c < h[NQ] else 0.0
-            w[index(stage_vector(h, Z, i) + c)] = ahead if length > 0.0 else along
+            rise = (w[o + 3 * size + c] * x + w[o + 2 * size + c]) * x + w[o + size + c]
+            ahead = w[o + c] + rise * x - w[h[m.Y] + c]
+            along = C[i] * step * w[h[m.SLOPES] + c] if c < h[m.NQ] else 0.0
+            w[stage_vector(h, Z, i) + c] = ahead if length > 0.0 else along
     mix(h, w, T_INVERSE, Z, TRANSFORMED)
 
 
 @kernel
 def residuals(h, w, step):
     """Right-hand sides of Newton's two systems."""
-    size, first = h[NY], h[SLOPES] + h[NY]
+    size, first = h[m.NY], h[m.SLOPES] + h[m.NY]
     for c in range(size):
-        a, b, d = w[index(first + c)], w[index(first + size + c)], w[index(first + 2 * size + c)]
-        one = w[index(stage_vector(h, TRANSFORMED, 0) + c)] / step
-        two = w[index(stage_vector(h, TRANSFORMED, 1) + c)] / step
-        three = w[index(stage_vector(h, TRANSFORMED, 2) + c)] / step
+        a, b, d = w[first + c], w[first + size + c], w[first + 2 * size + c]
+        one = w[stage_vector(h, TRANSFORMED, 0) + c] / step
+        two = w[stage_vector(h, TRANSFORMED, 1) + c] / step
+        three = w[stage_vector(h, TRANSFORMED, 2) + c] / step
         for i in range(3):
             total = T_INVERSE[i, 0] * a + T_INVERSE[i, 1] * b + T_INVERSE[i, 2] * d
             if i == 0:
@@ -169,67 +153,67 @@ def residuals(h, w, step):
                 total -= MU_REST * two - MU_IMAG * three
             else:
                 total -= MU_REST * three + MU_IMAG * two
-            w[index(stage_vector(h, CORRECTION, i) + c)] = total
+            w[stage_vector(h, CORRECTION, i) + c] = total
 
 
 @kernel
 def correct(h, w):
     """Add the corrections; their norm in units of the tolerance."""
     total = 0.0
-    for c in range(h[NY]):
-        scale = w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]
+    for c in range(h[m.NY]):
+        scale = w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]
         for i in range(3):
-            change = w[index(stage_vector(h, CORRECTION, i) + c)]
-            w[index(stage_vector(h, TRANSFORMED, i) + c)] += change
+            change = w[stage_vector(h, CORRECTION, i) + c]
+            w[stage_vector(h, TRANSFORMED, i) + c] += change
             total += (change / scale) ** 2
     mix(h, w, T, TRANSFORMED, Z)
-    return np.sqrt(total / (3.0 * h[NY]))
+    return np.sqrt(total / (3.0 * h[m.NY]))
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple:
+def compose(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
 
     @kernel
     def jacobian(h, f, w, n):
         """Change of all rates with all variables, at the start of the step."""
-        size, near = h[NY], h[SLOPES] + h[NY]
+        size, near = h[m.NY], h[m.SLOPES] + h[m.NY]
         for c in range(size):
-            w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)]
+            w[h[m.Y_STAGE] + c] = w[h[m.Y] + c]
         for k in range(size):
-            y = w[index(h[Y] + k)]
-            w[index(h[Y_STAGE] + k)] = y + NUDGE * (f[index(h[FLOORS] + h[index(h[GROUPS] + k)])] + abs(y))
-            nudge = w[index(h[Y_STAGE] + k)] - y
-            evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)], h[Y_STAGE], near)
-            n[EVALUATIONS] += 1
-            if n[EVALUATION] != OK:
+            y = w[h[m.Y] + k]
+            w[h[m.Y_STAGE] + k] = y + NUDGE * (f[m.FLOORS.row(h, m.GROUPS.group(h, k))] + abs(y))
+            nudge = w[h[m.Y_STAGE] + k] - y
+            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
+            n[m.EVALUATIONS] += 1
+            if n[m.EVALUATION] != m.OK:
                 return False
             for i in range(size):
-                difference = w[index(near + i)] - w[index(h[SLOPES] + i)]
-                w[index(jacobian_entry(h, i, k))] = difference / nudge
-            w[index(h[Y_STAGE] + k)] = y
-        n[JACOBIANS] += 1
-        w[index(h[MEMORY] + VALID)], w[index(h[MEMORY] + LU_STEP)] = 1.0, 0.0
+                difference = w[near + i] - w[h[m.SLOPES] + i]
+                w[jacobian_entry(h, i, k)] = difference / nudge
+            w[h[m.Y_STAGE] + k] = y
+        n[m.JACOBIANS] += 1
+        w[h[m.MEMORY] + VALID], w[h[m.MEMORY] + LU_STEP] = 1.0, 0.0
         return True
 
     @kernel
     def iterate(h, f, w, n, step):
         """Newton's iterations: speed at which the corrections fell, or -1 when they did not."""
-        size, last_norm, rate = h[NY], 0.0, 0.0
+        size, last_norm, rate = h[m.NY], 0.0, 0.0
         for k in range(MOST_ITERATIONS):
             for i in range(3):
                 for c in range(size):
-                    w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + w[index(stage_vector(h, Z, i) + c)]
-                t = w[index(h[CONTROL] + TIME)] + C[i] * step
-                evaluate(h, f, w, n, t, h[Y_STAGE], h[SLOPES] + size * (i + 1))
-                n[EVALUATIONS] += 1
-                if n[EVALUATION] != OK:
+                    w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + w[stage_vector(h, Z, i) + c]
+                t = w[h[m.CONTROL] + m.TIME] + C[i] * step
+                evaluate(h, f, w, n, t, h[m.Y_STAGE], h[m.SLOPES] + size * (i + 1))
+                n[m.EVALUATIONS] += 1
+                if n[m.EVALUATION] != m.OK:
                     return -1.0
             residuals(h, w, step)
             solve_real(h, w, stage_vector(h, CORRECTION, 0))
             solve_pair(h, w, stage_vector(h, CORRECTION, 1), stage_vector(h, CORRECTION, 2))
             norm = correct(h, w)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = converged(k, norm, last_norm, w[index(h[CONTROL] + RTOL)])
+            verdict = converged(k, norm, last_norm, w[h[m.CONTROL] + m.RTOL])
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm
@@ -238,22 +222,22 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
     @kernel
     def attempt(h, f, w, n, step):
         """State Y_NEW after a step from Y; False when Newton's iteration fails with a fresh Jacobian too."""
-        o = h[MEMORY]
-        set_magnitudes(h, f, w, h[Y])
+        o = h[m.MEMORY]
+        set_magnitudes(h, f, w, h[m.Y])
         for _ in range(2):
-            fresh = w[index(o + VALID)] == 0.0
+            fresh = w[o + VALID] == 0.0
             if fresh and not jacobian(h, f, w, n):
                 return False
-            if w[index(o + LU_STEP)] != step and not factorise(h, w, step):
+            if w[o + LU_STEP] != step and not factorise(h, w, step):
                 return False
             predict(h, w, step)
             rate = iterate(h, f, w, n, step)
             if rate >= 0.0:
-                w[index(o + VALID)] = 1.0 if rate <= SLOW else 0.0
-                for c in range(h[NY]):
-                    w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + w[index(stage_vector(h, Z, 2) + c)]
+                w[o + VALID] = 1.0 if rate <= SLOW else 0.0
+                for c in range(h[m.NY]):
+                    w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + w[stage_vector(h, Z, 2) + c]
                 return True
-            w[index(o + VALID)] = 0.0
+            w[o + VALID] = 0.0
             if fresh:
                 return False
         return False
@@ -261,29 +245,29 @@ def compose(evaluate: Callable, displace: Callable) -> tuple:
     @kernel
     def estimate(h, w, step, slope):
         """The filtered error from a slope at (or near) the start of the step; its norm."""
-        out, total = h[SLOPES] + h[NY] * ESTIMATE, 0.0
-        for c in range(h[NY]):
+        out, total = h[m.SLOPES] + h[m.NY] * ESTIMATE, 0.0
+        for c in range(h[m.NY]):
             bent = 0.0
             for i in range(3):
-                bent += E[i] * w[index(stage_vector(h, Z, i) + c)]
-            w[index(out + c)] = w[index(slope + c)] + bent / step
+                bent += E[i] * w[stage_vector(h, Z, i) + c]
+            w[out + c] = w[slope + c] + bent / step
         solve_real(h, w, out)
-        for c in range(h[NY]):
-            total += (w[index(out + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
-        return np.sqrt(total / h[NY])
+        for c in range(h[m.NY]):
+            total += (w[out + c] / w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]) ** 2
+        return np.sqrt(total / h[m.NY])
 
     @kernel
     def error(h, f, w, n, step):
         """Norm of the local error, 1 at the tolerance; what is too large is filtered twice."""
-        norm, out, near = estimate(h, w, step, h[SLOPES]), h[SLOPES] + h[NY] * ESTIMATE, h[SLOPES] + h[NY]
+        norm, out, near = estimate(h, w, step, h[m.SLOPES]), h[m.SLOPES] + h[m.NY] * ESTIMATE, h[m.SLOPES] + h[m.NY]
         if norm > 1.0:
-            for c in range(h[NY]):
-                w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + w[index(out + c)]
-            evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)], h[Y_STAGE], near)
-            n[EVALUATIONS] += 1
-            if n[EVALUATION] == OK and finite(h, w, near):
+            for c in range(h[m.NY]):
+                w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + w[out + c]
+            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
+            n[m.EVALUATIONS] += 1
+            if n[m.EVALUATION] == m.OK and finite(h, w, near):
                 norm = estimate(h, w, step, near)
-            n[EVALUATION] = OK
+            n[m.EVALUATION] = m.OK
         return norm
 
     return begin, attempt, error, extend, keep

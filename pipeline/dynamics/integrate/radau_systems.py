@@ -5,9 +5,9 @@ The systems are mu / h - J for the three eigenvalues mu of the inverse Butcher m
 
 from __future__ import annotations
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate import lu
-from pipeline.dynamics.tables import MEMORY, NY
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics.kernels import kernel
 
 #: eigenvalues of the inverse of the Butcher matrix: a real one and MU_REST +- i MU_IMAG
 MU_REAL = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
@@ -28,7 +28,7 @@ def memory(nq: int, nv: int, ny: int) -> int:
 @kernel
 def stage_vector(h, kind, i):
     """Where w holds vector i of a kind."""
-    return h[MEMORY] + VECTORS + h[NY] * (3 * kind + i)
+    return h[m.MEMORY] + VECTORS + h[m.NY] * (3 * kind + i)
 
 
 @kernel
@@ -40,40 +40,40 @@ def old(h):
 @kernel
 def jacobian_entry(h, i, k):
     """Place of an entry of the Jacobian."""
-    return h[MEMORY] + VECTORS + h[NY] * N_VECTORS + h[NY] * i + k
+    return h[m.MEMORY] + VECTORS + h[m.NY] * N_VECTORS + h[m.NY] * i + k
 
 
 @kernel
 def factors(h, k):
     """Place of the real system's factors (0), the complex one's (1), or what follows them (3)."""
-    m = h[NY]
-    return jacobian_entry(h, h[NY], 0) + k * m * m
+    size = h[m.NY]
+    return jacobian_entry(h, h[m.NY], 0) + k * size * size
 
 
 @kernel
 def factorise(h, w, step):
     """Both systems for a step; False when one is singular."""
-    m, real, rest = h[NY], factors(h, 0), factors(h, 1)
+    size, real, rest = h[m.NY], factors(h, 0), factors(h, 1)
     pivots = factors(h, 3)
-    for i in range(m):
-        for k in range(m):
-            entry, o = w[index(jacobian_entry(h, i, k))], m * i + k
-            w[index(real + o)] = w[index(rest + o)] = -entry
-            w[index(rest + m * m + o)] = 0.0
-        w[index(real + (m + 1) * i)] += MU_REAL / step
-        w[index(rest + (m + 1) * i)] += MU_REST / step
-        w[index(rest + m * m + (m + 1) * i)] = MU_IMAG / step
-    w[index(h[MEMORY] + LU_STEP)] = step
-    return lu.factor(w, real, pivots, m) and lu.factor_complex(w, rest, pivots + m, m)
+    for i in range(size):
+        for k in range(size):
+            entry, o = w[jacobian_entry(h, i, k)], size * i + k
+            w[real + o] = w[rest + o] = -entry
+            w[rest + size * size + o] = 0.0
+        w[real + (size + 1) * i] += MU_REAL / step
+        w[rest + (size + 1) * i] += MU_REST / step
+        w[rest + size * size + (size + 1) * i] = MU_IMAG / step
+    w[h[m.MEMORY] + LU_STEP] = step
+    return lu.factor(w, real, pivots, size) and lu.factor_complex(w, rest, pivots + size, size)
 
 
 @kernel
 def solve_real(h, w, b):
     """Solve the real system in place for the right-hand side from place b."""
-    lu.solve(w, factors(h, 0), factors(h, 3), h[NY], b)
+    lu.solve(w, factors(h, 0), factors(h, 3), h[m.NY], b)
 
 
 @kernel
 def solve_pair(h, w, b, d):
     """Solve the complex system in place: real part of the right-hand side from place b, imaginary part from d."""
-    lu.solve_complex(w, factors(h, 1), factors(h, 3) + h[NY], h[NY], b, d)
+    lu.solve_complex(w, factors(h, 1), factors(h, 3) + h[m.NY], h[m.NY], b, d)

@@ -18,7 +18,7 @@ B = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
 C = np.array([0.0, 0.5, 0.5, 1.0])
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple:
+def compose(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
     _, attempt = stages.compose(evaluate, A, B, C)
     return begin_afresh, attempt, None, hermite.make_extend(STAGES), keep_nothing

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics.integrate.state import LATCHED0, MODE0, N_RECORDED, WATCH_SIZE
-from pipeline.dynamics.tables import LATCHED, MODE, N_CONTACTS, NY, WATCH
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def hold_modes(h, w, n):
     """Keep the modes and impact rates that hold within the step, which its end may change."""
-    for c in range(h[N_CONTACTS]):
-        o = h[WATCH] + WATCH_SIZE * c
-        w[index(o + MODE0)], w[index(o + LATCHED0)] = n[index(n[MODE] + c)], w[index(h[LATCHED] + c)]
+    for c in range(h[m.N_CONTACTS]):
+        o = m.WATCH.row(h, c)
+        w[o + m.WATCH.mode0], w[o + m.WATCH.latched0] = n[n[m.MODE] + c], w[h[m.LATCHED] + c]
 
 
 @kernel
 def snapshot(h, w, n, rows, t, y):
     """Append a row to the record: time, modes and impact rates of the contacts as held, state."""
-    row, contacts = rows[n[N_RECORDED]], h[N_CONTACTS]
+    row, contacts = rows[n[m.N_RECORDED]], h[m.N_CONTACTS]
     row[0] = t
     for c in range(contacts):
-        o = h[WATCH] + WATCH_SIZE * c
-        row[1 + c] = w[index(o + MODE0)]
-        row[1 + contacts + c] = w[index(o + LATCHED0)]
-    for k in range(h[NY]):
-        row[1 + 2 * contacts + k] = w[index(y + k)]
-    n[N_RECORDED] += 1
+        o = m.WATCH.row(h, c)
+        row[1 + c] = w[o + m.WATCH.mode0]
+        row[1 + contacts + c] = w[o + m.WATCH.latched0]
+    for k in range(h[m.NY]):
+        row[1 + 2 * contacts + k] = w[y + k]
+    n[m.N_RECORDED] += 1

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics.assembly.places import N_KEPT_ROWS, ROW_SCALE
-from pipeline.dynamics.tables import N_CLOSURE_ROWS
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def keep_scales(h, w):
     """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
-    for r in range(h[N_KEPT_ROWS]):
-        o = h[ROW_SCALE] + r
-        w[index(o)] = max(w[index(o)], w[index(o + h[N_CLOSURE_ROWS])])
+    for r in range(h[m.N_KEPT_ROWS]):
+        o = h[m.ROW_SCALE] + r
+        w[o] = max(w[o], w[o + h[m.N_CLOSURE_ROWS]])

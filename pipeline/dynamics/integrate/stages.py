@@ -6,15 +6,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
-from pipeline.dynamics.tables import CONTROL, EVALUATION, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def slope(h, i):
     """Where w holds the slope of stage i."""
-    return h[SLOPES] + h[NY] * i
+    return h[m.SLOPES] + h[m.NY] * i
 
 
 def compose(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[Callable, Callable]:
@@ -24,35 +23,35 @@ def compose(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> 
     @kernel
     def stage(h, f, w, n, step, i):
         """Slope of stage i from those of all earlier ones."""
-        size, y, stage_y = h[NY], h[Y], h[Y_STAGE]
+        size, y, stage_y = h[m.NY], h[m.Y], h[m.Y_STAGE]
         for c in range(size):
-            w[index(stage_y + c)] = w[index(y + c)]
+            w[stage_y + c] = w[y + c]
         for j in range(i):
             weight = step * A[i, j]
             if weight != 0.0:
                 k = slope(h, j)
                 for c in range(size):
-                    w[index(stage_y + c)] += weight * w[index(k + c)]
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + C[i] * step, stage_y, slope(h, i))
-        n[EVALUATIONS] += 1
+                    w[stage_y + c] += weight * w[k + c]
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + C[i] * step, stage_y, slope(h, i))
+        n[m.EVALUATIONS] += 1
 
     @kernel
     def attempt(h, f, w, n, step):
         """State Y_NEW after a step from Y; False when a stage has no slope."""
-        size = h[NY]
+        size = h[m.NY]
         for i in range(1, count):
             stage(h, f, w, n, step, i)
-            if n[EVALUATION] != OK:
+            if n[m.EVALUATION] != m.OK:
                 return False
         for c in range(size):
-            w[index(h[Y_NEW] + c)] = 0.0
+            w[h[m.Y_NEW] + c] = 0.0
         for j in range(count):
             if B[j] != 0.0:
                 k = slope(h, j)
                 for c in range(size):
-                    w[index(h[Y_NEW] + c)] += B[j] * w[index(k + c)]
+                    w[h[m.Y_NEW] + c] += B[j] * w[k + c]
         for c in range(size):
-            w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + step * w[index(h[Y_NEW] + c)]
+            w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + step * w[h[m.Y_NEW] + c]
         return True
 
     return stage, attempt

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics.integrate.state import FIXED, STEEPEST, STIFF_STEPS
-from pipeline.dynamics.tables import CONTROL, GROUPS, MAGNITUDE, NQ, NV, NY, SLOPES, Y_NEW, Y_STAGE
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 #: changes of state below this share of the tolerance are rounding, from which no rate can be told
 FELT = 1e-2
@@ -22,8 +21,8 @@ def difference(h, w, first, count, a, b):
     """Norm of the difference of two states or slopes at places a and b of w, variables `first` on, by tolerance."""
     total = 0.0
     for k in range(first, first + count):
-        change = w[index(a + k)] - w[index(b + k)]
-        total += (change / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + k)])]) ** 2
+        change = w[a + k] - w[b + k]
+        total += (change / w[h[m.MAGNITUDE] + m.GROUPS.group(h, k)]) ** 2
     return np.sqrt(total)
 
 
@@ -36,15 +35,15 @@ def steepness(h, w, last):
     speeds alone it explodes where an oscillation's speeds happen to agree, so that it is at most the
     geometric mean with that of the positions, which an oscillation makes its frequency.
     """
-    end, stage = h[SLOPES] + h[NY] * last, h[SLOPES] + h[NY] * (last - 1)
-    speeds = difference(h, w, h[NQ], h[NV], h[Y_NEW], h[Y_STAGE])
-    if not speeds > FELT * np.sqrt(h[NV]):
+    end, stage = h[m.SLOPES] + h[m.NY] * last, h[m.SLOPES] + h[m.NY] * (last - 1)
+    speeds = difference(h, w, h[m.NQ], h[m.NV], h[m.Y_NEW], h[m.Y_STAGE])
+    if not speeds > FELT * np.sqrt(h[m.NV]):
         return 0.0
-    rate = difference(h, w, h[NQ], h[NV], end, stage) / speeds
-    positions = difference(h, w, 0, h[NQ], h[Y_NEW], h[Y_STAGE])
-    if not positions > FELT * np.sqrt(h[NQ]):
+    rate = difference(h, w, h[m.NQ], h[m.NV], end, stage) / speeds
+    positions = difference(h, w, 0, h[m.NQ], h[m.Y_NEW], h[m.Y_STAGE])
+    if not positions > FELT * np.sqrt(h[m.NQ]):
         return rate
-    return min(rate, np.sqrt(rate * difference(h, w, 0, h[NQ], end, stage) / positions))
+    return min(rate, np.sqrt(rate * difference(h, w, 0, h[m.NQ], end, stage) / positions))
 
 
 @kernel
@@ -60,10 +59,10 @@ def detect(method: Any) -> Callable:
 
     @kernel
     def feel(h, w, n, step):
-        rate, c = steepness(h, w, last), h[CONTROL]
-        w[index(c + STEEPEST)] = max(w[index(c + STEEPEST)], rate)
-        share = 1.0 if w[index(c + FIXED)] > 0.0 else SWINGING
+        rate, c = steepness(h, w, last), h[m.CONTROL]
+        w[c + m.STEEPEST] = max(w[c + m.STEEPEST], rate)
+        share = 1.0 if w[c + m.FIXED] > 0.0 else SWINGING
         if rate * step > share * reach:
-            n[STIFF_STEPS] += 1
+            n[m.STIFF_STEPS] += 1
 
     return feel

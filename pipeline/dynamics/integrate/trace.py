@@ -10,53 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics.integrate.state import (
-    COMPRESSION,
-    EVALUATIONS,
-    EVENT_CONTACT,
-    EVENT_KIND,
-    EVENT_ROW,
-    EVENT_TIME,
-    FORCE0,
-    FORCE1,
-    GAP0,
-    GAP1,
-    N_EVENTS,
-    PEAK_DEPTH,
-    PEAK_FORCE,
-    RATE0,
-    RATE1,
-    SLIP0,
-    SLIP1,
-    SLIP_RATE0,
-    SLIP_RATE1,
-    SLIPPING,
-    SPEED,
-    STICKING,
-    TIME,
-    TREND0,
-    TREND1,
-    WATCH_SIZE,
-)
-from pipeline.dynamics.tables import (
-    CONTROL,
-    GAP,
-    MODE,
-    N_CONTACTS,
-    NORMAL_FORCE,
-    NORMAL_LAW,
-    NY,
-    RATE,
-    SLIP,
-    SLOPES,
-    STICK_SPEED,
-    WATCH,
-    Y_NEW,
-    Y_STAGE,
-    contact_numbers,
-    touch,
-)
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 #: share of the step over which the force's trend at its end is felt; a peak nearer to the end than this is
 #: the force at the end, to the square of this
@@ -70,16 +25,16 @@ MOST_LOOKS = 60
 @kernel
 def watch(h, c):
     """Where w holds what the stepper watches of contact c."""
-    return h[WATCH] + WATCH_SIZE * c
+    return m.WATCH.row(h, c)
 
 
 @kernel
 def remember_end(h, w):
     """Note what the contacts do at the end of the step, where it has just been evaluated."""
-    for c in range(h[N_CONTACTS]):
-        o, now = watch(h, c), touch(h, c)
-        w[o + GAP1], w[o + RATE1] = w[now + GAP], w[now + RATE]
-        w[o + FORCE1], w[o + SLIP1] = w[now + NORMAL_FORCE], w[now + SLIP]
+    for c in range(h[m.N_CONTACTS]):
+        o, now = watch(h, c), m.TOUCH.row(h, c)
+        w[o + m.WATCH.gap1], w[o + m.WATCH.rate1] = w[now + m.TOUCH.gap], w[now + m.TOUCH.rate]
+        w[o + m.WATCH.force1], w[o + m.WATCH.slip1] = w[now + m.TOUCH.normal_force], w[now + m.TOUCH.slip]
 
 
 @kernel
@@ -91,13 +46,13 @@ def no_regimes(h, f, c):
 @kernel
 def regimes(h, f, c):
     """Whether contact c has a sliding speed below which its law sticks."""
-    return f[contact_numbers(h, c) + STICK_SPEED] > 0.0
+    return f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.stick_speed] > 0.0
 
 
 @kernel
 def passes_level(w, o, level):
     """Whether the sliding speed passes a level between the ends of a step."""
-    return (w[o + SLIP0] - level) * (w[o + SLIP1] - level) < 0.0
+    return (w[o + m.WATCH.slip0] - level) * (w[o + m.WATCH.slip1] - level) < 0.0
 
 
 @kernel
@@ -107,9 +62,9 @@ def may_touch_level(w, o, level, step):
     It must approach the level at the start and leave it at the end; where it turns, the tangents at both ends meet
     beyond it, since a speed is convex where it passes its least value and concave at its largest.
     """
-    first, second = w[o + SLIP0] - level, w[o + SLIP1] - level
+    first, second = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level
     side = 1.0 if first > 0.0 else -1.0
-    falls, rises = side * w[o + SLIP_RATE0] * step, side * w[o + SLIP_RATE1] * step
+    falls, rises = side * w[o + m.WATCH.slip_rate0] * step, side * w[o + m.WATCH.slip_rate1] * step
     if side * second <= 0.0 or falls > 0.0 or rises <= 0.0:
         return False
     meet = 0.0 if falls == 0.0 else (side * (second - first) - rises) / (falls - rises)
@@ -119,10 +74,10 @@ def may_touch_level(w, o, level, step):
 @kernel
 def note(events, n, c, kind, t):
     """A new row of the event table; returns its number."""
-    row = n[N_EVENTS]
+    row = n[m.N_EVENTS]
     event = events[row]
-    event[EVENT_TIME], event[EVENT_CONTACT], event[EVENT_KIND] = t, c, kind
-    n[N_EVENTS] = row + 1
+    event[m.EVENT.time], event[m.EVENT.contact], event[m.EVENT.kind] = t, c, kind
+    n[m.N_EVENTS] = row + 1
     return row
 
 
@@ -136,16 +91,16 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
     @kernel
     def feel_trends(h, f, w, n, step):
         """At what rates each force and each sliding speed grow at the end of the step."""
-        slope = h[SLOPES] + h[NY] * last
-        for k in range(h[NY]):
-            w[h[Y_STAGE] + k] = w[h[Y_NEW] + k] - BACK * step * w[slope + k]
-        t = w[h[CONTROL] + TIME] + (1.0 - BACK) * step
-        evaluate(h, f, w, n, t, h[Y_STAGE], h[SLOPES] + h[NY] * spare)
-        n[EVALUATIONS] += 1
-        for c in range(h[N_CONTACTS]):
-            o, before = watch(h, c), touch(h, c)
-            w[o + TREND1] = (w[o + FORCE1] - w[before + NORMAL_FORCE]) / (BACK * step)
-            w[o + SLIP_RATE1] = (w[o + SLIP1] - w[before + SLIP]) / (BACK * step)
+        slope = h[m.SLOPES] + h[m.NY] * last
+        for k in range(h[m.NY]):
+            w[h[m.Y_STAGE] + k] = w[h[m.Y_NEW] + k] - BACK * step * w[slope + k]
+        t = w[h[m.CONTROL] + m.TIME] + (1.0 - BACK) * step
+        evaluate(h, f, w, n, t, h[m.Y_STAGE], h[m.SLOPES] + h[m.NY] * spare)
+        n[m.EVALUATIONS] += 1
+        for c in range(h[m.N_CONTACTS]):
+            o, before = watch(h, c), m.TOUCH.row(h, c)
+            w[o + m.WATCH.trend1] = (w[o + m.WATCH.force1] - w[before + m.TOUCH.normal_force]) / (BACK * step)
+            w[o + m.WATCH.slip_rate1] = (w[o + m.WATCH.slip1] - w[before + m.TOUCH.slip]) / (BACK * step)
 
     @kernel
     def locate(h, f, w, n, step, place, level, a, b, fa, fb):
@@ -208,31 +163,35 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
     @kernel
     def compression(h, f, w, n, step, c, events):
         """The deepest point of this compression, as an event."""
-        o, now = watch(h, c), touch(h, c)
-        theta = locate(h, f, w, n, step, now + RATE, 0.0, 0.0, 1.0, w[o + RATE0], w[o + RATE1])
-        event = events[note(events, n, c, COMPRESSION, w[h[CONTROL] + TIME] + theta * step)]
-        event[SPEED], event[PEAK_DEPTH], event[PEAK_FORCE] = 0.0, -w[now + GAP], w[now + NORMAL_FORCE]
-        begun = events[int(w[o + EVENT_ROW])]
-        begun[PEAK_DEPTH] = max(begun[PEAK_DEPTH], -w[now + GAP])
-        begun[PEAK_FORCE] = max(begun[PEAK_FORCE], w[now + NORMAL_FORCE])
+        o, now = watch(h, c), m.TOUCH.row(h, c)
+        theta = locate(h, f, w, n, step, now + m.TOUCH.rate, 0.0, 0.0, 1.0, w[o + m.WATCH.rate0], w[o + m.WATCH.rate1])
+        event = events[note(events, n, c, m.COMPRESSION, w[h[m.CONTROL] + m.TIME] + theta * step)]
+        event[m.EVENT.speed], event[m.EVENT.peak_depth], event[m.EVENT.peak_force] = (
+            0.0,
+            -w[now + m.TOUCH.gap],
+            w[now + m.TOUCH.normal_force],
+        )
+        begun = events[int(w[o + m.WATCH.event_row])]
+        begun[m.EVENT.peak_depth] = max(begun[m.EVENT.peak_depth], -w[now + m.TOUCH.gap])
+        begun[m.EVENT.peak_force] = max(begun[m.EVENT.peak_force], w[now + m.TOUCH.normal_force])
 
     @kernel
     def passage(h, f, w, n, step, c, a, b, fa, fb, events):
         """Sticking begins or ends between the shares a and b of the step, as an event."""
-        level = f[contact_numbers(h, c) + STICK_SPEED]
-        theta = locate(h, f, w, n, step, touch(h, c) + SLIP, level, a, b, fa, fb)
-        note(events, n, c, STICKING if fb < 0.0 else SLIPPING, w[h[CONTROL] + TIME] + theta * step)
+        level = f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.stick_speed]
+        theta = locate(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.slip, level, a, b, fa, fb)
+        note(events, n, c, m.STICKING if fb < 0.0 else m.SLIPPING, w[h[m.CONTROL] + m.TIME] + theta * step)
 
     @kernel
     def regime(h, f, w, n, step, c, events):
         """One passage between the regimes, or there and back, as events."""
-        o, level = watch(h, c), f[contact_numbers(h, c) + STICK_SPEED]
-        first, second = w[o + SLIP0] - level, w[o + SLIP1] - level
+        o, level = watch(h, c), f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.stick_speed]
+        first, second = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level
         if first * second < 0.0:
             passage(h, f, w, n, step, c, 0.0, 1.0, first, second, events)
             return
         sign = -1.0 if first > 0.0 else 1.0
-        found, where = top(h, f, w, n, step, touch(h, c) + SLIP, sign)
+        found, where = top(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.slip, sign)
         beyond = sign * found - level
         if first * beyond < 0.0:
             passage(h, f, w, n, step, c, 0.0, where, first, beyond, events)
@@ -245,19 +204,25 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
         Around its peak a force lies below its tangents.
         """
         o = watch(h, c)
-        damped = f[contact_numbers(h, c) + NORMAL_LAW + 2] > 0.0
-        if not (damped and w[o + RATE0] > 0.0 and w[o + TREND0] > 0.0 and w[o + TREND1] <= 0.0):
+        damped = f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.normal_law + 2] > 0.0
+        if not (damped and w[o + m.WATCH.rate0] > 0.0 and w[o + m.WATCH.trend0] > 0.0 and w[o + m.WATCH.trend1] <= 0.0):
             return False
-        return min(w[o + FORCE0] + w[o + TREND0] * step, w[o + FORCE1] - w[o + TREND1] * step) > record
+        return (
+            min(
+                w[o + m.WATCH.force0] + w[o + m.WATCH.trend0] * step,
+                w[o + m.WATCH.force1] - w[o + m.WATCH.trend1] * step,
+            )
+            > record
+        )
 
     @kernel
     def trends_matter(h, f, w, n):
         """Whether some closed contact is compressing, or has regimes that a step may visit."""
         matter = False
-        for c in range(h[N_CONTACTS]):
+        for c in range(h[m.N_CONTACTS]):
             o = watch(h, c)
-            compressing = w[o + RATE0] > 0.0 or w[o + RATE1] > 0.0
-            matter |= n[n[MODE] + c] == 1 and (compressing or has_regimes(h, f, c))
+            compressing = w[o + m.WATCH.rate0] > 0.0 or w[o + m.WATCH.rate1] > 0.0
+            matter |= n[n[m.MODE] + c] == 1 and (compressing or has_regimes(h, f, c))
         return matter
 
     @kernel
@@ -265,36 +230,48 @@ def compose(evaluate: Callable, peek: Callable, extend: Callable, method: Any, h
         """Whether contact c passes, or may pass and return, the speed below which it sticks."""
         if not has_regimes(h, f, c):
             return False
-        o, level = watch(h, c), f[contact_numbers(h, c) + STICK_SPEED]
+        o, level = watch(h, c), f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.stick_speed]
         return passes_level(w, o, level) or may_touch_level(w, o, level, step)
 
     @kernel
     def trace(h, f, w, n, step, ready, events):
         if trends_matter(h, f, w, n):
             feel_trends(h, f, w, n, step)
-        for c in range(h[N_CONTACTS]):
-            if n[n[MODE] + c] != 1:
+        for c in range(h[m.N_CONTACTS]):
+            if n[n[m.MODE] + c] != 1:
                 continue
             o = watch(h, c)
-            event = events[int(w[o + EVENT_ROW])]
-            event[PEAK_FORCE] = max(event[PEAK_FORCE], max(w[o + FORCE0], w[o + FORCE1]))
-            event[PEAK_DEPTH] = max(event[PEAK_DEPTH], -w[o + GAP1])
-            turns = w[o + RATE0] > 0.0 and w[o + RATE1] <= 0.0
-            peaks = peaking(h, f, w, c, step, event[PEAK_FORCE])
+            event = events[int(w[o + m.WATCH.event_row])]
+            event[m.EVENT.peak_force] = max(
+                event[m.EVENT.peak_force], max(w[o + m.WATCH.force0], w[o + m.WATCH.force1])
+            )
+            event[m.EVENT.peak_depth] = max(event[m.EVENT.peak_depth], -w[o + m.WATCH.gap1])
+            turns = w[o + m.WATCH.rate0] > 0.0 and w[o + m.WATCH.rate1] <= 0.0
+            peaks = peaking(h, f, w, c, step, event[m.EVENT.peak_force])
             passes = changes_regime(h, f, w, c, step)
             if (turns or peaks or passes) and not ready:
                 extend(h, f, w, n, step)
                 ready = True
             if peaks:
-                event[PEAK_FORCE] = max(event[PEAK_FORCE], top(h, f, w, n, step, touch(h, c) + NORMAL_FORCE, 1.0)[0])
+                event[m.EVENT.peak_force] = max(
+                    event[m.EVENT.peak_force], top(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.normal_force, 1.0)[0]
+                )
             if turns:
                 compression(h, f, w, n, step, c, events)
             if passes:
                 regime(h, f, w, n, step, c, events)
-        for c in range(h[N_CONTACTS]):
+        for c in range(h[m.N_CONTACTS]):
             o = watch(h, c)
-            w[o + GAP0], w[o + RATE0], w[o + FORCE0] = w[o + GAP1], w[o + RATE1], w[o + FORCE1]
-            w[o + SLIP0], w[o + TREND0], w[o + SLIP_RATE0] = w[o + SLIP1], w[o + TREND1], w[o + SLIP_RATE1]
+            w[o + m.WATCH.gap0], w[o + m.WATCH.rate0], w[o + m.WATCH.force0] = (
+                w[o + m.WATCH.gap1],
+                w[o + m.WATCH.rate1],
+                w[o + m.WATCH.force1],
+            )
+            w[o + m.WATCH.slip0], w[o + m.WATCH.trend0], w[o + m.WATCH.slip_rate0] = (
+                w[o + m.WATCH.slip1],
+                w[o + m.WATCH.trend1],
+                w[o + m.WATCH.slip_rate1],
+            )
         return ready
 
     return trace

@@ -4,29 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import ROTATION, TRANSLATION, angle_about_z
-from pipeline.dynamics.tables import (
-    J_ACCELERATION,
-    J_ALPHA,
-    J_COLUMNS,
-    J_OMEGA,
-    J_POSITION,
-    J_ROTATION,
-    J_VELOCITY,
-)
-from pipeline.dynamics.vectors import about_z, kernel, put9
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import about_z, put9
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x radians about z, then metres along z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 12):
+    for k in range(m.JOINT.columns + 12):
         w[joint + k] = 0.0
-    put9(w, joint + J_ROTATION, about_z(w[x]))
-    w[joint + J_POSITION + 2] = w[x + 1]
-    w[joint + J_OMEGA + 2], w[joint + J_VELOCITY + 2] = w[u], w[u + 1]
-    w[joint + J_ALPHA + 2], w[joint + J_ACCELERATION + 2] = w[du], w[du + 1]
-    w[joint + J_COLUMNS + 2] = w[joint + J_COLUMNS + 6 + 5] = 1.0
+    put9(w, joint + m.JOINT.rotation, about_z(w[x]))
+    w[joint + m.JOINT.position + 2] = w[x + 1]
+    w[joint + m.JOINT.omega + 2], w[joint + m.JOINT.velocity + 2] = w[u], w[u + 1]
+    w[joint + m.JOINT.alpha + 2], w[joint + m.JOINT.acceleration + 2] = w[du], w[du + 1]
+    w[joint + m.JOINT.columns + 2] = w[joint + m.JOINT.columns + 6 + 5] = 1.0
     w[rate], w[rate + 1] = w[u], w[u + 1]
 
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import J_COLUMNS
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
     """The two frames coincide (see `spherical.motion`)."""
-    for k in range(J_COLUMNS):
+    for k in range(m.JOINT.columns):
         w[joint + k] = 0.0
     w[joint] = w[joint + 4] = w[joint + 8] = 1.0
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import J_ACCELERATION, J_ALPHA, J_COLUMNS, J_OMEGA, J_POSITION, J_ROTATION, J_VELOCITY
-from pipeline.dynamics.vectors import from_quaternion, kernel, put9, quaternion_rate
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import from_quaternion, put9, quaternion_rate
 
 
 @kernel
@@ -16,17 +17,17 @@ def motion(w, x, u, du, joint, rate):
 
     u: angular velocity, then velocity of G's origin, components in F, 6 numbers.
     """
-    put9(w, joint + J_ROTATION, from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3]))
+    put9(w, joint + m.JOINT.rotation, from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3]))
     for k in range(36):
-        w[joint + J_COLUMNS + k] = 0.0
+        w[joint + m.JOINT.columns + k] = 0.0
     for k in range(3):
-        w[joint + J_POSITION + k] = w[x + 4 + k]
-        w[joint + J_OMEGA + k] = w[u + k]
-        w[joint + J_VELOCITY + k] = w[u + 3 + k]
-        w[joint + J_ALPHA + k] = w[du + k]
-        w[joint + J_ACCELERATION + k] = w[du + 3 + k]
-        w[joint + J_COLUMNS + 7 * k] = 1.0
-        w[joint + J_COLUMNS + 18 + 7 * k + 3] = 1.0
+        w[joint + m.JOINT.position + k] = w[x + 4 + k]
+        w[joint + m.JOINT.omega + k] = w[u + k]
+        w[joint + m.JOINT.velocity + k] = w[u + 3 + k]
+        w[joint + m.JOINT.alpha + k] = w[du + k]
+        w[joint + m.JOINT.acceleration + k] = w[du + 3 + k]
+        w[joint + m.JOINT.columns + 7 * k] = 1.0
+        w[joint + m.JOINT.columns + 18 + 7 * k + 3] = 1.0
         w[rate + 4 + k] = w[u + 3 + k]
     quaternion_rate(w, x, u, rate)
 

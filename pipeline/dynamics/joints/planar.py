@@ -4,34 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z
-from pipeline.dynamics.tables import (
-    J_ACCELERATION,
-    J_ALPHA,
-    J_COLUMNS,
-    J_OMEGA,
-    J_POSITION,
-    J_ROTATION,
-    J_VELOCITY,
-)
-from pipeline.dynamics.vectors import about_z, kernel, put9
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import about_z, put9
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x metres along x and y of F, radians about z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 18):
+    for k in range(m.JOINT.columns + 18):
         w[joint + k] = 0.0
-    put9(w, joint + J_ROTATION, about_z(w[x + 2]))
+    put9(w, joint + m.JOINT.rotation, about_z(w[x + 2]))
     for k in range(2):
-        w[joint + J_POSITION + k] = w[x + k]
-        w[joint + J_VELOCITY + k] = w[u + k]
-        w[joint + J_ACCELERATION + k] = w[du + k]
-        w[joint + J_COLUMNS + 7 * k + 3] = 1.0
+        w[joint + m.JOINT.position + k] = w[x + k]
+        w[joint + m.JOINT.velocity + k] = w[u + k]
+        w[joint + m.JOINT.acceleration + k] = w[du + k]
+        w[joint + m.JOINT.columns + 7 * k + 3] = 1.0
         w[rate + k] = w[u + k]
-    w[joint + J_OMEGA + 2] = w[rate + 2] = w[u + 2]
-    w[joint + J_ALPHA + 2] = w[du + 2]
-    w[joint + J_COLUMNS + 12 + 2] = 1.0
+    w[joint + m.JOINT.omega + 2] = w[rate + 2] = w[u + 2]
+    w[joint + m.JOINT.alpha + 2] = w[du + 2]
+    w[joint + m.JOINT.columns + 12 + 2] = 1.0
 
 
 class Planar:

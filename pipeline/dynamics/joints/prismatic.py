@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import TRANSLATION
-from pipeline.dynamics.tables import J_ACCELERATION, J_COLUMNS, J_POSITION, J_VELOCITY
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x metres along z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 6):
+    for k in range(m.JOINT.columns + 6):
         w[joint + k] = 0.0
     w[joint] = w[joint + 4] = w[joint + 8] = 1.0
-    w[joint + J_POSITION + 2] = w[x]
-    w[joint + J_VELOCITY + 2] = w[u]
-    w[joint + J_ACCELERATION + 2] = w[du]
-    w[joint + J_COLUMNS + 5] = 1.0
+    w[joint + m.JOINT.position + 2] = w[x]
+    w[joint + m.JOINT.velocity + 2] = w[u]
+    w[joint + m.JOINT.acceleration + 2] = w[du]
+    w[joint + m.JOINT.columns + 5] = 1.0
     w[rate] = w[u]
 
 

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import ROTATION, angle_about_z
-from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA, J_ROTATION
-from pipeline.dynamics.vectors import about_z, kernel, put9
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import about_z, put9
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: x radians about z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 6):
+    for k in range(m.JOINT.columns + 6):
         w[joint + k] = 0.0
-    put9(w, joint + J_ROTATION, about_z(w[x]))
-    w[joint + J_OMEGA + 2] = w[u]
-    w[joint + J_ALPHA + 2] = w[du]
-    w[joint + J_COLUMNS + 2] = 1.0
+    put9(w, joint + m.JOINT.rotation, about_z(w[x]))
+    w[joint + m.JOINT.omega + 2] = w[u]
+    w[joint + m.JOINT.alpha + 2] = w[du]
+    w[joint + m.JOINT.columns + 2] = 1.0
     w[rate] = w[u]
 
 

@@ -11,9 +11,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA
-from pipeline.dynamics.vectors import add, at, cross, dot, kernel, put, put9, scale
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import add, at, cross, dot, put, put9, scale
 
 #: angle^2 below which the functions are taken from their series; their next terms are below rounding there
 SMALL = 1e-2
@@ -39,7 +40,7 @@ def _functions(s):
 @kernel
 def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: the rotation vector stored from x (see `spherical.motion`)."""
-    for k in range(9, J_COLUMNS + 18):
+    for k in range(9, m.JOINT.columns + 18):
         w[joint + k] = 0.0
     v, r, second = at(w, x), at(w, u), at(w, du)
     c, a, b, da, db = _functions(dot(v, v))
@@ -60,14 +61,14 @@ def motion(w, x, u, du, joint, rate):
     )
     vr, vs, ds = cross(v, r), cross(v, second), 2.0 * dot(v, r)
     vvr = cross(v, vr)
-    put(w, joint + J_OMEGA, add(r, add(scale(a, vr), scale(b, vvr))))
+    put(w, joint + m.JOINT.omega, add(r, add(scale(a, vr), scale(b, vvr))))
     own = add(second, add(scale(a, vs), scale(b, cross(v, vs))))
     bias = add(add(scale(da * ds, vr), scale(db * ds, vvr)), scale(b, cross(r, vr)))
-    put(w, joint + J_ALPHA, add(own, bias))
+    put(w, joint + m.JOINT.alpha, add(own, bias))
     for k in range(3):
         unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
         vu = cross(v, unit)
-        put(w, joint + J_COLUMNS + 6 * k, add(unit, add(scale(a, vu), scale(b, cross(v, vu)))))
+        put(w, joint + m.JOINT.columns + 6 * k, add(unit, add(scale(a, vu), scale(b, cross(v, vu)))))
         w[rate + k] = w[u + k]
 
 

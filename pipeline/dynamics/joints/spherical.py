@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA, J_ROTATION
-from pipeline.dynamics.vectors import from_quaternion, kernel, put9, quaternion_rate
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import from_quaternion, put9, quaternion_rate
 
 
 @kernel
@@ -18,13 +19,13 @@ def motion(w, x, u, du, joint, rate):
     Fills `joint` (layout: tables.J_*) and the position rates `rate` (4).
     """
     R = from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3])
-    put9(w, joint + J_ROTATION, R)
-    for k in range(9, J_COLUMNS + 18):
+    put9(w, joint + m.JOINT.rotation, R)
+    for k in range(9, m.JOINT.columns + 18):
         w[joint + k] = 0.0
     for k in range(3):
-        w[joint + J_OMEGA + k] = w[u + k]
-        w[joint + J_ALPHA + k] = w[du + k]
-        w[joint + J_COLUMNS + 7 * k] = 1.0
+        w[joint + m.JOINT.omega + k] = w[u + k]
+        w[joint + m.JOINT.alpha + k] = w[du + k]
+        w[joint + m.JOINT.columns + 7 * k] = 1.0
     quaternion_rate(w, x, u, rate)
 
 

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA
-from pipeline.dynamics.vectors import add, cross, kernel, put, put9, scale
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import add, cross, put, put9, scale
 
 
 @kernel
 def motion(w, x, u, du, joint, rate):
     """Motion of frame G in frame F: R_FG = R_x(x0) R_y(x1) (see `spherical.motion`)."""
-    for k in range(J_COLUMNS):
+    for k in range(m.JOINT.columns):
         w[joint + k] = 0.0
     ca, sa, cb, sb = np.cos(w[x]), np.sin(w[x]), np.cos(w[x + 1]), np.sin(w[x + 1])
     put9(w, joint, (cb, 0.0, sb, sa * sb, ca, -sa * cb, -ca * sb, sa, ca * cb))
     first, second = (1.0, 0.0, 0.0), (0.0, ca, sa)
     turning = scale(w[u], first)
-    put(w, joint + J_OMEGA, add(turning, scale(w[u + 1], second)))
+    put(w, joint + m.JOINT.omega, add(turning, scale(w[u + 1], second)))
     own = add(scale(w[du], first), scale(w[du + 1], second))
-    put(w, joint + J_ALPHA, add(own, scale(w[u + 1], cross(turning, second))))
+    put(w, joint + m.JOINT.alpha, add(own, scale(w[u + 1], cross(turning, second))))
     zero = (0.0, 0.0, 0.0)
-    put(w, joint + J_COLUMNS, first)
-    put(w, joint + J_COLUMNS + 3, zero)
-    put(w, joint + J_COLUMNS + 6, second)
-    put(w, joint + J_COLUMNS + 9, zero)
+    put(w, joint + m.JOINT.columns, first)
+    put(w, joint + m.JOINT.columns + 3, zero)
+    put(w, joint + m.JOINT.columns + 6, second)
+    put(w, joint + m.JOINT.columns + 9, zero)
     w[rate], w[rate + 1] = w[u], w[u + 1]
 
 

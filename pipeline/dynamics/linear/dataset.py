@@ -8,8 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
-from pipeline.dynamics.integrate import state as slots
-from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import NO_IMPACT, Bench, seen, state
 from pipeline.dynamics.linear.settle import Settled
 from pipeline.dynamics.linear.shares import by_body
@@ -17,7 +16,8 @@ from pipeline.dynamics.linear.vibrations import Vibrations
 from pipeline.dynamics.record.dataset import attributes, dataset
 from pipeline.dynamics.record.frames import frame_velocities
 from pipeline.dynamics.record.motion import link_motions
-from pipeline.dynamics.run import Run
+from pipeline.dynamics.run.run import Run
+from pipeline.dynamics.run.trajectory import Trajectory
 
 PARTS = ("real", "imaginary")
 
@@ -29,7 +29,7 @@ def equilibrium(bench: Bench, found: Settled, moving: bool) -> xr.Dataset:
     ahead = [np.full((1, 1), bench.time), np.ones((1, contacts)), np.full((1, contacts), NO_IMPACT)]
     once = Trajectory(
         np.hstack([*ahead, rows["state"]]),
-        np.zeros((0, slots.EVENT_SIZE)),
+        np.zeros((0, m.EVENT.size)),
         {},
         ((bench.time, bench.engine.kept.copy()),),
     )
@@ -70,10 +70,10 @@ def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.
         "frame_translation": (("vibration", "part", "frame", "axis"), _split(translation)),
         "frame_rotation": (("vibration", "part", "frame", "axis"), _split(rotation)),
     }
-    layout = bench.engine.built.layout
-    if layout.modes:
+    numbering = bench.engine.model.numbering
+    if numbering.modes:
         modal = np.concatenate(
-            [np.arange(layout.flex_c0[i], layout.flex_c0[i] + n) for i, n in sorted(layout.modes.items())]
+            [np.arange(numbering.flex_c0[i], numbering.flex_c0[i] + n) for i, n in sorted(numbering.modes.items())]
         )
         data["modal_shape"] = (("vibration", "part", "mode"), _split(w[modal].T))
     made = still.assign({n: xr.Variable(*v) for n, v in data.items()})
@@ -81,7 +81,7 @@ def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.
         vibration=np.arange(1, len(value) + 1),
         part=list(PARTS),
         moving_body=parts,
-        frame=list(bench.engine.built.system.frames),
+        frame=list(bench.engine.model.mechanism.frames),
     )
     return conform(made, LINEAR, **still.attrs, motions_without_stiffness=small.free)
 
@@ -91,18 +91,18 @@ def _motions(bench: Bench, found: Settled, w: np.ndarray) -> tuple[np.ndarray, n
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).
     """
-    built, n = bench.engine.built, w.shape[1]
+    model, n = bench.engine.model, w.shape[1]
     speeds = np.concatenate([np.zeros((1, len(w))), w.real.T, w.imag.T])
     rows = seen(bench, np.array([state(bench, found.at.q, v) for v in speeds]))
-    links = link_motions(built, rows["link_frame"])
-    velocities = frame_velocities(built, rows, links)
+    links = link_motions(model, rows["link_frame"])
+    velocities = frame_velocities(model, rows, links)
 
     def part(which: int) -> np.ndarray:
         every = np.array([m[which] for m in velocities.values()]).reshape(len(velocities), len(speeds), 3)
         moved = np.swapaxes(every - every[:, :1], 0, 1)[1:]
         return moved[:n] + 1j * moved[n:]
 
-    energy = {name: values[:n] + values[n:] for name, values in by_body(built, rows, links).items()}
+    energy = {name: values[:n] + values[n:] for name, values in by_body(model, rows, links).items()}
     whole = np.sum(list(energy.values()), axis=0)
     return part(0), part(1), {name: values / whole for name, values in energy.items()}
 

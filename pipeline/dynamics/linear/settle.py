@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import Bench, closed
 from pipeline.dynamics.linear.names import leading
 from pipeline.dynamics.linear.tangent import Tangent, magnitude, scales, stiffness, tangent
@@ -67,15 +68,15 @@ def settle(bench: Bench, q: np.ndarray) -> Settled:
 
 def weight(bench: Bench) -> float:
     """Norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
-    packed = bench.engine.built.packed
-    mass = packed.table("LINK_NUMBERS")[:, 0].sum() + packed.table("FLEX_NUMBERS")[:, 0].sum()
-    return float(np.sqrt(mass) * np.linalg.norm(packed.table("GRAVITY")[0]))
+    arrays = bench.engine.model.arrays
+    mass = arrays.table(m.LINK_NUMBERS)["mass"].sum() + arrays.table(m.FLEX_NUMBERS)["mass"].sum()
+    return float(np.sqrt(mass) * np.linalg.norm(arrays.table(m.GRAVITY)["acceleration"][0]))
 
 
 def residual(bench: Bench, at: Tangent) -> float:
     """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
     forces = at.mass @ at.Z @ at.unbalanced
-    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.built.system.length
+    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.model.mechanism.length
 
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:

@@ -9,10 +9,10 @@ import xarray as xr
 
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.integrate.engine import Progress
 from pipeline.dynamics.linear.bench import Bench, balance, hold, set_drives
 from pipeline.dynamics.linear.settle import Settled, settle
 from pipeline.dynamics.linear.tangent import scales
+from pipeline.dynamics.run.engine import Progress
 
 #: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
 STEADY = 1e-9

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.loads.fields import LOAD_KINDS
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 
 def compose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
@@ -21,9 +21,8 @@ def compose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
 
     @kernel
     def loads(h, f, w):
-        o = h[LOAD_KINDS] + 2 * first
-        begin = h[index(o)]
-        for k in range(begin, begin + h[index(o + 1)]):
+        begin = m.LOAD_KINDS.load0(h, first)
+        for k in range(begin, begin + m.LOAD_KINDS.n_loads(h, first)):
             head(h, f, w, k)
         tail(h, f, w)
 

@@ -6,20 +6,9 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.solver import Solver
-from pipeline.dynamics.assembly.numbers import Tables
-from pipeline.dynamics.integrate.trajectory import Trajectory
-from pipeline.dynamics.tables import (
-    BENT,
-    CONTACT_SLOTS,
-    DAMPING_LOSS,
-    DRIVE_WORK,
-    FRICTION_LOSS,
-    IMPULSE,
-    MODAL_LOSS,
-    PER_CONTACT,
-    STORED,
-    TOUCH_SIZE,
-)
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.run.trajectory import Trajectory
 
 Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -34,23 +23,23 @@ CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 1.0
 DAMPING = "generalized-alpha"
 
 
-def series(built: Tables, seen: Seen) -> Variables:
+def series(model: Model, seen: Seen) -> Variables:
     """The variables of the ledger, total and by cause."""
-    ledger = seen["state"][:, built.layout.nq + built.layout.nv :]
+    ledger = seen["state"][:, model.numbering.nq + model.numbering.nv :]
     kinetic, potential, elastic = seen["energy"].T
-    contacts = len(built.system.contacts)
-    touch = seen["touch"].reshape(len(ledger), contacts, TOUCH_SIZE)
-    slots = ledger[:, CONTACT_SLOTS : CONTACT_SLOTS + PER_CONTACT * contacts].reshape(
-        len(ledger), contacts, PER_CONTACT
+    contacts = len(model.mechanism.contacts)
+    touch = seen["touch"].reshape(len(ledger), contacts, m.TOUCH.size)
+    slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.PER_CONTACT * contacts].reshape(
+        len(ledger), contacts, m.PER_CONTACT
     )
     # friction's slot is its work; what bent bristles still hold of it is not lost
-    damping, friction = slots[..., DAMPING_LOSS], slots[..., FRICTION_LOSS] - touch[..., BENT]
-    work, modal = ledger[:, DRIVE_WORK], ledger[:, MODAL_LOSS]
+    damping, friction = slots[..., m.DAMPING_LOSS], slots[..., m.FRICTION_LOSS] - touch[..., m.TOUCH.bent]
+    work, modal = ledger[:, m.DRIVE_WORK], ledger[:, m.MODAL_LOSS]
     dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
     balance = kinetic + potential + elastic + dissipated - work
     loaded: Variables = {}
-    if built.system.scene.forces():
-        load_work, load_loss = ledger[:, built.packed.sizes["LOAD_SLOT"] :].T[:2]
+    if model.scene.forces():
+        load_work, load_loss = ledger[:, model.arrays.size(m.LOAD_SLOT) :].T[:2]
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
     found: Variables = {
@@ -63,12 +52,12 @@ def series(built: Tables, seen: Seen) -> Variables:
         "constraint_error": (("time",), seen["residual"][:, 0]),
         **loaded,
     }
-    if built.layout.modes:
+    if model.numbering.modes:
         found["modal_damping_loss"] = (("time",), modal)
     if contacts:
-        found["contact_elastic"] = (("time", "contact"), touch[..., STORED] + touch[..., BENT])
+        found["contact_elastic"] = (("time", "contact"), touch[..., m.TOUCH.stored] + touch[..., m.TOUCH.bent])
         found["contact_damping_loss"] = (("time", "contact"), damping)
-        found["contact_impulse"] = (("time", "contact"), slots[..., IMPULSE])
+        found["contact_impulse"] = (("time", "contact"), slots[..., m.IMPULSE])
         found["contact_friction_loss"] = (("time", "contact"), friction)
     return found
 
@@ -80,15 +69,15 @@ def usual(solver: Solver) -> float:
     return CHOSEN if solver.integrator == DAMPING else max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
 
 
-def require_closed(built: Tables, trajectory: Trajectory, seen: Seen) -> None:
+def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
     """SolverError when the ledger is off by more than the scene's tolerance times the energy turned over."""
-    found = {name: values for name, (_, values) in series(built, seen).items()}
+    found = {name: values for name, (_, values) in series(model, seen).items()}
     error = np.abs(found["energy_error"])
     turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in found]
     turned = max(float(np.ptp(found[n])) for n in turning)
     turned = max(turned, float(found["kinetic"].max()))
     largest = max(float(np.abs(found[n]).max()) for n in turning)
-    solver = built.system.scene.solver
+    solver = model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
     worst = int(np.argmax(error)) if np.isfinite(error).all() else int(np.argmin(np.isfinite(error)))
     if error[worst] <= tolerance * turned + ROUNDING * largest:
@@ -97,14 +86,14 @@ def require_closed(built: Tables, trajectory: Trajectory, seen: Seen) -> None:
     raise SolverError(
         f"at t = {trajectory.time[first]:.6g} s: the ledger of energy does not close: it is off by up to "
         f"{error[worst]:.3g} J where {turned:.3g} J are turned over (tolerance {tolerance:g}, "
-        f"[solver.ledger_tolerance]); lost so far: {_losses(built, found, first)}; "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(model, found, first)}; "
         "a smaller rtol or step is the remedy, or the scene is beyond this integrator"
     )
 
 
-def _losses(built: Tables, found: dict[str, np.ndarray], k: int) -> str:
+def _losses(model: Model, found: dict[str, np.ndarray], k: int) -> str:
     parts = []
-    for c, (name, *_) in enumerate(built.system.contacts):
+    for c, (name, *_) in enumerate(model.mechanism.contacts):
         for cause in ("damping", "friction"):
             parts.append(f"{found[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
     if "modal_damping_loss" in found:

@@ -1,0 +1,79 @@
+"""Back onto the closures: positions and speeds, by the least change in the metric of the mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+
+ITERATIONS = 8
+#: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)
+BLIND = 1e-8
+#: rounding may stop the residuals this far above a very tight tolerance
+ROUNDING = 1e3
+
+
+@kernel
+def largest(w, first, count):
+    """Largest magnitude of a stretch of w; NaN counts as infinite."""
+    result = 0.0
+    for k in range(first, first + count):
+        if not abs(w[k]) <= result:
+            result = abs(w[k]) if w[k] == w[k] else 1e300
+    return result
+
+
+@kernel
+def none(h, f, w, n, t, y, dy, tolerance):
+    """A tree cannot drift."""
+    return 0
+
+
+def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) -> Callable:
+    """The kernel project(h, f, w, n, t, y, dy, tolerance)."""
+
+    @kernel
+    def move(h, w, y, step):
+        """Add to the positions of y the change that a small displacement of the coordinates means."""
+        for k in range(h[m.NV]):
+            w[h[m.U] + k] = w[step + k]
+        for i in range(1, h[m.N_LINKS]):
+            q, c = m.LINKS.q0(h, i), m.LINKS.c0(h, i)
+            joint_motion(
+                m.LINKS.joint(h, i), w, h[m.X] + q, h[m.U] + c, h[m.DU] + c, h[m.JOINT.place], h[m.POSITION_RATE] + q
+            )
+        for k in range(h[m.N_FLEX]):
+            q, c = m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
+            for j in range(m.FLEXES.n_modes(h, k)):
+                w[h[m.POSITION_RATE] + q + j] = w[step + c + j]
+        for k in range(h[m.NQ]):
+            w[y + k] += w[h[m.POSITION_RATE] + k]
+
+    @kernel
+    def project(h, f, w, n, t, y, dy, tolerance):
+        """Correct y until residuals [m] and their rates [m/s] are below `tolerance`.
+
+        Needs the work space of evaluate(t, y); leaves it, and dy, up to date.  Returns the number
+        of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
+        residual says little about the error behind it, nothing is changed.
+        """
+        rows, step, used = h[m.N_CLOSURE_ROWS], h[m.CORRECTION], 0
+        if w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
+            return 0
+        for _ in range(ITERATIONS):
+            worst = max(largest(w, h[m.RESIDUAL], rows), largest(w, h[m.RESIDUAL_RATE], rows))
+            if worst <= tolerance:
+                return used
+            correction(h, w, h[m.RESIDUAL_RATE], step)
+            for k in range(h[m.NV]):
+                w[y + h[m.NQ] + k] += w[step + k]
+            correction(h, w, h[m.RESIDUAL], step)
+            move(h, w, y, step)
+            evaluate(h, f, w, n, t, y, dy)
+            used += 1
+            if n[m.EVALUATION] != m.OK:
+                return -1
+        return used if largest(w, h[m.RESIDUAL], rows) <= ROUNDING * tolerance else -1
+
+    return project

@@ -1,0 +1,199 @@
+"""Mobility, rank and redundancy of a mechanism, and refusals of mechanisms that cannot move as asked.
+
+All of it follows from the directions in which the joints leave the links free: the closures'
+Jacobian in any basis of them.  Whether a loss of rank belongs to the mechanism (a planar loop in
+space) or to the pose alone is seen from poses nearby.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.algebra import rotation_vector_to_matrix
+from pipeline.core.errors import InputError
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import weightless
+from pipeline.dynamics.model.assembly import close, settled
+from pipeline.dynamics.model.constraints import constraints
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, sites
+from pipeline.dynamics.model.tree import PATH
+
+#: displacements, in radians and shares of the mechanism's size, of the poses nearby
+NEARBY = (0.03, 0.01)
+#: share of a self-stress that a joint must carry for its reaction to count as undetermined
+CARRIES = 1e-6
+#: condition numbers are not told apart from infinity above this
+INFINITE = 1e15
+#: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
+SLIGHT = 1e-3
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Counts of a mechanism at its start. coordinates: free ones of the tree.
+
+    rank: independent closure rows of `rows`; those of poses nearby where the start is singular.
+    redundant_joints: joints whose reaction the equations of motion of rigid bodies do not determine.
+    singular_start: of a start in a singular pose, why it cannot go on by itself, in words.
+    """
+
+    coordinates: int
+    rows: int
+    rank: int
+    redundant_joints: frozenset[str]
+    singular_start: str = ""
+
+    @property
+    def mobility(self) -> int:
+        """Degrees of freedom, prescribed ones not counted."""
+        return self.coordinates - self.rank
+
+    @property
+    def redundant(self) -> int:
+        """Closure rows that follow from the others."""
+        return self.rows - self.rank
+
+    def text(self) -> str:
+        """In words, for the user."""
+        return f"mobility {self.mobility}, {self.redundant} redundant"
+
+
+def analyse(model: Model) -> Mobility:
+    """Mobility of an assembled mechanism.
+
+    Raises InputError for a mechanism that cannot move at all, drives that contradict each other and motions that no
+    mass resists.
+    """
+    poses, singular = [link.start for link in model.mechanism.links], ""
+    here = rates(model, poses)
+    regular = _regular_poses(model, here) if here.rank < len(here.J) else None
+    if regular is not None:
+        poses, singular = regular, _singular_start(model, here)
+        here = rates(model, poses)
+    found = Mobility(model.numbering.nv, len(here.J), here.rank, _undetermined(model, here, poses), singular)
+    _refuse_locked(model, found, here)
+    _refuse_contradiction(model, here)
+    if here.rank < model.numbering.nv:
+        weightless.refuse(model, poses, motions(model, poses).twists, here.free)
+    return found
+
+
+def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
+    """Poses nearby in which the closures have a higher rank than at the start, if there are any."""
+    flexible = any(link.flexible for link in model.mechanism.links)
+    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in model.mechanism.links)
+    if here.rank == model.numbering.nv or flexible or paths:
+        return None
+    joints = constraints(model.mechanism)
+    poses = [link.start for link in model.mechanism.links]
+    random = np.random.default_rng(0)
+    for size in NEARBY:
+        share = random.normal(size=here.free.shape[1])
+        motion = here.free @ (share / np.linalg.norm(share))
+        start = _displaced(model, poses, size * motion / max(1.0, float(np.linalg.norm(motion))))
+        closed = close(model.mechanism, joints, start)
+        if closed is None:
+            continue
+        there = [link.start for link in settled(model.mechanism, closed).links]
+        if rates(model, there).rank > here.rank:
+            return there
+    return None
+
+
+def _singular_start(model: Model, here: Rates) -> str:
+    """What is said of a start in a singular pose."""
+    names = {model.mechanism.closures[k][0].name: None for k in model.closure_order}
+    values = here.values
+    ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
+    return (
+        f"at t = {model.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
+        f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
+        "give its bodies the velocities of one of these, or start it in another pose of its path"
+    )
+
+
+def _displaced(model: Model, poses: Sequence[Placement], motion: np.ndarray) -> list[Placement]:
+    """Poses after a small motion of the tree's free coordinates."""
+    numbering, twists, moved = model.numbering, motions(model, poses).twists, [poses[0]]
+    for i in range(1, len(poses)):
+        route = [(c, col) for c, col in numbering.joint_route(i) if c < numbering.nv]
+        twist = sum((motion[c] * twists[col] for c, col in route), np.zeros(6))
+        turn = rotation_vector_to_matrix(twist[:3])
+        moved.append(Placement(turn @ poses[i].p + twist[3:], turn @ poses[i].R))
+    return moved
+
+
+def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> frozenset[str]:
+    """Joints that carry part of a self-stress: reactions in balance with each other, without any load."""
+    if here.rank == len(here.J):
+        return frozenset()
+    mechanism, L = model.mechanism, model.mechanism.length
+    stresses = here.stresses / np.max(np.abs(here.stresses), axis=1, keepdims=True)
+    carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
+    found, row = set(), 0
+    for k in model.closure_order:
+        edge, a, b = mechanism.closures[k]
+        along, about, force = row_axes(model, poses, k)
+        point = sites(model, poses, k)[1].p
+        wrenches = np.where(
+            force[:, None], np.hstack([np.cross(point, along) / L, along]), np.hstack([about, 0 * along])
+        )
+        share = stresses[:, row : row + len(wrenches)]
+        wrench = wrenches.T @ share.T
+        carried[a.link] -= wrench
+        carried[b.link] += wrench
+        if np.max(np.abs(share), initial=0.0) > CARRIES:
+            found.add(edge.name)
+        row += len(wrenches)
+    for i in range(len(mechanism.links) - 1, 0, -1):
+        branch = mechanism.links[i].branch
+        carried[branch.parent] += carried[i]
+        if branch.edge is not None and np.max(np.abs(carried[i])) > CARRIES:
+            found.add(branch.edge.name)
+    return frozenset(found)
+
+
+def _refuse_locked(model: Model, found: Mobility, here: Rates) -> None:
+    if found.mobility > 0 or model.numbering.known > 0:
+        return
+    least = float(here.values[here.rank - 1])
+    hardly = (
+        f"; one of these rows is only {least:.1g} of its natural size, as of joints whose axes hardly miss each other"
+        if least < SLIGHT
+        else ""
+    )
+    raise InputError(
+        "[joint]",
+        f"the mechanism is locked: {found.coordinates} free coordinates of its tree against {found.rank} "
+        f"independent closure rows leave it no motion{hardly}",
+        "write frames and poses with more digits, or let one of the joints give way"
+        if hardly
+        else "remove a joint, choose one with more freedom, or drive one",
+    )
+
+
+def _refuse_contradiction(model: Model, here: Rates) -> None:
+    """Drives that the loops tie to each other can follow their laws only if these happen to agree."""
+    drives = [name for name, tied in zip(model.mechanism.drives, here.tied, strict=True) if tied]
+    moving = [name for name in drives if _moves(model, name)]
+    if not moving:
+        return
+    raise InputError(
+        f"[drive.{moving[0].partition('.')[0]}]",
+        f"the mechanism is over-driven: its loops tie the coordinates of {', '.join(drives)} to each other ("
+        f"{model.numbering.nv} free coordinates, {here.rank} independent closure rows, {model.numbering.known} drives)",
+        "remove a drive, or a joint",
+    )
+
+
+def _moves(model: Model, name: str) -> bool:
+    first, count = model.arrays.table(m.LAWS)[model.mechanism.drives.index(name)]
+    pieces = slice(first, first + count)
+    values = model.arrays.table(m.PIECES)["coefficients"][pieces]
+    harmonics = model.arrays.table(m.PIECE_HARMONICS)["n_harmonics"][pieces]
+    return bool(np.any(values[:, 1:] != 0.0) or np.ptp(values[:, 0]) > 0.0 or np.any(harmonics > 0))

@@ -1,0 +1,136 @@
+"""Which closure rows are solved for, where some follow from the others.
+
+Loops of a planar mechanism in space, or Bricard's, ask for the same thing several times. Their
+multipliers are then not unique and J M^-1 J^T is singular, though the motion is as determined as
+ever. A selection keeps as many rows as the rank says; the others are only looked at.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.arrays import envelope_size
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.model.wiring import closure_envelope
+
+#: a row below this share of its natural length is rounding: the square root of what rounding leaves of a cancelling
+#: sum, 1e-13 at worst, with some digits to spare
+NOTHING = 1e-6
+
+
+def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray, float]:
+    """Rows to keep, as many as `rank`, and their least pivot: 1 for rows at right angles, 0 for dependent ones.
+
+    spread: J L^-T, shape (rows, nv), a row each in the metric of the mass, M = L L^T.  scale: what a row's
+    length is compared with, so that one that has shrunk to nothing is not mistaken for a good one; a row of the scale 0
+    moves nothing.  QR decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each
+    row kept is the one that stands out most from those before.  Of rows that are no numbers the first ones are kept,
+    with the pivot 0.
+    """
+    from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
+
+    kept, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
+    if not count:
+        return kept, 1.0
+    compared = spread / np.where(scale > 0.0, scale, 1.0)[:, None]
+    if not np.isfinite(compared).all():
+        kept[:count] = True
+        return kept, 0.0
+    R, order = qr(compared.T, mode="r", pivoting=True)
+    kept[order[:count]] = True
+    return kept, float(R[count - 1, count - 1] ** 2)
+
+
+def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
+    """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
+
+    Not less than a small share of the row's natural length: rows that are nothing but rounding must stay small.
+    """
+    kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
+    lengths = np.linalg.norm(spread, axis=1)
+    for line in model.arrays.table(m.CLOSURES):
+        span = slice(line["row0"], line["row0"] + line["n_rows"])
+        for kind in (0, 1):
+            mine = np.flatnonzero(kinds[span] == kind) + span.start
+            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), NOTHING * natural[mine])
+    return scales
+
+
+def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Length in the metric of the mass that each closure row would have if nothing cancelled in it; shape (rows,).
+
+    columns: rows of the work space's table COLUMNS; points: origins of all sites, (sites, 3);
+    factor: L of the mass matrix.  A turn counts with the mechanism's size as its arm, which only rounding resolves.
+    All are 0 where the mass matrix has no factor.
+    """
+    from scipy.linalg import solve_triangular
+
+    arrays, found = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
+    if not np.all(factor.diagonal() > 0.0):
+        return found
+    kinds, entries = arrays.table(m.CLOSURE_ROWS)["kind"], arrays.table(m.ENTRIES)
+    support = arrays.table(m.SUPPORT)["coordinate"]
+    inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
+    for c in arrays.table(m.CLOSURES):
+        mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
+        turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
+        angle = np.linalg.norm(turn, axis=1)
+        way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.mechanism.length * angle
+        share = mobility[support[c["support0"] + mine["slot"]]]
+        rows = slice(c["row0"], c["row0"] + c["n_rows"])
+        along, about = (np.sqrt(np.sum(size**2 * share)) for size in (way, angle))
+        found[rows] = np.where(kinds[rows] == 0, along, about)
+    return found
+
+
+def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
+    """Write into h, a copy of the system's wiring, that the `kept` rows are solved for.
+
+    kept: per row of the closure table.  No size and no offset changes except the number of rows solved for.
+    """
+    all_rows = model.arrays.table(m.CLOSURES)
+    closures, rows = model.arrays.table(m.CLOSURES, h), model.arrays.table(m.CLOSURE_ROWS, h)
+    declared = model.arrays.table(m.CLOSURE_ROWS)
+    start = 0
+    for closure, was in zip(closures, all_rows, strict=True):
+        span = slice(was["row0"], was["row0"] + was["n_rows"])
+        order = np.argsort(~kept[span], kind="stable")
+        rows[span] = declared[span][order]
+        closure["kept0"], closure["n_kept"] = start, np.sum(kept[span])
+        start += int(closure["n_kept"])
+    envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
+    envelope["first"][:start], envelope["start"][:start] = closure_envelope(
+        closures, model.arrays.table(m.CLOSURE_PAIRS)
+    ).T
+    h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
+
+
+def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
+    """Kept rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
+
+    stored: JACOBIAN or SPREAD of the work space, shape (..., size).
+    """
+    support = model.arrays.table(m.SUPPORT)["coordinate"]
+    full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.numbering.nv))
+    for c in model.arrays.table(m.CLOSURES, h):
+        count, slots = int(c["n_kept"]), int(c["n_support"])
+        columns = support[c["support0"] : c["support0"] + slots]
+        block = stored[..., c["jacobian0"] : c["jacobian0"] + count * slots]
+        block = block.reshape(*stored.shape[:-1], slots, count)
+        full[..., c["kept0"] : c["kept0"] + count, columns] = np.swapaxes(block, -1, -2)
+    return full
+
+
+def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
+    """Place of each kept row among all, as residuals and their rates are stored."""
+    spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
+    return np.array([k for span in spans for k in span], dtype=np.int64)
+
+
+def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
+    """Name of the joint to which each kept row belongs."""
+    names = [model.mechanism.closures[k][0].name for k in model.closure_order]
+    counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
+    return [name for name, count in zip(names, counts, strict=True) for _ in range(count)]
