@@ -11,7 +11,6 @@ from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.linear.bench import Bench, balance, hold, set_drives
 from pipeline.dynamics.linear.settle import Settled, settle
-from pipeline.dynamics.linear.tangent import scales
 from pipeline.dynamics.run.engine import Progress
 
 #: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
@@ -47,7 +46,7 @@ def _require_steady(bench: Bench, found: Settled) -> None:
     set_drives(bench, onward)
     after = balance(bench, found.at.q)
     set_drives(bench, bench.drives)
-    size = scales(bench)
+    size = bench.engine.model.speed_scales
     change = float(np.max(np.abs(after.bias - before.bias) * size, initial=0.0))
     largest = float(np.max(np.abs(before.bias) * size, initial=0.0))
     loops = float(np.max(np.abs(before.slip), initial=0.0))

@@ -21,8 +21,11 @@ from pipeline.dynamics.model.tree import PATH
 #: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-#: misses below this share of the speeds asked for are rounding
-RIGID = 1e-9
+#: misses below this share of the speeds asked for are rounding; speeds that contradict each other miss by more than
+#: this share
+RIGID, CONTRADICTS = 1e-9, 1e-6
+#: combinations of speeds that change rates by less than this share of the largest change nothing: redundant closures
+REDUNDANT = 1e-9
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
 
@@ -89,35 +92,44 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
     told, arms = ~np.isnan(given), _arms(model, wanted)
 
+    unit, L = model.speed_scales, model.mechanism.length
+    lengths = np.tile([1.0] * 3 + [L] * 3, len(wanted))[told]
+    opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
+
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
-        return np.concatenate([_twists(frames, *arms)[told], opening])
+        return np.concatenate([_twists(frames, *arms)[told] / lengths, opening / opening_lengths])
 
     base = rates(y)
     columns = []
     for k in range(nv):
         moved = y.copy()
-        moved[nq + k] = 1.0
+        moved[nq + k] = unit[k]
         columns.append(rates(moved) - base)
     matrix = np.array(columns).T.reshape(len(base), nv)
-    target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
+    asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
+    target = asked - base
+    # a radian, or the mechanism's size, in the time of the whole run is slow
+    slow = 1.0 / (scene.time.end - scene.time.start)
+    fastest = slow + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
     speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
+    if miss > RIGID * fastest:
         speeds, miss = _least(matrix, target)
-    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
+    if wanted and miss > CONTRADICTS * fastest:
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g})",
+            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
+            "mechanism's size, or radians, per second)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[nq : nq + nv] = speeds
+    y[nq : nq + nv] = unit * speeds
     return y
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
-    """The least speeds that come nearest to the target, and by how much they miss it."""
-    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
+    """The least speeds that come nearest to the target, and by how much they miss it; all in their natural units."""
+    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=REDUNDANT)
     return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))
 
 

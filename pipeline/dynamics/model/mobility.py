@@ -161,7 +161,7 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
 def _refuse_locked(model: Model, found: Mobility, here: Rates) -> None:
     if found.mobility > 0 or model.numbering.known > 0:
         return
-    least = float(here.values[here.rank - 1])
+    least = float(np.min(here.values[: here.rank], initial=1.0))
     hardly = (
         f"; one of these rows is only {least:.1g} of its natural size, as of joints whose axes hardly miss each other"
         if least < SLIGHT

@@ -127,7 +127,9 @@ def prepare(model: Model, progress: Progress) -> Engine:
     entry = fuse.entry(model.kinds, scheme, lambda text: progress(None, text))
     h, kept = model.arrays.h.copy(), np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     entry.connect(h)
-    return Engine(model, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    engine = Engine(model, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    engine.view(m.CONTROL, m.N_CONTROLS)[m.LENGTH] = model.mechanism.length
+    return engine
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
