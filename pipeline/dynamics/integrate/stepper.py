@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.closures import keep_scales
 from pipeline.dynamics.equations.projection import largest
 from pipeline.dynamics.integrate.rows import hold_modes, snapshot
-from pipeline.dynamics.integrate.scales import keep_scales
 from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
 from pipeline.dynamics.integrate.stiffness import detect
 from pipeline.dynamics.kernels import kernel

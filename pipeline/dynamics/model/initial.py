@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import Ground
+from pipeline.core.scene.parts import Ground, RigidBody
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.chain import path_positions
 from pipeline.dynamics.model.constraints import outboard_place
+from pipeline.dynamics.model.deformation import shift
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.flexible_bodies import bow
 from pipeline.dynamics.model.loads import order
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
@@ -72,7 +75,8 @@ def _world(model: Model, frame: str) -> Placement:
 def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
-    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
     Raises InputError when joints and drives do not allow the velocities.
     """
     scene, numbering = model.scene, model.numbering
@@ -90,7 +94,7 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     nq, nv = numbering.nq, numbering.nv
     y[nq : nq + nv] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told, arms = ~np.isnan(given), _arms(model, wanted)
+    told, centres = ~np.isnan(given), _centres(model, wanted)
 
     unit, L = model.speed_scales, model.mechanism.length
     lengths = np.tile([1.0] * 3 + [L] * 3, len(wanted))[told]
@@ -98,7 +102,8 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
-        return np.concatenate([_twists(frames, *arms)[told] / lengths, opening / opening_lengths])
+        moving = [centre.motion(frames, state[:nq], state[nq : nq + nv]) for centre in centres]
+        return np.concatenate([np.array(moving).ravel()[told] / lengths, opening / opening_lengths])
 
     base = rates(y)
     columns = []
@@ -137,21 +142,45 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
     return [np.nan] * 3 if given is None else list(given)
 
 
-def _arms(model: Model, bodies: dict) -> tuple[np.ndarray, np.ndarray]:
-    """Number of each body's link, (n,), and its centre of mass in the link's frame, (n, 3)."""
-    links = [model.mechanism.link_of[name] for name in bodies]
-    places = [model.mechanism.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
-    coms = [np.array(getattr(body, "com", (0.0, 0.0, 0.0))) for body in bodies.values()]
-    arms = [place.p + place.R @ com for place, com in zip(places, coms, strict=True)]
-    return np.array(links, dtype=int), np.array(arms).reshape(len(links), 3)
+@dataclass(frozen=True)
+class _Centre:
+    """Centre of mass of a body: its place in the frame of its link, undeformed.
+
+    shape, bow: its shift with the modal coordinates, from q0 and with the speeds from c0 on, as in `deformation.shift`.
+    """
+
+    link: int
+    place: np.ndarray
+    shape: np.ndarray
+    bow: np.ndarray | None = None
+    q0: int = 0
+    c0: int = 0
+
+    def motion(self, frames: np.ndarray, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Angular velocity of the body and velocity of this point, world axes, shape (6,)."""
+        modes, frame = self.shape.shape[1], frames[self.link]
+        bent, bending = q[None, self.q0 : self.q0 + modes], u[None, self.c0 : self.c0 + modes]
+        moved, rate, _ = shift(self.shape, self.bow, bent, bending, np.zeros((1, modes)))
+        R = frame[m.FRAME.axes : m.FRAME.axes + 9].reshape(3, 3)
+        omega, v = (frame[o : o + 3] for o in (m.FRAME.omega, m.FRAME.velocity))
+        return np.concatenate([omega, v + np.cross(omega, R @ (self.place + moved[0])) + R @ rate[0]])
 
 
-def _twists(link_frames: np.ndarray, links: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """Angular velocity and velocity of the centre of mass of each body, flattened."""
-    frames = link_frames[links]
-    omega, v = frames[:, m.FRAME.omega : m.FRAME.omega + 3], frames[:, m.FRAME.velocity : m.FRAME.velocity + 3]
-    turned = np.einsum("nij,nj->ni", frames[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3), arms)
-    return np.hstack([omega, v + np.cross(omega, turned)]).ravel()
+def _centres(model: Model, bodies: Iterable[str]) -> list[_Centre]:
+    """The centres of mass of bodies, in their order."""
+    mechanism, numbering, found = model.mechanism, model.numbering, []
+    for name in bodies:
+        i = mechanism.link_of[name]
+        place, body = mechanism.links[i].places[name], mechanism.scene.body[name]
+        if isinstance(body, RigidBody):
+            found.append(_Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0))))
+            continue
+        bundle, bent = mechanism.bundles[name], bow(mechanism, name)
+        mass = float(bundle["mass"])
+        first, shape = (bundle[key].values / mass for key in ("first_moment", "modal_first_moment"))
+        bent = None if bent is None else bent / mass
+        found.append(_Centre(i, first, shape, bent, numbering.flex_q0[i], numbering.flex_c0[i]))
+    return found
 
 
 def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

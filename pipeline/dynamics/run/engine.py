@@ -9,15 +9,17 @@ from typing import Any
 import numpy as np
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile import functions as fuse
 from pipeline.dynamics.equations import observation as observing
-from pipeline.dynamics.integrate.method import scheme_of
+from pipeline.dynamics.integrate.method import Method, scheme_of
 from pipeline.dynamics.model import initial, selection
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
+INTEGRATORS = "pipeline.dynamics.integrate"
 Progress = Callable[[float | None, str], None]
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
@@ -35,6 +37,7 @@ class Engine:
 
     model: Model
     entry: fuse.Entry
+    method: Method
     h: np.ndarray
     kept: np.ndarray
     mobility: Mobility
@@ -75,7 +78,7 @@ class Engine:
 
     def view(self, place: int, length: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
-        o = self.model.arrays.offset(place)
+        o = self.h[place]
         return self.w[o : o + length]
 
     def table(self, table: Any, count: int) -> np.ndarray:
@@ -123,11 +126,13 @@ def prepare(model: Model, progress: Progress) -> Engine:
     if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
     scheme = scheme_of(scene.solver)
-    w, n = model.arrays.work_space()
     entry = fuse.entry(model.kinds, scheme, lambda text: progress(None, text))
-    h, kept = model.arrays.h.copy(), np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
+    method = lookup(INTEGRATORS, scene.solver.integrator, where="[solver.integrator]")
+    h, w, n = model.arrays.work_space(method.room)
+    kept = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     entry.connect(h)
-    engine = Engine(model, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    end, rtol = scene.time.end, scene.solver.rtol
+    engine = Engine(model, entry, method, h, kept, mobility, w, n, scene.time.start, end, rtol)
     engine.view(m.CONTROL, m.N_CONTROLS)[m.LENGTH] = model.mechanism.length
     return engine
 

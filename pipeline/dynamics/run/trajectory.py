@@ -136,7 +136,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
     control[:] = 0.0
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.mechanism.length
-    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, model.method.parameter(scene.solver)
+    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, engine.method.parameter(scene.solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[n[m.MODE] :] = 0
     n[m.CAP] = scene.solver.evaluations
@@ -223,7 +223,7 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
 def _crawls(engine: Engine, run: _Run) -> bool:
     """Whether stability limits the steps so much that the run would take far too long."""
     n, control = run.n, engine.view(m.CONTROL, m.N_CONTROLS)
-    if engine.model.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
+    if engine.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
         return False
     done = max((control[m.TIME] - engine.start) / control[m.SPAN], 1e-12)
     too_many = min(HOPELESS, n[m.CAP])
