@@ -23,8 +23,9 @@ from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, sites
 from pipeline.dynamics.model.tree import PATH
 
-#: displacements, in radians and shares of the mechanism's size, of the poses nearby
-NEARBY = (0.03, 0.01)
+#: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
+#: how many are enough; share of the displacement that such a pose must keep when its loops are closed
+NEARBY, TRIES, ENOUGH, LEFT = (0.03, 0.01), 24, 2, 0.1
 #: share of a self-stress that a joint must carry for its reaction to count as undetermined
 CARRIES = 1e-6
 #: condition numbers are not told apart from infinity above this
@@ -84,25 +85,39 @@ def analyse(model: Model) -> Mobility:
 
 
 def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
-    """Poses nearby in which the closures have a higher rank than at the start, if there are any."""
+    """Poses nearby in which the closures have a higher rank than at the start, if there are any.
+
+    Of a redundant mechanism all poses nearby have the rank of the start.  From a singular pose a random way need not
+    lead onto a branch of the motion: it may not close, or close back to where it began, which tells nothing.
+    """
     flexible = any(link.flexible for link in model.mechanism.links)
     paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in model.mechanism.links)
     if here.rank == model.numbering.nv or flexible or paths:
         return None
-    joints = constraints(model.mechanism)
-    poses = [link.start for link in model.mechanism.links]
+    joints, start = constraints(model.mechanism), [link.start for link in model.mechanism.links]
     random = np.random.default_rng(0)
-    for size in NEARBY:
+    left, stayed, told = [(here.rank, start)], [(here.rank, start)], 0
+    for k in range(TRIES):
         share = random.normal(size=here.free.shape[1])
         motion = here.free @ (share / np.linalg.norm(share))
-        start = _displaced(model, poses, size * motion / max(1.0, float(np.linalg.norm(motion))))
-        closed = close(model.mechanism, joints, start)
+        motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
+        closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
             continue
         there = [link.start for link in settled(model.mechanism, closed).links]
-        if rates(model, there).rank > here.rank:
-            return there
-    return None
+        away = _distance(start, there, model.mechanism.length) > LEFT * NEARBY[k % 2]
+        (left if away else stayed).append((rates(model, there).rank, there))
+        told += away
+        if told == ENOUGH:
+            break
+    rank, poses = max(left if told else stayed, key=lambda found: found[0])
+    return poses if rank > here.rank else None
+
+
+def _distance(one: Sequence[Placement], other: Sequence[Placement], length: float) -> float:
+    """How far the farthest link has gone, in shares of the mechanism's size, or turned [rad]."""
+    ways = [np.linalg.norm(a.p - b.p) / length + np.linalg.norm(a.R - b.R) for a, b in zip(one, other, strict=True)]
+    return float(max(ways))
 
 
 def _singular_start(model: Model, here: Rates) -> str:
