@@ -144,9 +144,11 @@ def scene(made: Mechanism, random: Random, setting: Setting, **more: object) -> 
     for name, com in here.bodies.items():
         mass = setting.density * setting.size**3 * random.uniform(0.5, 2.0)
         at, vector = poses[name]
+        inward = rotation_vector_to_matrix(vector).T
+        moments = mass * setting.size**2 * inward @ R @ np.diag([0.04, 0.06, 0.07]) @ (inward @ R).T
         bodies[name] = {
-            "type": "rigid", "mass": mass, "com": (rotation_vector_to_matrix(vector).T @ (com - at)).tolist(),
-            "inertia": (mass * setting.size**2 * np.array([0.04, 0.06, 0.07])).tolist(),
+            "type": "rigid", "mass": mass, "com": (inward @ (com - at)).tolist(),
+            "inertia": (0.5 * (moments + moments.T)).tolist(),
             "pose": {"position": at.tolist(), "rotation_vector": vector.tolist()}, "frames": {},
         }  # fmt: skip
     joints = {}

@@ -93,7 +93,7 @@ def bennett(random: Random) -> Mechanism:
 
 
 def bricard(random: Random, symmetry: str) -> Mechanism:
-    """Six hinges: three are the others' half turn about a line; or two lie in a plane, and two others are mirrored in it.
+    """Six hinges: three are the others' half turn about a line; or two lie in a plane in which two others are mirrored.
 
     Bricard (1897), J. de mathematiques pures et appliquees 5(3), 113-148.
     """

@@ -51,7 +51,7 @@ def test_a_mechanism_moves_as_its_construction_says(name: str) -> None:
     known_mobility(made, random, movable.any_setting(random))
 
 
-@pytest.mark.parametrize("number", range(40))
+@pytest.mark.parametrize("number", range(30))
 def test_mechanisms_that_share_no_loop_add_their_mobilities(number: int) -> None:
     several(number)
 
@@ -59,13 +59,13 @@ def test_mechanisms_that_share_no_loop_add_their_mobilities(number: int) -> None
 @pytest.mark.slow
 @pytest.mark.parametrize("name", UNITS)
 def test_a_mechanism_moves_whatever_its_dimensions(name: str) -> None:
-    for number in range(20):
+    for number in range(10):
         random = np.random.default_rng([*seed(name), number])
         known_mobility(UNITS[name](random), random, movable.any_setting(random))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("hundred", range(8))
+@pytest.mark.parametrize("hundred", range(4))
 def test_many_more_mechanisms_add_their_mobilities(hundred: int) -> None:
     for number in range(100):
         several(100 * (hundred + 1) + number)
