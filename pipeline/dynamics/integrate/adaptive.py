@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import singular_step as straddle
+from pipeline.dynamics.integrate import singular_step
+from pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
 from pipeline.dynamics.integrate.singular_step import steer
-from pipeline.dynamics.integrate.stepper import FAILED, finite, scaled_norm, set_magnitudes
+from pipeline.dynamics.integrate.stepper import FAILED
 from pipeline.dynamics.kernels import kernel
 
 # the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
@@ -29,15 +30,15 @@ STRICTER = 10.0
 STRETCH = 1.1
 
 
-def compose(
+def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
+    """The kernels first_step, error_norm, after_rejection, next_step, choose_step and foresee of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
     steady, gap = method.steady, method.gap
-    start_watch, closed = contacts
+    watch_start, any_closed = contacts
 
     @kernel
     def first_step(h, f, w, n):
@@ -49,8 +50,8 @@ def compose(
         if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
             n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
             return False
-        start_watch(h, w)
-        set_magnitudes(h, f, w, y)
+        watch_start(h, w)
+        set_error_scales(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
         step = 1e-6 * w[c + m.SPAN]
         if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
@@ -65,7 +66,7 @@ def compose(
             steepness = max(steepness, scaled_norm(h, w, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        if closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
+        if any_closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
             step = min(step, w[c + m.TOUCHED_STEP])
         w[c + m.STEP] = step
         w[c + m.FIRST], w[c + m.REJECTED_STEP] = 1.0, 0.0
@@ -75,10 +76,10 @@ def compose(
         return True
 
     @kernel
-    def judge(h, f, w, n, step):
+    def error_norm(h, f, w, n, step):
         """Error norm of the step to Y_NEW, 1 at the tolerance."""
-        set_magnitudes(h, f, w, h[m.Y_NEW])
-        if closed(h, n):
+        set_error_scales(h, f, w, h[m.Y_NEW])
+        if any_closed(h, n):
             for g in range(h[m.N_GROUPS]):
                 w[h[m.MAGNITUDE] + g] /= STRICTER
         return error(h, f, w, n, step)
@@ -110,7 +111,7 @@ def compose(
     def next_step(h, w, n, step, norm):
         """Length of the step after the one that has just been accepted."""
         c = h[m.CONTROL]
-        if w[c + m.FIRST] > 0.0 and closed(h, n):
+        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
             w[c + m.TOUCHED_STEP] = step
         w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
         norm = max(norm, LEAST_NORM)
@@ -120,8 +121,8 @@ def compose(
         return step if 1.0 <= growth < steady else step * growth
 
     @kernel
-    def lay(h, w, t):
+    def choose_step(h, w, t):
         """Length of the step to try from t: as planned, unless a singular pose is ahead."""
         return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, STRETCH)
 
-    return first_step, judge, after_rejection, next_step, lay, straddle.compose(evaluate)
+    return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)

@@ -10,17 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.closures import keep_scales
-from pipeline.dynamics.equations.projection import largest
-from pipeline.dynamics.integrate.rows import hold_modes, snapshot
+from pipeline.dynamics.equations.projection import keep_scales, largest
+from pipeline.dynamics.integrate.norms import finite
+from pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
 from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
-from pipeline.dynamics.integrate.stiffness import detect
+from pipeline.dynamics.integrate.stiffness import make_detect_stiffness
 from pipeline.dynamics.kernels import kernel
 
-#: what settle returns for an event after which integration starts afresh; another positive number only records it
+#: what resolve_events returns for an event after which integration starts afresh; another positive number only
+#: records it
 RESTART = 1
 #: share of the mechanism's size to which closures are closed before a singular pose
 TIGHTLY = 1e-15
@@ -30,40 +29,6 @@ MOST_BLIND = 20.0
 FAILED = 1e9
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
-
-
-@kernel
-def set_magnitudes(h, f, w, y):
-    """Scale of each error group: tolerance times its floor plus the length of its vector at the step's ends.
-
-    The length, not the largest component: that would depend on the axes in which a scene is written.
-    """
-    magnitudes, o = h[m.MAGNITUDE], h[m.Y]
-    for g in range(h[m.N_GROUPS]):
-        w[magnitudes + g] = 0.0
-    for c in range(h[m.NY]):
-        g = magnitudes + m.GROUPS.group(h, c)
-        w[g] += 0.5 * (w[y + c] ** 2 + w[o + c] ** 2)
-    for g in range(h[m.N_GROUPS]):
-        w[magnitudes + g] = w[h[m.CONTROL] + m.RTOL] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[magnitudes + g]))
-
-
-@kernel
-def scaled_norm(h, w, a):
-    """Root mean square of the stretch of w from a, in units of the magnitudes."""
-    total = 0.0
-    for c in range(h[m.NY]):
-        total += (w[a + c] / w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]) ** 2
-    return np.sqrt(total / h[m.NY])
-
-
-@kernel
-def finite(h, w, a):
-    """Whether the stretch of w from a holds numbers only."""
-    result = True
-    for c in range(h[m.NY]):
-        result &= abs(w[a + c]) <= 1e300
-    return result
 
 
 @kernel
@@ -77,36 +42,41 @@ def none_closed(h, n):
     return False
 
 
-def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-    """The stepper without root finding."""
+def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+    """The kernel resolve_events of a stepper that looks for none."""
 
     @kernel
-    def settle(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, events):
         return 0, False, t_new, step
 
-    return settle
+    return resolve_events
 
 
-def compose(
+#: `events` of scenes without contacts
+NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
+
+
+def make_advance(
     evaluate: Callable,
     project: Callable,
     retract: Callable,
     method: Any,
-    stepping: Callable,
-    contact_events: tuple[Callable, Callable, Callable],
+    stepping: Any,
+    events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
-    stepping: `compose` of `adaptive` or `fixed`.
-    contact_events: start_watch, make_settle and closed of `events` or `step_ends`, or those that do nothing.
+    stepping: the module `adaptive` or `fixed`.
+    events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    begin, attempt, error, extend, keep = method.compose(evaluate, retract)
-    interpolate, last, ends = method.interpolate, method.last, method.ends
-    start_watch, make_settle, closed = contact_events
-    settle = make_settle(evaluate, attempt, extend, project, method)
-    feel = detect(method)
-    first_step, judge, after_rejection, next_step, lay, foresee = stepping(
-        evaluate, (start_watch, closed), begin, error, method
+    begin, attempt, error, extend, keep = method.make_kernels(evaluate, retract)
+    last, ends = method.last, method.ends
+    watch_start, make_resolve_events, any_closed = events
+    resolve_events = make_resolve_events(evaluate, attempt, extend, project, method)
+    record_outputs = make_record_outputs(extend, method.interpolate)
+    detect_stiffness = make_detect_stiffness(method)
+    first_step, error_norm, after_rejection, next_step, choose_step, foresee = stepping.make_step_control(
+        evaluate, (watch_start, any_closed), begin, error, method
     )
 
     @kernel
@@ -131,20 +101,6 @@ def compose(
         else:
             return False
         return True
-
-    @kernel
-    def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
-        """Snapshots at the output times up to t_end, from the dense output."""
-        t = w[h[m.CONTROL] + m.TIME]
-        while n[m.NEXT_OUTPUT] < outputs.shape[0] and outputs[n[m.NEXT_OUTPUT]] <= t_end:
-            wanted = outputs[n[m.NEXT_OUTPUT]]
-            if wanted > t:
-                if not ready:
-                    extend(h, f, w, n, step)
-                    ready = True
-                interpolate(h, w, (wanted - t) / step, h[m.Y_STAGE])
-                snapshot(h, w, n, rows, wanted, h[m.Y_STAGE])
-            n[m.NEXT_OUTPUT] += 1
 
     @kernel
     def finish(h, f, w, n, t_new):
@@ -174,7 +130,7 @@ def compose(
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
         if not attempt(h, f, w, n, step):
             return FAILED
-        norm = judge(h, f, w, n, step)
+        norm = error_norm(h, f, w, n, step)
         if norm != norm:
             n[m.EVALUATION] = m.NOT_FINITE
             return FAILED
@@ -182,7 +138,7 @@ def compose(
             return min(norm, FAILED)
         if not finish(h, f, w, n, t_new):
             return FAILED
-        feel(h, w, n, step)
+        detect_stiffness(h, w, n, step)
         return norm
 
     @kernel
@@ -207,7 +163,7 @@ def compose(
                     return
                 note(h, w)
                 forget(h, w, t)
-            step = lay(h, w, t)
+            step = choose_step(h, w, t)
             final = t + 1.0001 * step >= w[c + m.END]
             if final:
                 step = w[c + m.END] - t
@@ -226,7 +182,7 @@ def compose(
                 continue
             following = next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
+            happened, ready, t_new, step = resolve_events(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
             n[m.STEPS] += 1
