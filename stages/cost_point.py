@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.workflow.progress import silent
 from stages.kernels import warm
 from stages.s4_simulate import bundles, rebuild
 
@@ -41,14 +42,14 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     try:
         while not seconds or (len(seconds) < REPEATS and sum(seconds) < LONG):
             begun = time.process_time()
-            done = dynamics.simulate(scene, reduced, progress if not seconds else _silent)
+            done = dynamics.simulate(scene, reduced, progress if not seconds else silent)
             seconds.append(time.process_time() - begun)
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     chosen = [quantities.parse(name, scene.owners()) for name in params["quantities"]]
     kept = quantities.keep(done, chosen)
     kept["cpu_repeat"] = (("repeat",), seconds, {"units": "s", "long_name": "processor time of a warm run"})
-    costs = {"evaluations": done.attrs["evaluations"], "peak_memory": _memory()}
+    costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
     return {"nc": kept.assign_attrs(**costs, **_twin(done), **_contacts(scene))}
 
@@ -83,11 +84,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
 
 
-def _silent(fraction: float | None, text: str) -> None:
-    """Reports would be part of what is measured."""
-
-
-def _memory() -> int:
+def peak_memory() -> int:
     """Largest resident memory of this process so far [B]."""
     import resource
     import sys

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.workflow.progress import silent
 from stages.s4_simulate import rebuild
 
 if TYPE_CHECKING:
@@ -97,9 +98,6 @@ def paper_scene(scene: Scene) -> Scene:
 
 def _simulation(bundles: Mapping[str, xr.Dataset]) -> Callable[[Scene], xr.Dataset]:
     from pipeline import dynamics
-
-    def silent(fraction: float | None, text: str) -> None:
-        """Reports would be part of what is measured."""
 
     return lambda scene: dynamics.simulate(scene, bundles, silent)
 
