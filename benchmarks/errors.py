@@ -9,17 +9,29 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicHermiteSpline
 
-from benchmarks.engines import Mechanism, silent, with_tolerance
-from benchmarks.exudyn_runs import SAMPLING, Samples
-from benchmarks.measure import once
+from benchmarks.mechanisms import Mechanism
+from benchmarks.timing import once
 from pipeline import dynamics
+from pipeline.core.scene.load import edited
+from pipeline.core.workflow.progress import silent
 from pipeline.dynamics.integrate.engine import consistent_start
 from pipeline.dynamics.integrate.trajectory import integrate
 from pipeline.dynamics.run import observed
 
+#: two codes are compared at multiples of this [s]
+SAMPLING = 1e-3
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 #: the reference; its rows are so dense that cubic interpolation between them does not show
 FINEST, DENSE = 1e-13, 1e-5
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Motion of a body's centre of mass: time [s], shape (n,); position [m] and velocity [m/s], shape (n, 3)."""
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -70,7 +82,7 @@ class Reference:
 
 def converged(here: Mechanism, body: str, horizon: float) -> Reference:
     """Our run at the tightest tolerance."""
-    scene = with_tolerance(here.scene, FINEST, DENSE)
+    scene = edited(here.scene, {"solver.rtol": FINEST, "output.interval": DENSE})
     motion = dynamics.simulate(scene, here.bundles, silent).sel(body=body)
     time, x, v, a = (motion[name].values for name in ("time", "position", "velocity", "acceleration"))
     place, speed = CubicHermiteSpline(time, x, v), CubicHermiteSpline(time, v, a)
@@ -93,10 +105,10 @@ def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
     """Our runs at all tolerances."""
     rungs = []
     for rtol in TOLERANCES:
-        edited = here.with_scene(here.name, with_tolerance(here.scene, rtol, SAMPLING))
-        run = dynamics.simulate(edited.scene, edited.bundles, silent)
+        scene = edited(here.scene, {"solver.rtol": rtol, "output.interval": SAMPLING})
+        run = dynamics.simulate(scene, here.bundles, silent)
         error = reference.error(_regular(run.sel(body=body)))
-        rungs.append(Rung(rtol, int(run.attrs["evaluations"]), error, _timer(edited)))
+        rungs.append(Rung(rtol, int(run.attrs["evaluations"]), error, _timer(here.with_scene(here.name, scene))))
     return rungs
 
 
@@ -112,3 +124,8 @@ def _timer(here: Mechanism) -> Callable[[], float]:
     start, _ = consistent_start(engine)
     # with the rows evaluated, as the peer evaluates its samples
     return lambda: once(lambda: observed(engine, integrate(engine, start, silent)))
+
+
+def cheapest(rungs: list[Rung], good: Callable[[Error], bool]) -> Rung | None:
+    """Our run with the fewest evaluations whose error is good."""
+    return min((rung for rung in rungs if good(rung.error)), key=lambda rung: rung.evaluations, default=None)

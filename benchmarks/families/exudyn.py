@@ -1,31 +1,29 @@
 """Whole runs against Exudyn at equal error, both against the same converged reference.
 
-The reference is our run at rtol 1e-13; Exudyn's error against it falls with its step, which confirms it independently.
-Error: largest deviation of the platform's velocity (and position) at multiples of 1 ms, where both codes also record
-it.  Each of Exudyn's runs is measured next to ours that is no worse in either and needs the fewest evaluations. Times
-are those of the whole integration with its samples; building the model and compiling are in neither.
+Each of Exudyn's runs is measured next to ours that is no worse in position and velocity and needs the fewest
+evaluations. Times are those of the whole integration with its samples; building the model and compiling are in neither.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from benchmarks import accuracy, exudyn_model, exudyn_runs
-from benchmarks.accuracy import Error, Reference, Rung
-from benchmarks.engines import Mechanism, damped, mechanism, without_friction
-from benchmarks.exudyn_model import load
-from benchmarks.exudyn_runs import METHODS, Outcome, solve
-from benchmarks.tables import short, table
+from benchmarks import errors
+from benchmarks.errors import Error, Reference, Rung
+from benchmarks.exudyn_model import METHODS, Outcome, solve
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
+from benchmarks.page import short
 from pipeline.core.scene.schema import Scene
+from pipeline.post.plotting.table import pipe_table
 
-TITLE = "Whole runs against Exudyn"
-#: modules whose texts belong to what the page says
-EXPLAINED_BY = (exudyn_model, exudyn_runs)
 BODY = "platform"
 #: shares of the largest speed for which the times needed are compared
 LEVELS = (1e-2, 1e-3, 1e-4)
@@ -36,102 +34,107 @@ SMOOTH = (1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 STIFF = (5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
 #: the second method is no better in the long run; it takes part at the first steps of each ladder
 TRIED = 4
-INSTALL = "exudyn is not installed; to compare with it: .venv/bin/python -m pip install -e '.[exudyn]'"
 
 
 @dataclass(frozen=True)
-class Case:
-    """A scene, edited or not. horizon: end of the comparison [s]; own_law: Exudyn has another friction law."""
+class Comparison:
+    """A scene, edited or not.
 
-    title: str
+    horizon: end of the comparison [s].  own_law: Exudyn has another friction law.
+    study: the cost study in whose figure its runs are points.  note: how they differ from that scene.
+    """
+
     scene: str
-    edit: Callable[[Scene], Scene]
     steps: tuple[float, ...]
+    edit: Callable[[Scene], Scene] = field(default=lambda scene: scene, repr=False)
     horizon: float | None = None
     own_law: bool = False
+    study: str = ""
+    note: str = ""
 
 
-CASES = (
-    Case("ideal", "ideal", lambda scene: scene, SMOOTH),
-    Case("far_cb", "far_cb", lambda scene: scene, SMOOTH),
-    Case("csj without friction", "csj", without_friction, STIFF),
-    Case("csj, each code with its own friction law", "csj", lambda scene: scene, STIFF, own_law=True),
-    Case(
-        "far_csj_cb without friction, 5 % modal damping",
-        "far_csj_cb",
-        lambda scene: damped(without_friction(scene), 0.05),
-        STIFF,
+OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
+COMPARISONS = {
+    "ideal": Comparison("ideal", SMOOTH, study="sps4/ideal"),
+    "far_cb": Comparison("far_cb", SMOOTH, study="sps4/far_cb"),
+    "csj without friction": Comparison("csj", STIFF, without_friction),
+    "csj, each code with its own friction law": Comparison(
+        "csj", STIFF, own_law=True, study="sps4/csj", note=f"; {OWN_LAW}"
     ),
-    Case("far_csj_cb without friction, error up to 30 ms", "far_csj_cb", without_friction, STIFF, horizon=0.03),
-)
+    "far_csj_cb without friction, 5 % modal damping": Comparison(
+        "far_csj_cb",
+        STIFF,
+        lambda scene: damped(without_friction(scene), 0.05),
+        study="sps4/variants/far_csj_cb_damped",
+        note="; without friction",
+    ),
+    "far_csj_cb without friction, error up to 30 ms": Comparison(
+        "far_csj_cb",
+        STIFF,
+        without_friction,
+        horizon=0.03,
+        study="sps4/far_csj_cb",
+        note="; without friction; errors up to 30 ms",
+    ),
+}
 
 
-def measure() -> Iterator[dict[str, Any]]:
-    """One result per case; nothing when exudyn is not installed."""
-    try:
-        load()
-    except ImportError:
-        print(INSTALL)
-        return
-    for case in CASES:
-        yield _case(case)
+def edited(case: Case) -> Mechanism:
+    """The mechanism that both codes run."""
+    original = mechanism(case.of.scene)
+    return original.with_scene(case.name, case.of.edit(original.scene))
 
 
-def _case(case: Case) -> dict[str, Any]:
-    original = mechanism(case.scene)
-    here = original.with_scene(case.title, case.edit(original.scene))
-    horizon = case.horizon or here.scene.time.end
-    reference = accuracy.converged(here, BODY, horizon)
-    ours = accuracy.ladder(here, BODY, reference)
-    theirs, law, difference = reference, {}, None
-    if case.own_law:
-        finest = solve(here, BODY, next(iter(METHODS)), case.steps[-1])
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """Of each case a record on what is compared, then one for each of our runs and one for each of Exudyn's."""
+    for case in cases:
+        yield case, list(_records(case, edited(case)))
+
+
+def _records(case: Case, here: Mechanism) -> Iterator[Record]:
+    asked: Comparison = case.of
+    horizon = asked.horizon or here.scene.time.end
+    reference = errors.converged(here, BODY, horizon)
+    ours = errors.ladder(here, BODY, reference)
+    theirs, law, steps = reference, {}, asked.steps
+    if asked.own_law:
+        finest = solve(here, BODY, next(iter(METHODS)), steps[-1])
         if finest.samples is None:
-            raise RuntimeError(f"Exudyn fails on its finest run of {case.title}: {finest.failure}")
-        theirs, difference = accuracy.of_samples(finest.samples, horizon), reference.error(finest.samples)
-        law = {"difference_of_laws": _numbers(difference)}
-    steps = case.steps[:-1] if case.own_law else case.steps
-    settings = [(method, step) for k, method in enumerate(METHODS) for step in (steps[:TRIED] if k else steps)]
-    runs = [_run(here, method, step, theirs, ours) for method, step in settings]
-    return {
-        "case": case.title,
-        "horizon": horizon,
-        **law,
-        "ours": [{"rtol": r.rtol, "evaluations": r.evaluations, **_numbers(r.error)} for r in ours],
-        "exudyn": runs,
-        "levels": [_level(level, runs) for level in LEVELS],
-    }
+            raise RuntimeError(f"Exudyn fails on its finest run of {case.name}: {finest.failure}")
+        theirs, steps = errors.of_samples(finest.samples, horizon), steps[:-1]
+        law = {"difference_of_laws": _numbers(reference.error(finest.samples))}
+    yield {"horizon": horizon, "version": version("exudyn"), **law}
+    for r in ours:
+        yield {"by": "flexclear", "rtol": r.rtol, "evaluations": r.evaluations, **_numbers(r.error)}
+    for k, method in enumerate(METHODS):
+        for step in steps[:TRIED] if k else steps:
+            yield {"by": "exudyn", "method": method, "step": step, **_run(here, method, step, theirs, ours)}
 
 
 def _numbers(error: Error) -> dict[str, float]:
     return {"position_um": 1e6 * error.position, "velocity_mm_s": 1e3 * error.velocity, "relative": error.relative}
 
 
-def _run(here: Mechanism, method: str, step: float, reference: Reference, ours: list[Rung]) -> dict[str, Any]:
+def _run(here: Mechanism, method: str, step: float, reference: Reference, ours: list[Rung]) -> Record:
     """One of their runs, and next to it ours that match its error or one of the levels."""
-    found: dict[str, Any] = {"method": method, "step": step}
     first = solve(here, BODY, method, step)
     if first.samples is None:
-        return found | {"failed": first.failure}
+        return {"failed": first.failure}
     error = reference.error(first.samples)
-    wanted = {"equal": _cheapest(ours, lambda e: e.within(error))}
+    wanted = {"equal": errors.cheapest(ours, lambda e: e.within(error))}
     for level in LEVELS:
-        wanted[str(level)] = _cheapest(ours, partial(_reaches, level))
+        wanted[str(level)] = errors.cheapest(ours, partial(_reaches, level))
     seconds, timed = _side_by_side(here, method, step, first, [rung for rung in wanted.values() if rung])
     matches = {
         name: {"rtol": rung.rtol, "s": timed[rung.rtol], "ratio": seconds / timed[rung.rtol]}
         for name, rung in wanted.items()
         if rung
     }
-    return found | {"s": seconds, **_numbers(error), "ours": matches}
+    return {"s": seconds, **_numbers(error), "ours": matches}
 
 
 def _reaches(level: float, error: Error) -> bool:
     return error.relative <= level
-
-
-def _cheapest(ours: list[Rung], good: Callable[[Error], bool]) -> Rung | None:
-    return min((rung for rung in ours if good(rung.error)), key=lambda rung: rung.evaluations, default=None)
 
 
 def _side_by_side(
@@ -147,32 +150,14 @@ def _side_by_side(
     return float(np.median(theirs)), {rtol: float(np.median(times)) for rtol, times in ours.items()}
 
 
-def _level(level: float, runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """Their fastest run that reaches a level against ours; theirs may reach none, then its longest run is a bound."""
-    done = [r for r in runs if "s" in r and str(level) in r["ours"]]
-    reaching = [r for r in done if r["relative"] <= level]
-    best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"], default=None)
-    if best is None:
-        return {"level": level}
-    ours = best["ours"][str(level)]
-    return {
-        "level": level,
-        "reached": bool(reaching),
-        "method": best["method"],
-        "step": best["step"],
-        "exudyn_s": best["s"],
-        "ours_s": ours["s"],
-        "rtol": ours["rtol"],
-        "ratio": ours["ratio"],
-    }
-
-
-def show(results: list[dict[str, Any]]) -> str:
+def show(records: list[Record]) -> str:
     """Times needed for an accuracy, then every run of Exudyn with ours beside it."""
+    heads, runs = {r["case"]: r for r in records if "horizon" in r}, _runs(records)
+    levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
     head = ("velocity error below", "Exudyn [s]", "step [s]", "ours [s]", "rtol", "Exudyn / ours")
-    texts = [table(head, [_level_row(r["case"], level) for r in results for level in r["levels"]])]
     columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "rtol", "ours, no worse [s]", "ratio")
-    for r in results:
+    texts = [pipe_table(head, levels)]
+    for case, r in heads.items():
         note = f"error over {1e3 * r['horizon']:g} ms"
         if "difference_of_laws" in r:
             d = r["difference_of_laws"]
@@ -180,24 +165,79 @@ def show(results: list[dict[str, Any]]) -> str:
                 "; each against the converged solution of its own law, which differ by "
                 f"{short(d['position_um'])} um and {short(d['velocity_mm_s'])} mm/s"
             )
-        texts.append(f"{r['case']} ({note}):\n\n{table(columns, [_run_row(run) for run in r['exudyn']])}")
+        texts.append(f"{case} ({note}):\n\n{pipe_table(columns, [_run_row(run) for run in runs[case]])}")
     return "\n\n".join(texts)
 
 
-def _level_row(case: str, level: dict[str, Any]) -> list[str]:
-    name = f"{case}: {100 * level['level']:g} %"
-    if "ratio" not in level:
+def _runs(records: list[Record]) -> dict[str, list[Record]]:
+    """Exudyn's runs by case."""
+    found: dict[str, list[Record]] = {}
+    for r in records:
+        if r.get("by") == "exudyn":
+            found.setdefault(r["case"], []).append(r)
+    return found
+
+
+def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
+    """Their fastest run that reaches a level against ours; theirs may reach none, then its longest run is a bound."""
+    name = f"{case}: {100 * level:g} %"
+    done = [r for r in runs if "s" in r and str(level) in r["ours"]]
+    reaching = [r for r in done if r["relative"] <= level]
+    if not done:
         return [name, "", "", "", "", ""]
-    mark = "" if level["reached"] else "> "  # their finest run does not get there
-    seconds, step = f"{mark}{level['exudyn_s']:.3g}", f"{level['step']:g}"
-    return [name, seconds, step, f"{level['ours_s']:.3g}", f"{level['rtol']:g}", f"{mark}{level['ratio']:.3g}"]
+    best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
+    mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
+    seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
+    return [name, seconds, f"{best['step']:g}", f"{ours['s']:.3g}", f"{ours['rtol']:g}", ratio]
 
 
-def _run_row(run: dict[str, Any]) -> list[str]:
+def _run_row(run: Record) -> list[str]:
     name = f"{run['method']}, {run['step']:g} s"
     if "failed" in run:
         return [name, "failed", "", "", "", "", ""]
-    errors = [short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
+    cells = [short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
     equal = run["ours"].get("equal")
     matched = [f"{equal['rtol']:g}", f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""]
-    return [name, *errors, *matched]
+    return [name, *cells, *matched]
+
+
+def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
+    """By scene of a cost study its runs as `flexclear cost --peer` draws them: seconds [s] and errors [SI] by step."""
+    versions = {r["case"]: r["version"] for r in records if "version" in r}
+    return {
+        asked.study: list(_tracks(runs, f"Exudyn {versions[case]}", asked.note))
+        for case, runs in _runs(records).items()
+        if (asked := COMPARISONS[case]).study
+    }
+
+
+def _tracks(runs: list[Record], program: str, note: str) -> Iterator[dict[str, Any]]:
+    done = [run for run in runs if "s" in run]
+    for method in dict.fromkeys(run["method"] for run in done):
+        mine = [run for run in done if run["method"] == method]
+        yield {
+            "name": f"Exudyn, {method}",
+            "note": f"{program}: times of its integration alone, ours hold all that a run records{note}",
+            "seconds": [run["s"] for run in mine],
+            "error": {
+                f"{BODY}.position": [1e-6 * run["position_um"] for run in mine],
+                f"{BODY}.velocity": [1e-3 * run["velocity_mm_s"] for run in mine],
+            },
+        }
+
+
+def files(records: list[Record]) -> Mapping[str, bytes]:
+    """The file of those points."""
+    return {"accuracy/exudyn.json": f"{json.dumps(points(records), indent=1)}\n".encode()}
+
+
+FAMILY = Family(
+    what="whole runs against Exudyn at equal error",
+    takes="15 min",
+    page="benchmarks.md",
+    cases=lambda: [Case(name, asked) for name, asked in COMPARISONS.items()],
+    measure=measure,
+    show=show,
+    files=files,
+    needs=("exudyn", "exudyn"),
+)

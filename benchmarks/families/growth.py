@@ -1,8 +1,5 @@
 """What absent effects cost, and how the cost grows with the number of loops.
 
-An effect is absent when its part is: the fullest scene with its flexible rod replaced by a rigid one, or its clearance
-joint by an ideal one, must cost what the scene costs that never had them.
-
 The N-four-bar: N + 1 upright rods on revolute joints, their tops joined by N rods. In space, planar loops with
 revolute joints alone are redundant; here the joining rods have a spherical joint at each end and may spin about their
 own axes, which leaves the planar motion as it is and every closure independent.
@@ -10,43 +7,43 @@ own axes, which leaves the planar motion as it is and every closure independent.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from benchmarks.engines import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
-from benchmarks.measure import interleaved, slope
-from benchmarks.tables import percent, short, table
+from benchmarks.family import REFUSED, Case, Family, Measured, Record
+from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
+from benchmarks.page import percent, short, spread, table
+from benchmarks.timing import interleaved, slope
 from pipeline.core.errors import FlexclearError
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.integrate.engine import Engine
 
-TITLE = "Absent effects, and growth with the number of loops"
 LOOPS = (5, 10, 20, 40, 80)
+#: what the fullest scene loses, and the scene that never had it
+ABSENT = {"clearance and flexibility": "ideal", "flexibility": "csj", "clearance": "far_cb"}
 ROUNDS = 25
 #: evaluations of a round, for one loop or scene
 EVALUATIONS = 4000
 
 
-def measure() -> Iterator[dict[str, Any]]:
-    """Results of kind "absent", then of kind "loops"."""
-    ideal, csj = mechanism("ideal"), mechanism("csj")
-    far, full = mechanism("far_cb"), mechanism("far_csj_cb")
-    rigid = full.scene.model_copy(update={"body": full.scene.body | {"rod1": csj.scene.body["rod1"]}})
-    yield _absent("clearance and flexibility", full.with_scene("", without_clearance(rigid)), ideal)
-    yield _absent("flexibility", full.with_scene("", rigid), csj)
-    yield _absent("clearance", full.with_scene("", without_clearance(full.scene)), far)
-    yield from _loops()
+def cases() -> list[Case]:
+    """Absent effects, then numbers of loops."""
+    return [Case(effect) for effect in ABSENT] + [Case(f"{n} loops", n) for n in LOOPS]
 
 
-def _absent(effect: str, stripped: Mechanism, without: Mechanism) -> dict[str, Any]:
-    engines = {"stripped": stripped.engine(), "without": without.engine()}
-    tasks = {}
-    for label, engine in engines.items():
-        state = states(engine, trajectory(engine))["free"]
-        tasks[label] = lambda e=engine, s=state: evaluation_time(e, s, EVALUATIONS)
-    times = interleaved(tasks, ROUNDS)
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each; numbers of loops take turns."""
+    for case in cases:
+        if case.name in ABSENT:
+            yield case, [_absent(case.name)]
+    yield from _loops([case for case in cases if case.name not in ABSENT])
+
+
+def _absent(effect: str) -> Record:
+    full, without = mechanism("far_csj_cb"), mechanism(ABSENT[effect])
+    engines = {"stripped": stripped(full, effect).engine(), "without": without.engine()}
+    times = interleaved({label: _evaluation(engine, EVALUATIONS) for label, engine in engines.items()}, ROUNDS)
     return {
-        "kind": "absent",
-        "effect": effect,
         "scene": without.name,
         "same_code": engines["stripped"].entry == engines["without"].entry,
         "stripped_us": 1e6 * times["stripped"].median,
@@ -56,20 +53,31 @@ def _absent(effect: str, stripped: Mechanism, without: Mechanism) -> dict[str, A
     }
 
 
-def _loops() -> Iterator[dict[str, Any]]:
-    tasks, refused = {}, []
-    for n in LOOPS:
+def stripped(full: Mechanism, effect: str) -> Mechanism:
+    """The fullest scene with a rigid rod in place of its flexible one, an ideal joint in place of the loose one."""
+    scene = full.scene
+    if "flexibility" in effect:
+        scene = scene.model_copy(update={"body": scene.body | {"rod1": mechanism("csj").scene.body["rod1"]}})
+    return full.with_scene(effect, without_clearance(scene) if "clearance" in effect else scene)
+
+
+def _loops(cases: Sequence[Case]) -> Measured:
+    tasks = {}
+    for case in cases:
         try:
-            engine = Mechanism(f"{n} loops", four_bars(n), {}).engine()
-            state = states(engine, trajectory(engine))["free"]
+            engine = Mechanism(case.name, four_bars(case.of), {}).engine()
+            tasks[case.name] = _evaluation(engine, max(EVALUATIONS // case.of, 10))
         except FlexclearError as error:
-            refused.append({"kind": "loops", "loops": n, "skipped": str(error)})
-            continue
-        tasks[str(n)] = lambda e=engine, s=state, n=n: evaluation_time(e, s, max(EVALUATIONS // n, 10))
+            yield case, [{"loops": case.of, "verdict": REFUSED, "reason": str(error)}]
     times = interleaved(tasks, ROUNDS)
-    for label, found in times.items():
-        yield {"kind": "loops", "loops": int(label), "us": 1e6 * found.median, "spread": found.spread}
-    yield from refused
+    for case in cases:
+        if case.name in times:
+            yield case, [{"loops": case.of, **times[case.name].told("us")}]
+
+
+def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
+    state = states(engine, trajectory(engine))["free"]
+    return lambda: evaluation_time(engine, state, repeat)
 
 
 def four_bars(loops: int) -> Scene:
@@ -116,28 +124,35 @@ def four_bars(loops: int) -> Scene:
     )
 
 
-def show(results: list[dict[str, Any]]) -> str:
+def show(records: list[Record]) -> str:
     """Both tables, with the exponent of the growth."""
-    absent = [r for r in results if r["kind"] == "absent"]
-    rows = [
-        [
-            f"{r['effect']}, against {r['scene']}",
-            f"{r['stripped_us']:.2f}",
-            f"{r['without_us']:.2f}",
-            f"{r['ratio']:.3f}",
-            percent(r["spread"]),
-            "yes" if r["same_code"] else "no",
-        ]
-        for r in absent
-    ]
-    head = ("absent effect", "removed [us]", "never there [us]", "ratio", "spread", "same compiled code")
-    loops = [r for r in results if r["kind"] == "loops" and "us" in r]
-    lines = [[str(r["loops"]), f"{r['us']:.1f} ± {percent(r['spread'])}", short(r["us"] / r["loops"])] for r in loops]
-    text = f"{table(head, rows)}\n\n{table(('loops', 'us per evaluation', 'us per loop'), lines)}"
+    loops = [r for r in records if "us" in r]
+    absent: dict[str, Callable[[Record], str]] = {
+        "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
+        "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
+        "never there [us]": lambda r: f"{r['without_us']:.2f}",
+        "ratio": lambda r: f"{r['ratio']:.3f}",
+        "spread": lambda r: percent(r["spread"]),
+        "same compiled code": lambda r: "yes" if r["same_code"] else "no",
+    }
+    growth: dict[str, Callable[[Record], str]] = {
+        "loops": lambda r: str(r["loops"]),
+        "us per evaluation": lambda r: spread(r, "us", 1),
+        "us per loop": lambda r: short(r["us"] / r["loops"]),
+    }
+    parts = [table([r for r in records if "same_code" in r], absent), table(loops, growth)]
     if len(loops) > 1:
         exponent = slope([r["loops"] for r in loops], [r["us"] for r in loops])
-        text += f"\n\nTime grows as the number of loops to the power {exponent:.2f}."
-    for r in results:
-        if "skipped" in r:
-            text += f"\n\n{r['loops']} loops skipped: {r['skipped']}"
-    return text
+        parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
+    return "\n\n".join(parts + [f"{r['case']} skipped: {r['reason']}" for r in records if "reason" in r])
+
+
+FAMILY = Family(
+    what="what absent effects cost, and growth with the number of loops",
+    takes="2 min",
+    page="benchmarks.md",
+    cases=cases,
+    measure=measure,
+    show=show,
+    quick="5 loops",
+)

@@ -2,64 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable, Sequence
 
-from benchmarks.engines import SCENES, Mechanism, mechanism, silent
-from benchmarks.measure import interleaved, once
-from benchmarks.tables import percent, table
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.mechanisms import SCENES, Mechanism, mechanism
+from benchmarks.page import spread, table
+from benchmarks.timing import interleaved, once
 from pipeline import dynamics
+from pipeline.core.workflow.progress import silent
 from pipeline.dynamics.integrate.engine import consistent_start
 from pipeline.dynamics.integrate.trajectory import integrate
 
-TITLE = "Seconds per warm run"
 ROUNDS = 5
 
 
-def measure() -> Iterator[dict[str, Any]]:
-    """One result per scene; the scenes take turns, so that a slow minute of the machine slows all of them."""
-    mechanisms = [mechanism(name) for name in SCENES]
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each scene; the scenes take turns, so that a slow minute of the machine slows all of them."""
+    mechanisms = {case: mechanism(case.name) for case in cases}
     tasks: dict[str, Callable[[], float]] = {}
-    counters: dict[str, dict[str, int]] = {}
-    for here in mechanisms:
-        tasks[f"{here.name} integration"], counters[here.name] = _integration(here)
+    evaluations: dict[str, int] = {}
+    for here in mechanisms.values():
+        tasks[f"{here.name} integration"], evaluations[here.name] = _integration(here)
         tasks[f"{here.name} stage"] = _stage(here)
     times = interleaved(tasks, ROUNDS)
-    for here in mechanisms:
-        integration, stage = times[f"{here.name} integration"], times[f"{here.name} stage"]
-        evaluations = counters[here.name]["evaluations"]
-        yield {
-            "scene": here.name,
+    for case, here in mechanisms.items():
+        integration = times[f"{here.name} integration"]
+        record = {
             "rtol": here.scene.solver.rtol,
-            "evaluations": evaluations,
-            "integration": {"s": integration.median, "spread": integration.spread},
-            "stage": {"s": stage.median, "spread": stage.spread},
-            "us_per_evaluation": 1e6 * integration.median / evaluations,
+            "evaluations": evaluations[here.name],
+            "integration": integration.told("s"),
+            "stage": times[f"{here.name} stage"].told("s"),
+            "us_per_evaluation": 1e6 * integration.median / evaluations[here.name],
         }
+        yield case, [record]
 
 
-def _integration(here: Mechanism) -> tuple[Callable[[], float], dict[str, int]]:
+def _integration(here: Mechanism) -> tuple[Callable[[], float], int]:
     engine = here.engine()
     start, _ = consistent_start(engine)
-    counters = integrate(engine, start, silent).counters
-    return lambda: once(lambda: integrate(engine, start, silent)), counters
+    evaluations = integrate(engine, start, silent).counters["evaluations"]
+    return lambda: once(lambda: integrate(engine, start, silent)), evaluations
 
 
 def _stage(here: Mechanism) -> Callable[[], float]:
     return lambda: once(lambda: dynamics.simulate(here.scene, here.bundles, silent))
 
 
-def show(results: list[dict[str, Any]]) -> str:
+def show(records: list[Record]) -> str:
     """The table; the rest of the stage is the evaluation of every recorded row, and the dataset."""
-    rows = [
-        [
-            r["scene"],
-            f"{r['integration']['s']:.4f} ± {percent(r['integration']['spread'])}",
-            f"{r['stage']['s']:.3f} ± {percent(r['stage']['spread'])}",
-            str(r["evaluations"]),
-            f"{r['us_per_evaluation']:.2f}",
-        ]
-        for r in results
-    ]
-    head = ("scene", "integration [s]", "simulate stage [s]", "evaluations", "us per evaluation, all in")
-    return table(head, rows)
+    columns: dict[str, Callable[[Record], str]] = {
+        "scene": lambda r: r["case"],
+        "integration [s]": lambda r: spread(r["integration"], "s", 4),
+        "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),
+        "evaluations": lambda r: str(r["evaluations"]),
+        "us per evaluation, all in": lambda r: f"{r['us_per_evaluation']:.2f}",
+    }
+    return table(records, columns)
+
+
+FAMILY = Family(
+    what="seconds of whole warm runs of the paper's scenes",
+    takes="2 min",
+    page="benchmarks.md",
+    cases=lambda: [Case(name) for name in SCENES],
+    measure=measure,
+    show=show,
+    quick="ideal",
+)

@@ -1,24 +1,22 @@
-"""``python -m benchmarks.large_solid [rod|block]``: a large solid to its Craig-Bampton bundle, by stages of the work.
+"""A large solid from its recipe to its Craig-Bampton bundle on the disk, by the parts of the work.
 
-One thread, so that processor seconds are those of the work; docs/structure.md has the numbers.
+One thread, so that processor seconds are those of the work.
 """
 
 from __future__ import annotations
 
-# first of all: it pins BLAS to one thread, which NumPy reads when it is imported
-import pipeline  # noqa: F401  isort: skip
-
-import argparse
-import resource
-import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.family import Case, Family, Measured, Record
 from pipeline.core.artifacts.store import write_dataset
+from pipeline.post.plotting.table import pipe_table
 from pipeline.structure.kinds.kind import of_recipe
 from pipeline.structure.modes import bundle, solve
+from stages.cost_point import peak_memory
 
 MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
 FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}
@@ -34,52 +32,71 @@ SHAPES: dict[str, dict[str, Any]] = {
     "block": {"type": "block", "size": [0.2, 0.1, 0.1], "element": "hex8", "cells": [71, 36, 36]},
 }
 COUNT = 13
+#: parts of the work in their order, and what the stages say when each begins
+PARTS = {
+    "mesh and assembly": "mesh",
+    "static shapes": "static shapes",
+    "factorisation": "factorising",
+    "normal modes": "normal modes",
+    "counting them, by another factorisation": "checking that no mode was missed",
+    "compliances, free body to compare with, error bounds": "compliance of the full model",
+    "inertia integrals and writing": "inertia integrals",
+}
 
 
-class Stages:
-    """Prints what is done as it begins: seconds of the processor and of the clock so far, largest memory so far."""
+class Parts:
+    """Processor seconds by part of the work; what a later part does again of an earlier one is its own."""
 
     def __init__(self) -> None:
-        self._begun = time.process_time(), time.perf_counter()
-        self._last = ""
+        self.seconds = dict.fromkeys(PARTS, 0.0)
+        self._now, self._since = 0, time.process_time()
 
     def __call__(self, share: float | None, text: str) -> None:
         """Progress callback of the stages."""
-        if text == self._last:
-            return
-        self._last = text
-        processor, clock = time.process_time() - self._begun[0], time.perf_counter() - self._begun[1]
-        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-        print(f"{processor:8.1f} s {clock:8.1f} s {memory:6.2f} GiB  {text}", flush=True)
+        now = time.process_time()
+        self.seconds[list(PARTS)[self._now]] += now - self._since
+        self._since = now
+        self._now = max([self._now, *(k for k, said in enumerate(PARTS.values()) if said in text)])
 
 
-def measure(shape: dict[str, Any]) -> None:
-    """Recipe to bundle on the disk."""
-    stages = Stages()
-    stages(None, "mesh")
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each body: seconds by part, and the largest memory so far."""
+    for case in cases:
+        yield case, [_body(case.of)]
+
+
+def _body(shape: dict[str, Any]) -> Record:
+    told, begun = Parts(), time.process_time()
     recipe = {"interfaces": list(FRAMES), "shape": shape, "material": MATERIAL, "frames": FRAMES}
     mesh = of_recipe(recipe).build(recipe, Path())
-    modes = solve(mesh, "craig-bampton", COUNT, progress=stages)
-    stages(None, "inertia integrals")
-    reduced = bundle.build(mesh, modes)
-    stages(None, "writing")
+    modes = solve(mesh, "craig-bampton", COUNT, progress=told)
+    told(None, "inertia integrals")
     with tempfile.TemporaryDirectory() as folder:
-        write_dataset(Path(folder) / "bundle.nc", reduced)
-    stages(None, f"done: {3 * mesh.sizes['node']} displacements, {reduced.sizes['mode']} coordinates")
+        write_dataset(Path(folder) / "bundle.nc", bundle.build(mesh, modes))
+    told(None, "done")
+    return {
+        "cells": f"{shape['element'].removeprefix('hex')}-node cells",
+        "displacements": 3 * mesh.sizes["node"],
+        "seconds": told.seconds,
+        "together": time.process_time() - begun,
+        "gigabytes": 1e-9 * peak_memory(),
+    }
 
 
-def main() -> int:
-    """Measure one body or both."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.large_solid", description=__doc__)
-    parser.add_argument("bodies", nargs="*", help=f"some of {', '.join(SHAPES)}; default: all")
-    options = parser.parse_args()
-    for name in options.bodies or SHAPES:
-        if name not in SHAPES:
-            parser.error(f"no body is called {name}")
-        print(f"{name}: processor, clock, memory")
-        measure(SHAPES[name])
-    return 0
+def show(records: list[Record]) -> str:
+    """One column for each body."""
+    rows = [["displacements", *(f"{r['displacements']:,}".replace(",", " ") for r in records)]]
+    rows += [[part, *(f"{r['seconds'][part]:.0f}" for r in records)] for part in PARTS]
+    rows.append(["together", *(f"{r['together']:.0f}" for r in records)])
+    rows.append(["most memory", *(f"{r['gigabytes']:.1f} GB" for r in records)])
+    return pipe_table(("", *(f"{r['case']}, {r['cells']}" for r in records)), rows)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+FAMILY = Family(
+    what="large solids from the recipe to the bundle, by parts of the work",
+    takes="11 min and 7 GB",
+    page="structure.md",
+    cases=lambda: [Case(name, shape) for name, shape in SHAPES.items()],
+    measure=measure,
+    show=show,
+)

@@ -1,4 +1,4 @@
-"""What is compared: mode sets, places of the prismatic joint, and the runs that this takes."""
+"""What is compared: mode sets of the rod, places of its prismatic joint, and the runs that this takes."""
 
 from __future__ import annotations
 
@@ -7,14 +7,18 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-import pipeline
+import xarray as xr
+
 from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene, read_toml
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
+from pipeline.structure.fe import mesh
+from pipeline.structure.modes import solve
 from stages import s4_simulate
 from stages.graph import Graph
+from stages.run import find_scene
 
-SCENES = Path(__file__).parents[2] / "scenes" / "sps4"
 ROD = "rod1"
 #: frame of the rod that carries the prismatic joint, by its distance from the rod's lower end [mm]
 PLACES = {0: "bottom", 60: "at_60mm", 120: "at_120mm"}
@@ -69,16 +73,15 @@ def modes(case: Case) -> dict[str, Any]:
 
 def scene(case: Case) -> Scene:
     """The paper's scene with the joint at the case's place and the rod of its mode set."""
-    stem = "" if case.place == 0 else f"prismatic_{case.place}mm"
-    folder = SCENES if case.place == 0 else SCENES / "variants"
+    stem, folder = ("", "sps4") if case.place == 0 else (f"prismatic_{case.place}mm", "sps4/variants")
     if case.condition == RIGID:
         name = "_".join(part for part in (stem, "csj" if case.clearance else "") if part) or "ideal"
-        return pipeline.load_scene(folder / f"{name}.toml")
+        return load_scene(find_scene(f"{folder}/{name}"))
     name = "_".join(part for part in (stem, "far_csj_cb" if case.clearance else "far_cb") if part)
     changes: dict[str, Any] = {f"body.{ROD}.modes": modes(case)}
     if case.clearance:
         changes["ensemble.members"] = case.members
-    return pipeline.load_scene(folder / f"{name}.toml", override=changes)
+    return load_scene(find_scene(f"{folder}/{name}"), changes)
 
 
 def task(case: Case) -> Task:
@@ -105,10 +108,23 @@ def _told_apart(made: Task, case: Case) -> Task:
 
 
 @cache
+def rod(finer: int) -> xr.Dataset:
+    """The paper's rod in cells."""
+    recipe = read_toml(Path(scene(Case(0, FULL)).flexible()[ROD].mesh))
+    return mesh.build(recipe | {"elements": finer * recipe["elements"]})
+
+
+@cache
+def solved(case: Case) -> xr.Dataset:
+    """Modes (schema MODES) of a case; InputError for counts that cut a pair."""
+    table = modes(case)
+    count = None if table["count"] == "all" else table["count"]
+    return solve(rod(case.finer), table["reference"], count, table["interfaces"])
+
+
+@cache
 def whole(place: int, condition: str, count: int) -> int:
     """The least whole count that is not below `count`."""
-    from benchmarks.reference_conditions.statics import solved
-
     while True:
         try:
             solved(Case(place, condition, count))
@@ -118,6 +134,18 @@ def whole(place: int, condition: str, count: int) -> int:
             count += 1
         else:
             return count
+
+
+def whole_counts(place: int, condition: str, most: int) -> list[int]:
+    """Counts up to `most` that cut no pair."""
+    found = []
+    for count in range(1, most + 1):
+        try:
+            solved(Case(place, condition, count))
+        except InputError:
+            continue
+        found.append(count)
+    return found
 
 
 def far(places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
