@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial.polynomial import polyder
 
 from benchmarks.errors import SAMPLING, Samples
 from benchmarks.exudyn_bodies import Model, add_bodies, add_rigid, load, marker, transformation
@@ -181,7 +182,7 @@ def derivative(law: Pieces, order: int) -> Callable[[float], float]:
     if law.harmonic:
         raise ValueError("laws with harmonics have no polynomials")
     starts = [piece.start for piece in law.pieces]
-    falling = [_differentiate(list(piece.coefficients), order)[::-1] for piece in law.pieces]
+    falling = [polyder(piece.coefficients, order)[::-1].tolist() for piece in law.pieces]
 
     def value(t: float) -> float:
         k = max(bisect_right(starts, t) - 1, 0)
@@ -191,12 +192,6 @@ def derivative(law: Pieces, order: int) -> Callable[[float], float]:
         return result
 
     return value
-
-
-def _differentiate(rising: list[Any], order: int) -> list[Any]:
-    for _ in range(order):
-        rising = [k * c for k, c in enumerate(rising)][1:]
-    return rising
 
 
 def solve(here: Mechanism, body: str, method: str, step: float) -> Outcome:

@@ -66,7 +66,7 @@ def files(records: list[Record]) -> dict[str, bytes]:
 
 FAMILY = Family(
     what="error against cost of five scenes, and where the error comes from",
-    takes="30 min",
+    takes="40 min",
     page="accuracy.md",
     cases=lambda: [Case(scene) for scene in SCENES],
     measure=measure,

@@ -101,7 +101,7 @@ def _records(case: Case, here: Mechanism) -> Iterator[Record]:
         finest = solve(here, BODY, next(iter(METHODS)), steps[-1])
         if finest.samples is None:
             raise RuntimeError(f"Exudyn fails on its finest run of {case.name}: {finest.failure}")
-        theirs, steps = errors.of_samples(finest.samples, horizon), steps[:-1]
+        theirs, steps = Reference(finest.samples, horizon), steps[:-1]
         law = {"difference_of_laws": _numbers(reference.error(finest.samples))}
     yield {"horizon": horizon, "version": version("exudyn"), **law}
     for r in ours:

@@ -92,7 +92,7 @@ def _peaks(rows: list[Row], place: int) -> str:
 
 FAMILY = Family(
     what="which mode sets of a rod give the answers of the full rod, and at what cost",
-    takes="1 h on two cores",
+    takes="40 min on two cores",
     page="reference-conditions.md",
     cases=runs.cases,
     measure=runs.measure,

@@ -118,7 +118,7 @@ def test_tasks_take_turns_and_the_first_round_does_not_count():
 def test_errors_are_taken_up_to_the_horizon_and_between_equal_times():
     time = SAMPLING * np.arange(11)
     still, moved = np.zeros((11, 3)), np.outer(time, [3.0, 0.0, 4.0])
-    reference = errors.of_samples(Samples(time, still, still + 2.0), 5 * SAMPLING)
+    reference = errors.Reference(Samples(time, still, still + 2.0), 5 * SAMPLING)
     error = reference.error(Samples(time, moved, still + 2.0 + 10 * moved))
     assert error.position == pytest.approx(5 * 5 * SAMPLING)
     assert error.relative == pytest.approx(250 * SAMPLING / np.sqrt(12.0))
