@@ -11,11 +11,11 @@ import xarray as xr
 from benchmarks.mechanisms import Mechanism
 from benchmarks.timing import once
 from pipeline import dynamics
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import edited
-from pipeline.core.workflow.progress import silent
-from pipeline.dynamics.integrate.engine import consistent_start
-from pipeline.dynamics.integrate.trajectory import integrate
-from pipeline.dynamics.run import observed
+from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.run import observed
+from pipeline.dynamics.run.trajectory import integrate
 
 #: two codes are compared at multiples of this [s]
 SAMPLING = 1e-3

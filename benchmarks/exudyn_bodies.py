@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.merge import Frame, Group, Placement, rigid_inertia
+from pipeline.dynamics.model.merge import Frame, Group, Placement, rigid_inertia
 
 EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
 

@@ -22,9 +22,9 @@ from benchmarks.mechanisms import Mechanism, joint_laws
 from benchmarks.timing import once
 from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.merge import Frame, frames_of, merge, start_places
 from pipeline.dynamics.contact.surfaces import BallInSocket
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model.merge import Frame, frames_of, merge, start_places
 
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
 X_FROM_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])

@@ -18,8 +18,7 @@ from typing import Any
 
 from benchmarks.family import FINISHED, Case, Family, Record
 from pipeline.core.artifacts.paths import results_root
-from pipeline.core.workflow.fingerprint import Sources, library_version
-from stages.families import TREE
+from pipeline.core.workflow.fingerprint import TREE, Sources, library_version
 
 FOLDER = Path(__file__).parent / "log"
 PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn")

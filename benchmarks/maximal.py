@@ -22,7 +22,7 @@ import xarray as xr
 from benchmarks.mechanisms import joint_laws
 from pipeline.core.algebra import skew
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
+from pipeline.dynamics.model.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
 
 #: rows of a joint: directions of relative translation and of relative rotation that it stops, axes of its first frame
 ROWS = {

@@ -9,17 +9,17 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.timing import once
+from pipeline.core.progress import silent
 from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.drives import JointDrive
 from pipeline.core.scene.load import edited, load_scene
 from pipeline.core.scene.parts import IdealJoint
 from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.progress import silent
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from pipeline.dynamics.integrate.engine import Engine, consistent_start
-from pipeline.dynamics.integrate.trajectory import Trajectory, integrate
-from pipeline.dynamics.run import engine_of, observed
-from pipeline.dynamics.tables import MODE, NORMAL_FORCE, TOUCH_SIZE
+from pipeline.dynamics.run.engine import Engine, consistent_start
+from pipeline.dynamics.run.run import engine_of, observed
+from pipeline.dynamics.run.trajectory import Trajectory, integrate
 from stages.run import bundles, find_scene
 
 #: the scenes of the paper, from the least to the fullest
@@ -100,12 +100,12 @@ def trajectory(engine: Engine) -> Trajectory:
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
     """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
-    contacts = engine.built.packed.sizes["N_CONTACTS"]
+    contacts = engine.model.arrays.size(m.N_CONTACTS)
     modes = run.rows[:, 1 : 1 + contacts]
     found = {"free": np.flatnonzero(~np.any(modes == 1.0, axis=1))}
     if contacts:
-        touches = observed(engine, run)["touch"].reshape(len(modes), contacts, TOUCH_SIZE)
-        found["in contact"] = np.flatnonzero(np.all(touches[:, :, NORMAL_FORCE] > 0.0, axis=1))
+        touches = observed(engine, run)["touch"].reshape(len(modes), contacts, m.TOUCH.size)
+        found["in contact"] = np.flatnonzero(np.all(touches[:, :, m.TOUCH.normal_force] > 0.0, axis=1))
     # the middle of the candidates: at the very start much is zero
     return {name: _state(run.rows[rows[len(rows) // 2]], contacts) for name, rows in found.items()}
 
@@ -117,8 +117,8 @@ def _state(row: np.ndarray, contacts: int) -> State:
 def set_state(engine: Engine, state: State) -> None:
     """Put contact modes, impact rates and the pieces of the drives as they are in a state."""
     n, contacts = engine.n, len(state.modes)
-    n[n[MODE] : n[MODE] + contacts] = state.modes
-    engine.view("LATCHED", contacts)[:] = state.latched
+    n[n[m.MODE] : n[m.MODE] + contacts] = state.modes
+    engine.view(m.LATCHED, contacts)[:] = state.latched
     engine.select_pieces(state.t)
 
 

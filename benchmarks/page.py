@@ -19,8 +19,8 @@ from benchmarks.family import Family, Record
 from benchmarks.log import Session
 from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
+from pipeline.core.workflow.fingerprint import TREE
 from pipeline.post.plotting.table import pipe_table
-from stages.families import TREE
 
 DOCS = TREE / "docs"
 #: what stands where nothing was measured

@@ -11,8 +11,8 @@ from stages import s4_simulate
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 
 def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
@@ -58,7 +58,7 @@ def _processor_time() -> float:
 
 def warm(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
     """Compile or fetch the kernels and call them, so that no measurement contains it."""
-    from pipeline.dynamics.integrate.engine import consistent_start
-    from pipeline.dynamics.run import engine_of
+    from pipeline.dynamics.run.engine import consistent_start
+    from pipeline.dynamics.run.run import engine_of
 
     consistent_start(engine_of(scene, reduced, progress))

@@ -16,7 +16,7 @@ from benchmarks.page import percent, short, spread, table
 from benchmarks.timing import interleaved, slope
 from pipeline.core.errors import FlexclearError
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.integrate.engine import Engine
+from pipeline.dynamics.run.engine import Engine
 
 LOOPS = (5, 10, 20, 40, 80)
 #: what the fullest scene loses, and the scene that never had it

@@ -9,9 +9,9 @@ from benchmarks.mechanisms import SCENES, Mechanism, mechanism
 from benchmarks.page import spread, table
 from benchmarks.timing import interleaved, once
 from pipeline import dynamics
-from pipeline.core.workflow.progress import silent
-from pipeline.dynamics.integrate.engine import consistent_start
-from pipeline.dynamics.integrate.trajectory import integrate
+from pipeline.core.progress import silent
+from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.trajectory import integrate
 
 ROUNDS = 5
 

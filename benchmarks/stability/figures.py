@@ -12,6 +12,7 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Record
 from benchmarks.page import png
 from benchmarks.stability.runs import LEDGER
 from benchmarks.stability.scenes import ALONG, RANGES, Parameters
+from pipeline.core.integrators import DEFAULT, INTEGRATORS
 from pipeline.post.plotting.style import SOFT, plt, style
 
 BLUE, MARKS = "#0072B2", {REFUSED: ("D", "#E69F00"), WRONG: ("X", "#D55E00")}
@@ -32,7 +33,10 @@ LABELS = {
 #: planes in which the random points are shown
 PLANES = (("clearance", "stiffness"), ("speed", "mass"), ("restitution", "friction"), ("nearness", "joints"))
 #: symbols by the integrator that made the run
-SYMBOLS = {"dop853": ("o", "as asked for"), "radau": ("s", "an implicit method took over")}
+SYMBOLS = {
+    DEFAULT: ("o", "as asked for"),
+    INTEGRATORS[DEFAULT].hands_over_to: ("s", "an implicit method took over"),
+}
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,11 @@ from benchmarks.stability.scenes import Parameters, scene, sweep
 from pipeline import dynamics
 from pipeline.core import quantities
 from pipeline.core.errors import FlexclearError, SolverError
-from pipeline.core.workflow.progress import Monitor, silent
+from pipeline.core.progress import silent
+from pipeline.core.scene.wanted import parse
+from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import in_order
-from pipeline.dynamics.run import engine_of
+from pipeline.dynamics.run.run import engine_of
 from stages.graph import Graph
 from stages.run import Workplace, bundles, workplace
 
@@ -96,7 +98,7 @@ def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> flo
         tight = dynamics.simulate(tight_scene, bundles(tight_scene, _place()), silent)
     except FlexclearError:
         return float("nan")
-    velocity = quantities.parse("platform.velocity", described.owners())
+    velocity = parse("platform.velocity", described.owners())
     until = min(float(run["horizon"]), float(tight["horizon"]))
     return quantities.error(run, tight, velocity, until) / quantities.scale(run, velocity)
 

@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.family import Case
 from pipeline.core.scene.load import compose
 from pipeline.core.scene.schema import Scene
-from stages.families import TREE
+from pipeline.core.workflow.fingerprint import TREE
 
 CLEARANCE, STIFFNESS = 0.5e-3, 1.3631e11  # Table 3 [m], eq. (26) with its data [N/m^1.5]
 #: radii of the joint circles, start height [m], and the angles of the joints that are far from singular [deg]

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-
-Progress = Callable[[float | None, str], None]
 
 __all__ = ["ensemble", "equilibrium", "frequencies", "simulate"]
 
@@ -23,17 +22,17 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
     from pipeline.dynamics.record.dataset import dataset, warnings
-    from pipeline.dynamics.run import integrate
+    from pipeline.dynamics.run.run import integrate
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
-        for sentence in warnings(done.engine.built, done.trajectory):
+        for sentence in warnings(done.engine.model, done.trajectory):
             progress(None, f"warning: {sentence}")
         return dataset(done)
 
     if scene.accuracy is None or not scene.accuracy.quantities:
         return once(scene)
-    from pipeline.dynamics.accuracy import deliver
+    from pipeline.dynamics.run.accuracy import deliver
 
     return deliver(scene, once, progress)
 
@@ -75,5 +74,5 @@ def frequencies(
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from pipeline.dynamics.linear import dataset, solve, vibrations
 
-    bench, found = solve.equilibrium(scene, bundles, progress, time, drives, moving)
-    return dataset.linear(bench, found, vibrations.vibrations(bench, found.at), moving)
+    bench, rest = solve.equilibrium(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, vibrations.vibrations(bench, rest.at), moving)

@@ -1,98 +1,62 @@
 """Vector and rotation algebra for compiled kernels, on tuples that live in registers.
 
-A vector is ``(x, y, z)``, a matrix its nine entries row by row. `kernel` is the decorator of
-every compiled function: IEEE division (no exceptions), fused multiply-add and reordered sums
-allowed, NaN and infinity honoured.
+A vector is ``(x, y, z)``, a matrix its nine entries row by row.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from pipeline.dynamics.lowering import KernelCompiler
+from pipeline.dynamics.kernels import kernel
 
-# No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and C
-# took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
-kernel = njit(
-    error_model="numpy",
-    fastmath={"contract", "reassoc", "nsz"},
-    _nrt=False,
-    no_cfunc_wrapper=True,
-    no_cpython_wrapper=True,
-    pipeline_class=KernelCompiler,
-)
-
-
-#: type of an index: unsigned, because compiled code must otherwise ask of each whether it is negative
-index = np.uint64
-ONE, TWO, THREE, FOUR, FIVE, SIX, SEVEN, EIGHT = (np.uint64(k) for k in range(1, 9))
+ZERO, IDENTITY = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @kernel
-def at(a, o):
-    """Vector stored in a flat array from place o."""
-    i = index(o)
-    return (a[i], a[i + ONE], a[i + TWO])
+def at(a, i):
+    """Vector stored in a flat array from place i."""
+    return (a[i], a[i + 1], a[i + 2])
 
 
 @kernel
-def put(a, o, v):
-    """Store a vector from place o."""
-    i = index(o)
-    a[i] = v[0]
-    a[i + ONE] = v[1]
-    a[i + TWO] = v[2]
+def put(a, i, v):
+    """Store a vector from place i."""
+    a[i], a[i + 1], a[i + 2] = v[0], v[1], v[2]
 
 
 @kernel
-def accumulate(a, o, v):
-    """Add a vector to the one stored from place o."""
-    i = index(o)
+def accumulate(a, i, v):
+    """Add a vector to the one stored from place i."""
     a[i] += v[0]
-    a[i + ONE] += v[1]
-    a[i + TWO] += v[2]
+    a[i + 1] += v[1]
+    a[i + 2] += v[2]
 
 
 @kernel
-def at9(a, o):
-    """Matrix stored in a flat array from place o."""
-    i = index(o)
-    return (
-        a[i],
-        a[i + ONE],
-        a[i + TWO],
-        a[i + THREE],
-        a[i + FOUR],
-        a[i + FIVE],
-        a[i + SIX],
-        a[i + SEVEN],
-        a[i + EIGHT],
-    )
+def at9(a, i):
+    """Matrix stored in a flat array from place i."""
+    return (a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5], a[i + 6], a[i + 7], a[i + 8])
 
 
 @kernel
-def at6(a, o):
-    """Symmetric matrix (xx, yy, zz, xy, xz, yz) stored from place o."""
-    i = index(o)
-    return (a[i], a[i + ONE], a[i + TWO], a[i + THREE], a[i + FOUR], a[i + FIVE])
+def at6(a, i):
+    """Symmetric matrix (xx, yy, zz, xy, xz, yz) stored from place i."""
+    return (a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5])
 
 
 @kernel
-def put9(a, o, m):
-    """Store a matrix from place o."""
-    i = index(o)
-    a[i], a[i + ONE], a[i + TWO] = m[0], m[1], m[2]
-    a[i + THREE], a[i + FOUR], a[i + FIVE] = m[3], m[4], m[5]
-    a[i + SIX], a[i + SEVEN], a[i + EIGHT] = m[6], m[7], m[8]
+def put9(a, i, m):
+    """Store a matrix from place i."""
+    put(a, i, (m[0], m[1], m[2]))
+    put(a, i + 3, (m[3], m[4], m[5]))
+    put(a, i + 6, (m[6], m[7], m[8]))
 
 
 @kernel
-def dot6(a, o, b, p):
-    """Product of the six-vectors stored from o in a and from p in b."""
-    i, j = index(o), index(p)
-    first = a[i] * b[j] + a[i + ONE] * b[j + ONE] + a[i + TWO] * b[j + TWO]
-    second = a[i + THREE] * b[j + THREE] + a[i + FOUR] * b[j + FOUR] + a[i + FIVE] * b[j + FIVE]
+def dot6(a, i, b, j):
+    """Product of the six-vectors stored from i in a and from j in b."""
+    first = a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
+    second = a[i + 3] * b[j + 3] + a[i + 4] * b[j + 4] + a[i + 5] * b[j + 5]
     return first + second
 
 

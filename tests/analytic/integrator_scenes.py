@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly.numbers import tabulate
-from pipeline.dynamics.assembly.system import build
-from pipeline.dynamics.integrate.engine import Engine, consistent_start, prepare
-from pipeline.dynamics.integrate.trajectory import Trajectory, integrate
+from pipeline.dynamics.model.mechanism import build
+from pipeline.dynamics.model.model import tabulate
+from pipeline.dynamics.run.engine import Engine, consistent_start, prepare
+from pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: a tolerance at which no projection is made within these short runs, so that the method alone is seen
 NO_PROJECTION = 1e-2

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.progress import silent
 from stages import run as stages
 
 TREE = Path(__file__).resolve().parents[2]

@@ -6,9 +6,9 @@ from typing import Any
 
 import xarray as xr
 
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import edited, load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 
 

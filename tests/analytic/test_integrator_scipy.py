@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.integrate.engine import consistent_start
+from pipeline.dynamics.run.engine import consistent_start
 from tests.analytic.integrator_scenes import double_pendulum, engine_with, ledger_free, trajectory
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from pipeline import dynamics
 from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.integrate import trajectory
+from pipeline.dynamics.run import trajectory
 from tests.analytic.mechanism_runs import TREE
 
 ROLLING, END = "checks/socket_rolling.toml", "3 ms"

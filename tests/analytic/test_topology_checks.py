@@ -10,9 +10,9 @@ from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.integrate import singular
 from pipeline.dynamics.record.dataset import dataset as dataset_of
-from pipeline.dynamics.run import integrate
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.run import integrate
 from tests.analytic import four_bars
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import Table, simulate

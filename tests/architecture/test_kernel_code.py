@@ -8,8 +8,7 @@ import pytest
 from numba import njit
 from numba.core.codegen import CPUCodeLibrary
 
-from pipeline.dynamics.lowering import Part
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import Part, kernel
 
 
 def tower() -> tuple[Callable, Callable, Callable]:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline import load_scene
-from pipeline.dynamics.run import engine_of
+from pipeline.dynamics.run.run import engine_of
 
 IDEAL = Path(__file__).parents[2] / "scenes" / "sps4" / "ideal.toml"
 

@@ -12,14 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.registry import lookup, module_of
+from pipeline.core.registry import module_of
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import joints, tables
-from pipeline.dynamics.assembly import dispatch
-from pipeline.dynamics.assembly.numbers import Tables, tabulate
-from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics import joints
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.contact import forces, friction
 from pipeline.dynamics.contact import form as forms
+from pipeline.dynamics.model.mechanism import build
+from pipeline.dynamics.model.model import Model, tabulate
 from tests.properties.kernels import from_python
 
 FRICTION: dict[str, dict[str, Any]] = {
@@ -42,7 +42,7 @@ Laws = tuple[str, str | None, str]
 
 
 @cache
-def tables_of(laws: Laws) -> Tables:
+def tables_of(laws: Laws) -> Model:
     """A free ball in a free socket."""
     contact: dict[str, Any] = {
         "type": laws[2],
@@ -65,12 +65,9 @@ def tables_of(laws: Laws) -> Tables:
 @cache
 def kernel(laws: Laws) -> Any:
     form = import_module(module_of(forms.__name__, tables_of(laws).laws[0].form))
-    surfaces = import_module(module_of(joints.__name__, laws[2], "CONTACTS"))
-    rub = forces.frictionless()
-    if laws[1] is not None:
-        rub = forces.rubbing(dispatch.choose((lookup(friction.__name__, laws[1], where="test").traction,)))
-    chosen = (dispatch.choose((k,)) for k in (surfaces.separation, form.force, form.stored))
-    return from_python(forces.compose(*chosen, rub))
+    surfaces = import_module(module_of(joints.__name__, laws[2], table="CONTACTS"))
+    frictions = () if laws[1] is None else (import_module(module_of(friction.__name__, laws[1])),)
+    return from_python(forces.make_contacts((surfaces,), (form,), frictions))
 
 
 class Touch:
@@ -81,9 +78,9 @@ class Touch:
 
     def __init__(self, laws: Laws, seed: int, depth: float, slip: float, together: bool = False) -> None:
         random = np.random.default_rng(seed)
-        packed = tables_of(laws).packed
-        w, n = packed.work_space()
-        n[n[tables.MODE]] = 1
+        packed = tables_of(laws).arrays
+        h, w, n = packed.work_space(lambda nq, nv, ny: m.Room(1, 1, 0))
+        n[n[m.MODE]] = 1
         turned = rotation_vector_to_matrix(random.normal(size=3))
         self.axis = random.normal(size=3)
         if laws[2] == "clearance-revolute":  # in the plane normal to the journal's axis
@@ -97,37 +94,37 @@ class Touch:
             self.omega["ball"] = self.omega["socket"]
             arm = self.centre["ball"] - self.centre["socket"]
             self.velocity["ball"] = self.velocity["socket"] + np.cross(self.omega["socket"], arm)
-        sites = packed.table("CONTACTS")[0, [tables.OUTER, tables.INNER]]
-        self.links = {name: int(packed.table("SITES")[s, 0]) for name, s in zip(self.centre, sites, strict=True)}
+        sites = packed.table(m.CONTACTS)[0][["outer", "inner"]]
+        self.links = {name: int(packed.table(m.SITES)["link"][s]) for name, s in zip(self.centre, sites, strict=True)}
         for name, site in zip(self.centre, sites, strict=True):
-            o = packed.offset("SITE_FRAMES") + tables.FRAME_SIZE * site
+            o = h[m.SITE_FRAMES.place] + m.FRAME.size * site
             w[o : o + 3] = self.centre[name]
-            w[o + tables.AXES : o + tables.AXES + 9] = turned.ravel()
-            w[o + tables.OMEGA : o + tables.OMEGA + 3] = self.omega[name]
-            w[o + tables.VELOCITY : o + tables.VELOCITY + 3] = self.velocity[name]
-        n[tables.STATE] = packed.offset("Y")
-        self.bend(packed, w, laws, turned, random)
-        w[packed.offset("LATCHED")] = random.uniform(0.01, 1.0)
-        kernel(laws)(packed.h, packed.f, w, n)
-        wrench = packed.offset("WRENCH") + 6 * np.array(list(self.links.values()))
+            w[o + m.FRAME.axes : o + m.FRAME.axes + 9] = turned.ravel()
+            w[o + m.FRAME.omega : o + m.FRAME.omega + 3] = self.omega[name]
+            w[o + m.FRAME.velocity : o + m.FRAME.velocity + 3] = self.velocity[name]
+        n[m.STATE] = h[m.Y]
+        self.bend(packed, w[h[m.Y] :], laws, turned, random)
+        w[h[m.LATCHED]] = random.uniform(0.01, 1.0)
+        kernel(laws)(h, packed.f, w, n)
+        wrench = h[m.WRENCH.place] + 6 * np.array(list(self.links.values()))
         # the table holds inertial minus applied wrenches (moment about the origin; force)
         self.wrench = {name: -w[o : o + 6] for name, o in zip(self.links, wrench, strict=True)}
-        self.touch = w[packed.offset("TOUCH") :][: tables.TOUCH_SIZE]
-        losses = packed.offset("LEDGER_RATE") + tables.CONTACT_SLOTS
+        self.touch = w[h[m.TOUCH.place] :][: m.TOUCH.size]
+        losses = h[m.LEDGER_RATE] + m.CONTACT_SLOTS
         self.losses = w[losses : losses + 2]
         self.bending = 0.0  # power that bends the bristles at this normal force
         if self.place >= 0:
-            rate = turned @ w[losses + tables.PER_CONTACT :][:3]
-            self.bending = 1e5 * self.touch[tables.NORMAL_FORCE] * float(self.bent @ rate)
+            rate = turned @ w[losses + m.PER_CONTACT :][:3]
+            self.bending = 1e5 * self.touch[m.TOUCH.normal_force] * float(self.bent @ rate)
             self.out_of_plane = float(rate @ self.axis)
 
-    def bend(self, packed: Any, w: np.ndarray, laws: Laws, turned: np.ndarray, random: Any) -> None:
+    def bend(self, packed: Any, state: np.ndarray, laws: Laws, turned: np.ndarray, random: Any) -> None:
         """Bristles somewhere below their largest deflection, in the tangent plane, axes of the socket."""
-        self.bent, self.place = np.zeros(3), int(packed.table("CONTACTS")[0, tables.BRISTLE])
+        self.bent, self.place = np.zeros(3), int(packed.table(m.CONTACTS)["bristle"][0])
         if self.place >= 0:
             across = np.cross(self.axis, random.normal(size=3))
             self.bent = random.uniform(0.0, 1.5e-6) * across / np.linalg.norm(across)
-            w[packed.offset("Y") + self.place :][:3] = turned.T @ self.bent
+            state[self.place :][:3] = turned.T @ self.bent
 
     @property
     def power(self) -> float:
@@ -163,7 +160,7 @@ def test_action_is_reaction_in_force_and_moment(laws: Laws, seed: int, depth: fl
 def test_the_ball_is_pushed_back_into_the_socket(laws: Laws, seed: int, depth: float, slip: float) -> None:
     touch = Touch(laws, seed, depth, slip)
     force = touch.wrench["ball"][3:]
-    pressed = touch.touch[tables.NORMAL_FORCE]
+    pressed = touch.touch[m.TOUCH.normal_force]
     assert pressed >= 0.0
     # rounding of the axis, of a difference of 0.5 mm between points some 1 m from the origin
     assert -force @ touch.axis == pytest.approx(pressed, rel=1e-11, abs=1e-12)
@@ -176,16 +173,16 @@ def test_the_ball_is_pushed_back_into_the_socket(laws: Laws, seed: int, depth: f
 @motions
 def test_rubbing_and_damping_only_take_energy(laws: Laws, seed: int, depth: float, slip: float) -> None:
     touch = Touch(laws, seed, depth, slip)
-    assert touch.touch[tables.FRICTION_POWER] <= 0.0
+    assert touch.touch[m.TOUCH.friction_power] <= 0.0
     # a lossless law is subtracted from itself, in rounding where the compiler fuses the product
-    rounding = 1e-15 * touch.touch[tables.NORMAL_FORCE] * abs(touch.touch[tables.RATE])
+    rounding = 1e-15 * touch.touch[m.TOUCH.normal_force] * abs(touch.touch[m.TOUCH.rate])
     assert touch.losses[0] >= -rounding
     # what friction works is lost, but for what bends the bristles
-    assert touch.losses[1] - touch.bending == pytest.approx(-touch.touch[tables.FRICTION_POWER], abs=1e-9)
+    assert touch.losses[1] - touch.bending == pytest.approx(-touch.touch[m.TOUCH.friction_power], abs=1e-9)
     if laws[1] is None:
         assert touch.losses[1] == 0.0
-    elif touch.touch[tables.NORMAL_FORCE] > 0.0:
-        assert touch.touch[tables.FRICTION_POWER] < 0.0
+    elif touch.touch[m.TOUCH.normal_force] > 0.0:
+        assert touch.touch[m.TOUCH.friction_power] < 0.0
 
 
 @every_law
@@ -195,8 +192,8 @@ def test_the_ledger_books_what_the_forces_do(laws: Laws, seed: int, depth: float
     touch = Touch(laws, seed, depth, slip)
     law = tables_of(laws).laws[0]
     form = import_module(module_of(forms.__name__, law.form))
-    elastic = float(from_python(form.force)(-touch.touch[tables.GAP], 0.0, 1.0, law.numbers)[0])
-    stored = elastic * touch.touch[tables.RATE]
+    elastic = float(from_python(form.force)(-touch.touch[m.TOUCH.gap], 0.0, 1.0, law.numbers)[0])
+    stored = elastic * touch.touch[m.TOUCH.rate]
     size = np.abs(touch.wrench["ball"]).max() * slip * 20.0
     # rounding of moments about a point some 1 m away
     assert touch.power == pytest.approx(-stored - touch.losses.sum(), abs=1e-13 * size)
@@ -208,8 +205,8 @@ def test_the_ledger_books_what_the_forces_do(laws: Laws, seed: int, depth: float
 def test_rolling_is_no_sliding(laws: Laws, seed: int) -> None:
     """A ball and a socket that turn as one rigid body do not rub, wherever they turn about."""
     touch = Touch(laws, seed, 1e-5, 1.0, together=True)
-    assert touch.touch[tables.RATE] == pytest.approx(0.0, abs=1e-12)  # rounding of speeds of some m/s
+    assert touch.touch[m.TOUCH.rate] == pytest.approx(0.0, abs=1e-12)  # rounding of speeds of some m/s
     # a sliding speed of rounding, 1e-15 m/s, times slope 1.5 mu_s / v_s = 1e3 s/m, force 1e4 N, and speed; bent
-    # bristles bear up to mu_s of the force at any speed
-    bearing = 0.15 * touch.touch[tables.NORMAL_FORCE] if laws[1] == "lugre" else 1e-3
-    assert -touch.touch[tables.FRICTION_POWER] <= 1e-15 * bearing
+    # bristles bear up to mu_s of the force at any speed. The speed is a sum of some products of 10 m/s: ten times that
+    bearing = 0.15 * touch.touch[m.TOUCH.normal_force] if laws[1] == "lugre" else 1e-3
+    assert -touch.touch[m.TOUCH.friction_power] <= 1e-14 * bearing

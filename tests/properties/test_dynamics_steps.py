@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from pipeline.core.errors import SolverError
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.integrate import trajectory as stepping
-from pipeline.dynamics.integrate.engine import consistent_start
-from pipeline.dynamics.run import observed
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.run import trajectory as stepping
+from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.run import observed
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
-FIXED = ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "generalized-alpha", "radau")
-ADAPTIVE = ("dop853", "dopri5", "generalized-alpha", "radau")
-SOLVERS = [{"integrator": name, "step": 0.004} for name in FIXED] + [{"integrator": name} for name in ADAPTIVE]
+ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]
+SOLVERS = [{"integrator": name, "step": 0.004} for name in INTEGRATORS] + [{"integrator": name} for name in ADAPTIVE]
 
 
 def named(solver: dict[str, Any]) -> str:
@@ -54,7 +55,7 @@ def test_a_right_hand_side_that_is_no_number_is_refused(solver: dict[str, Any]) 
     scene = Scene.model_validate({**double_pendulum(), "solver": {"rtol": 1e-6, **solver}})
     engine = engine_with(scene)
     start, _ = consistent_start(engine)
-    engine.built.packed.table("GRAVITY")[:] = np.nan
+    engine.model.arrays.table(m.GRAVITY)["acceleration"] = np.nan
     with pytest.raises(SolverError, match="not a number"):
         stepping.integrate(engine, start, lambda share, text: None)
 

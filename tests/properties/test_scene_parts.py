@@ -13,9 +13,10 @@ from pipeline import dynamics
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly import fuse
-from pipeline.dynamics.assembly.numbers import tabulate
-from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.compile import functions
+from pipeline.dynamics.model.mechanism import build
+from pipeline.dynamics.model.model import tabulate
 from stages import s4_simulate
 
 SCENE = """
@@ -121,7 +122,7 @@ def test_it_is_refused_with_place_value_rule_and_remedy(
     def compile_nothing(*_: object) -> None:
         raise AssertionError("compiled before the input was checked")
 
-    monkeypatch.setattr(fuse, "entry", compile_nothing)
+    monkeypatch.setattr(functions, "entry", compile_nothing)
     path = tmp_path / "wrong.toml"
     path.write_text(SCENE + addition)
     with pytest.raises(InputError) as error:
@@ -161,8 +162,9 @@ ROWS = "time,other,angle\n# a remark\n0,9,0\n400,9,20\n1000,9,90\n"
 
 
 def values(path: Path) -> np.ndarray:
-    packed = tabulate(build(load_scene(path), {})).packed
-    return packed.table("PIECES")[:, :2]
+    packed = tabulate(build(load_scene(path), {})).arrays
+    pieces = packed.table(m.PIECES)
+    return np.column_stack([pieces["start"], pieces["coefficients"][:, 0]])
 
 
 def test_a_table_is_read_beside_the_scene_in_its_units(tmp_path: Path) -> None:

@@ -25,10 +25,10 @@ from benchmarks.mechanisms import (
     without_friction,
 )
 from pipeline import dynamics
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.progress import silent
-from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_SIZE
+from pipeline.dynamics import memory as m
 from stages import cost_peers
 from tests.reference.ideal_motion import ideal
 
@@ -136,7 +136,7 @@ def test_evaluations_in_contact_are_of_states_that_press():
     engine = mechanism("csj").engine()
     for label, state in states(engine, trajectory(engine)).items():
         assert evaluation_time(engine, state, 1) > 0.0
-        force = engine.view("TOUCH", TOUCH_SIZE)[NORMAL_FORCE]
+        force = engine.view(m.TOUCH.place, m.TOUCH.size)[m.TOUCH.normal_force]
         assert (force > 0.0) == (label == "in contact")
 
 

@@ -117,10 +117,6 @@ class Monitor:
         self.out.flush()
 
 
-def silent(fraction: float | None, text: str) -> None:
-    """Progress that nobody sees: where nobody watches, and where reports would be part of what is measured."""
-
-
 def duration(seconds: float) -> str:
     """``4.2 s``, ``3 min 10 s``."""
     if round(seconds, 1) < 60.0:

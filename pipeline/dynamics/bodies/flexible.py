@@ -13,36 +13,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
-from pipeline.dynamics.bodies.modal_terms import RATE, carried, mass_matrix, places, spatial, spin, stiffness, tensor
-from pipeline.dynamics.tables import (
-    ACCELERATION,
-    ALPHA,
-    AXES,
-    DU,
-    FLEX_C0,
-    FLEX_INBOARD,
-    FLEX_LINK,
-    FLEX_NUMBERS,
-    INERTIA_SIZE,
-    MODAL,
-    MODAL_BIAS,
-    MOMENT0,
-    MOMENT_VALUES,
-    MOMENTS,
-    N_MODES,
-    N_MOMENTS,
-    OMEGA,
-    ORIGIN,
-    OWN,
-    SCRATCH,
-    VELOCITY,
-    U,
-    flex,
-    link_frame,
-    momentum,
-    wrench,
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.modal_terms import (
+    RATE,
+    body_mass_matrix,
+    carried,
+    modal_forces,
+    places,
+    port_load,
+    spatial,
+    spin,
+    stiffness,
+    tensor,
 )
+from pipeline.dynamics.bodies.ports import make_ports
+from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import (
     accumulate,
     add,
@@ -51,8 +38,6 @@ from pipeline.dynamics.vectors import (
     congruence,
     cross,
     dot,
-    index,
-    kernel,
     put,
     scale,
     turn,
@@ -70,39 +55,51 @@ def straight(h, f, w, k, j, vector):
 @kernel
 def plain(f, data, n, j):
     """Int rho S_j of the linear shape of mode j."""
-    return (f[index(data + j)], f[index(data + n + j)], f[index(data + 2 * n + j)])
+    return (f[data + j], f[data + n + j], f[data + 2 * n + j])
 
 
 @dataclass(frozen=True)
-class Kernels:
-    """What `equations` and `observe` compose: see the functions of the same names in `compose`."""
+class FlexibleBodies:
+    """Kernels of all flexible bodies.
 
+    site(h, f, w, s), inboard(h, f, w, i, ...): of frames on them (see `ports`).  inertia(h, f, w, n): spatial inertias,
+    wrenches and modal forces, modal accelerations taken as zero.  mass_matrix(h, f, w): modal blocks, right after it.
+    modal_inertia(h, f, w, n): what these add to the wrenches.  port_load(h, w, i): a link on a flexible parent loads
+    its modes, too.  modal_forces(h, w): generalised forces of the modes.  energies(h, f, w): kinetic and elastic [J].
+    """
+
+    site: Callable
+    inboard: Callable
     inertia: Callable
     mass_matrix: Callable
     modal_inertia: Callable
+    port_load: Callable
+    modal_forces: Callable
     energies: Callable
 
 
-def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
-    """The kernels of a body whose bending shortens it by these forms (h, f, w, k, j, vector), or by `straight`."""
+def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
+    """The kernels of bodies with linear shapes, or with those that bending shortens (the module `shortening`)."""
+    first_moment = straight if shortening is None else shortening.first_moment
+    second_moment = straight if shortening is None else shortening.second_moment
+    site, inboard = make_ports(straight if shortening is None else shortening.at_port)
 
     @kernel
     def invariants(h, f, w, k):
         """Fill MODAL with P (first 9 n) and V (next 9 n), row (3k + l) holding n values."""
         n, x, u, data = places(h, k)
-        P = h[MODAL]
+        P = h[m.MODAL]
         V = P + 9 * n
         for e in range(9 * n):
-            w[index(P + e)] = f[index(data + 3 * n + e)]
-            w[index(V + e)] = 0.0
-        first, count = flex(h, k, MOMENT0), flex(h, k, N_MOMENTS)
-        where, values = h[MOMENTS] + 2 * first, h[MOMENT_VALUES] + first
-        for e in range(count):
-            row, i, value = h[index(where + 2 * e)], h[index(where + 2 * e + 1)], f[index(values + e)]
-            w[index(P + row)] += value * w[index(x + i)]
-            w[index(V + row)] += value * w[index(u + i)]
+            w[P + e] = f[data + 3 * n + e]
+            w[V + e] = 0.0
+        first, count = m.FLEXES.moment0(h, k), m.FLEXES.n_moments(h, k)
+        for e in range(first, first + count):
+            row, i, value = m.MOMENTS.row_of(h, e), m.MOMENTS.mode(h, e), f[m.MOMENT_VALUES.row(h, e)]
+            w[P + row] += value * w[x + i]
+            w[V + row] += value * w[u + i]
         for j in range(n):
-            w[index(P + j)] += second_moment(h, f, w, k, j, x)
+            w[P + j] += second_moment(h, f, w, k, j, x)
 
     @kernel
     def shape(h, f, w, k, j):
@@ -115,116 +112,138 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
     def sums(h, f, w, k):
         """First moment and its rate; into SCRATCH the second moment and D (after `invariants`)."""
         n, x, u, data = places(h, k)
-        P, numbers, Q = h[MODAL], h[FLEX_NUMBERS] + 13 * k, h[SCRATCH]
-        c, v = at(f, numbers + 1), (0.0, 0.0, 0.0)
+        P, numbers, Q = h[m.MODAL], m.FLEX_NUMBERS.row(h, k), h[m.SCRATCH]
+        c, v = at(f, numbers + m.FLEX_NUMBERS.first_moment), (0.0, 0.0, 0.0)
         for j in range(n):
             straight, bent = plain(f, data, n, j), shape(h, f, w, k, j)
-            c = add(c, scale(0.5 * w[index(x + j)], add(straight, bent)))
-            v = add(v, scale(w[index(u + j)], bent))
+            c = add(c, scale(0.5 * w[x + j], add(straight, bent)))
+            v = add(v, scale(w[u + j], bent))
         for a in range(3):
             for b in range(3):
-                both, rate = f[index(numbers + 4 + 3 * a + b)], 0.0
+                both, rate = f[numbers + m.FLEX_NUMBERS.second_moment + 3 * a + b], 0.0
                 row, mirrored = P + (3 * a + b) * n, data + 3 * n + (3 * b + a) * n
                 for j in range(n):
                     # int r_a r_b = int X_a X_b + int X_b S_a q + int r_a S_b q
-                    both += (f[index(mirrored + j)] + w[index(row + j)]) * w[index(x + j)]
-                    rate += w[index(row + j)] * w[index(u + j)]
-                w[index(Q + 3 * a + b)] = both
-                w[index(Q + RATE + 3 * a + b)] = rate
+                    both += (f[mirrored + j] + w[row + j]) * w[x + j]
+                    rate += w[row + j] * w[u + j]
+                w[Q + 3 * a + b] = both
+                w[Q + RATE + 3 * a + b] = rate
         return c, v
 
     @kernel
     def modes(h, f, w, k, R, p, a, alpha, omega):
         """Inertial forces on the modes, and the momentum that each mode's rate carries."""
-        n = flex(h, k, N_MODES)
-        c0, P = flex(h, k, FLEX_C0), h[MODAL]
+        n = m.FLEXES.n_modes(h, k)
+        c0, P = m.FLEXES.c0(h, k), h[m.MODAL]
         V = P + 9 * n
         x, y, z = omega
         xx, yy, zz = y * y + z * z, x * x + z * z, x * x + y * y
         for j in range(n):
             C = shape(h, f, w, k, j)
             angular = spin(w, P, n, j)
-            centrifugal = x * y * (w[index(P + n + j)] + w[index(P + 3 * n + j)]) + x * z * (
-                w[index(P + 2 * n + j)] + w[index(P + 6 * n + j)]
-            )
-            centrifugal += y * z * (w[index(P + 5 * n + j)] + w[index(P + 7 * n + j)])
-            centrifugal -= xx * w[index(P + j)] + yy * w[index(P + 4 * n + j)] + zz * w[index(P + 8 * n + j)]
+            centrifugal = x * y * (w[P + n + j] + w[P + 3 * n + j]) + x * z * (w[P + 2 * n + j] + w[P + 6 * n + j])
+            centrifugal += y * z * (w[P + 5 * n + j] + w[P + 7 * n + j])
+            centrifugal -= xx * w[P + j] + yy * w[P + 4 * n + j] + zz * w[P + 8 * n + j]
             coriolis = 2.0 * dot(spin(w, V, n, j), omega)
-            w[index(h[MODAL_BIAS] + c0 + j)] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
+            w[h[m.MODAL_BIAS] + c0 + j] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
             linear = turn(R, C)
-            o = momentum(h, c0 + j)
+            o = m.MOMENTA.row(h, c0 + j)
             put(w, o, add(turn(R, angular), cross(p, linear)))
             put(w, o + 3, linear)
-        if flex(h, k, FLEX_INBOARD):
+        if m.FLEXES.inboard(h, k):
             carried(h, w, k)
 
     @kernel
-    def inertia(h, f, w, k):
+    def body_inertia(h, f, w, k):
         """Spatial inertia, wrench, modal forces and modal momenta of flexible body k.
 
         As `rigid.inertia`, with the modal accelerations taken as zero; `modal_inertia` adds theirs.
         """
-        i, n, u = flex(h, k, FLEX_LINK), flex(h, k, N_MODES), h[U] + flex(h, k, FLEX_C0)
+        i, n, u = m.FLEXES.link(h, k), m.FLEXES.n_modes(h, k), h[m.U] + m.FLEXES.c0(h, k)
         invariants(h, f, w, k)
         first, first_rate = sums(h, f, w, k)
-        mass = f[index(h[FLEX_NUMBERS] + 13 * k)]
-        frame, Q = link_frame(h, i), h[SCRATCH]
-        R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
+        mass = f[m.FLEX_NUMBERS.row(h, k)]
+        frame, Q = m.LINK_FRAMES.row(h, i), h[m.SCRATCH]
+        R, p = at9(w, frame + m.FRAME.axes), at(w, frame + m.FRAME.origin)
         J = tensor(w, Q)
-        omega, alpha = turn_back(R, at(w, frame + OMEGA)), turn_back(R, at(w, frame + ALPHA))
-        a = turn_back(R, at(w, frame + ACCELERATION))
-        spatial(w, h[OWN] + INERTIA_SIZE * i, mass, p, turn(R, first), congruence(R, J))
+        omega, alpha = turn_back(R, at(w, frame + m.FRAME.omega)), turn_back(R, at(w, frame + m.FRAME.alpha))
+        a = turn_back(R, at(w, frame + m.FRAME.acceleration))
+        spatial(w, m.OWN.row(h, i), mass, p, turn(R, first), congruence(R, J))
         force = add(scale(mass, a), cross(alpha, first))
         force = add(force, cross(omega, add(cross(omega, first), scale(2.0, first_rate))))
         for j in range(n):
             # a point that bending draws in is accelerated also at constant modal rates
-            force = add(force, (w[index(u + j)] * first_moment(h, f, w, k, j, u), 0.0, 0.0))
+            force = add(force, (w[u + j] * first_moment(h, f, w, k, j, u), 0.0, 0.0))
         moment = add(cross(first, a), turn_symmetric(J, alpha))
         moment = add(moment, cross(omega, turn_symmetric(J, omega)))
         # 2 int rho r x (omega x rdot) = 2 (tr(D) omega - D^T omega)
         D = at9(w, Q + RATE)
         twice = add(scale(D[0] + D[4] + D[8], omega), scale(-1.0, turn_back(D, omega)))
         moment = add(moment, scale(2.0, twice))
-        o, force = wrench(h, i), turn(R, force)
+        o, force = m.WRENCH.row(h, i), turn(R, force)
         put(w, o, add(turn(R, moment), cross(p, force)))
         put(w, o + 3, force)
         modes(h, f, w, k, R, p, a, alpha, omega)
         stiffness(h, f, w, k)
 
     @kernel
-    def modal_inertia(h, f, w, k):
+    def body_modal_inertia(h, f, w, k):
         """Add what the modal accelerations in DU demand to the wrench on the body's link (after `inertia`)."""
-        n = flex(h, k, N_MODES)
-        i, du, P = flex(h, k, FLEX_LINK), h[DU] + flex(h, k, FLEX_C0), h[MODAL]
+        n = m.FLEXES.n_modes(h, k)
+        i, du, P = m.FLEXES.link(h, k), h[m.DU] + m.FLEXES.c0(h, k), h[m.MODAL]
         invariants(h, f, w, k)
-        frame = link_frame(h, i)
-        R, p = at9(w, frame + AXES), at(w, frame + ORIGIN)
+        frame = m.LINK_FRAMES.row(h, i)
+        R, p = at9(w, frame + m.FRAME.axes), at(w, frame + m.FRAME.origin)
         force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
         for j in range(n):
-            force = add(force, scale(w[index(du + j)], shape(h, f, w, k, j)))
-            moment = add(moment, scale(w[index(du + j)], spin(w, P, n, j)))
+            force = add(force, scale(w[du + j], shape(h, f, w, k, j)))
+            moment = add(moment, scale(w[du + j], spin(w, P, n, j)))
         force = turn(R, force)
-        accumulate(w, wrench(h, i), add(turn(R, moment), cross(p, force)))
-        accumulate(w, wrench(h, i) + 3, force)
+        accumulate(w, m.WRENCH.row(h, i), add(turn(R, moment), cross(p, force)))
+        accumulate(w, m.WRENCH.row(h, i) + 3, force)
 
     @kernel
-    def energies(h, f, w, k):
+    def body_energies(h, f, w, k):
         """Kinetic and elastic energy [J] of flexible body k."""
         n, x, u, data = places(h, k)
         invariants(h, f, w, k)
         first, first_rate = sums(h, f, w, k)
-        frame, P = link_frame(h, flex(h, k, FLEX_LINK)), h[MODAL]
-        R = at9(w, frame + AXES)
-        omega, v = turn_back(R, at(w, frame + OMEGA)), turn_back(R, at(w, frame + VELOCITY))
-        kinetic = 0.5 * f[index(h[FLEX_NUMBERS] + 13 * k)] * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
-        kinetic += 0.5 * dot(omega, turn_symmetric(tensor(w, h[SCRATCH]), omega))
+        frame, P = m.LINK_FRAMES.row(h, m.FLEXES.link(h, k)), h[m.MODAL]
+        R = at9(w, frame + m.FRAME.axes)
+        omega, v = turn_back(R, at(w, frame + m.FRAME.omega)), turn_back(R, at(w, frame + m.FRAME.velocity))
+        kinetic = 0.5 * f[m.FLEX_NUMBERS.row(h, k)] * dot(v, v) + dot(v, add(cross(omega, first), first_rate))
+        kinetic += 0.5 * dot(omega, turn_symmetric(tensor(w, h[m.SCRATCH]), omega))
         elastic, M = 0.0, data + 12 * n
         K = M + n * n
         for i in range(n):
-            kinetic += dot(omega, spin(w, P, n, i)) * w[index(u + i)]
-            elastic += 0.5 * f[index(K + i)] * w[index(x + i)] ** 2
+            kinetic += dot(omega, spin(w, P, n, i)) * w[u + i]
+            elastic += 0.5 * f[K + i] * w[x + i] ** 2
             for j in range(n):
-                kinetic += 0.5 * f[index(M + i * n + j)] * w[index(u + i)] * w[index(u + j)]
+                kinetic += 0.5 * f[M + i * n + j] * w[u + i] * w[u + j]
         return kinetic, elastic
 
-    return Kernels(inertia, mass_matrix, modal_inertia, energies)
+    @kernel
+    def inertia(h, f, w, n):
+        for k in range(h[m.N_FLEX]):
+            body_inertia(h, f, w, k)
+
+    @kernel
+    def mass_matrix(h, f, w):
+        for k in range(h[m.N_FLEX]):
+            body_mass_matrix(h, f, w, k)
+
+    @kernel
+    def modal_inertia(h, f, w, n):
+        for k in range(h[m.N_FLEX]):
+            body_modal_inertia(h, f, w, k)
+
+    @kernel
+    def energies(h, f, w):
+        kinetic = elastic = 0.0
+        for k in range(h[m.N_FLEX]):
+            moving, bent = body_energies(h, f, w, k)
+            kinetic += moving
+            elastic += bent
+        return kinetic, elastic
+
+    return FlexibleBodies(site, inboard, inertia, mass_matrix, modal_inertia, port_load, modal_forces, energies)

@@ -2,44 +2,10 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics.tables import (
-    DATA0,
-    DEFORMATION,
-    ENVELOPE,
-    FLEX_C0,
-    FLEX_DATA,
-    FLEX_INBOARD,
-    FLEX_LINK,
-    FLEX_Q0,
-    INERTIA_SIZE,
-    LEDGER_RATE,
-    MASS,
-    MODAL_BIAS,
-    MODAL_LOSS,
-    N_MODES,
-    OWN,
-    POSITION_RATE,
-    U,
-    X,
-    column,
-    flex,
-    momentum,
-    wrench,
-)
-from pipeline.dynamics.vectors import (
-    accumulate,
-    add,
-    at,
-    at6,
-    cross,
-    dot,
-    dot6,
-    index,
-    kernel,
-    put,
-    scale,
-    turn_symmetric,
-)
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import carry
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot, dot6, put, scale, turn_symmetric
 
 RATE = 9  #: SCRATCH: second moment int rho r r^T (9), then D = int rho r rdot^T (9)
 
@@ -47,20 +13,20 @@ RATE = 9  #: SCRATCH: second moment int rho r r^T (9), then D = int rho r rdot^T
 @kernel
 def places(h, k):
     """Number of modes, and where body k keeps positions, speeds and numbers."""
-    n = flex(h, k, N_MODES)
-    return n, h[X] + flex(h, k, FLEX_Q0), h[U] + flex(h, k, FLEX_C0), h[FLEX_DATA] + flex(h, k, DATA0)
+    n = m.FLEXES.n_modes(h, k)
+    return n, h[m.X] + m.FLEXES.q0(h, k), h[m.U] + m.FLEXES.c0(h, k), h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k)
 
 
 @kernel
 def tensor(w, Q):
     """Inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment stored from Q."""
     return (
-        w[index(Q + 4)] + w[index(Q + 8)],
-        w[Q] + w[index(Q + 8)],
-        w[Q] + w[index(Q + 4)],
-        -w[index(Q + 1)],
-        -w[index(Q + 2)],
-        -w[index(Q + 5)],
+        w[Q + 4] + w[Q + 8],
+        w[Q] + w[Q + 8],
+        w[Q] + w[Q + 4],
+        -w[Q + 1],
+        -w[Q + 2],
+        -w[Q + 5],
     )
 
 
@@ -68,40 +34,40 @@ def tensor(w, Q):
 def spin(w, P, n, j):
     """Antisymmetric part of column j of P (or V): int rho r x S_j (or rdot x S_j)."""
     return (
-        w[index(P + 5 * n + j)] - w[index(P + 7 * n + j)],
-        w[index(P + 6 * n + j)] - w[index(P + 2 * n + j)],
-        w[index(P + n + j)] - w[index(P + 3 * n + j)],
+        w[P + 5 * n + j] - w[P + 7 * n + j],
+        w[P + 6 * n + j] - w[P + 2 * n + j],
+        w[P + n + j] - w[P + 3 * n + j],
     )
 
 
 @kernel
 def spatial(w, o, mass, p, c, J):
     """Store a spatial inertia; c, J: first moment and inertia about p, world axes."""
-    w[index(o)] = mass
+    w[o] = mass
     put(w, o + 1, add(scale(mass, p), c))
     square = mass * dot(p, p) + 2.0 * dot(p, c)
     for k in range(3):
-        w[index(o + 4 + k)] = J[k] + square - mass * p[k] * p[k] - 2.0 * p[k] * c[k]
-    w[index(o + 7)] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
-    w[index(o + 8)] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
-    w[index(o + 9)] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
+        w[o + 4 + k] = J[k] + square - mass * p[k] * p[k] - 2.0 * p[k] * c[k]
+    w[o + 7] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
+    w[o + 8] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
+    w[o + 9] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
 
 
 @kernel
 def carried(h, w, k):
     """Modes that also move the body frame: their columns carry the body's own wrench and inertia."""
-    i, c0 = flex(h, k, FLEX_LINK), flex(h, k, FLEX_C0)
-    own = h[OWN] + INERTIA_SIZE * i
+    i, c0 = m.FLEXES.link(h, k), m.FLEXES.c0(h, k)
+    own = m.OWN.row(h, i)
     c, J = at(w, own + 1), at6(w, own + 4)
-    for j in range(c0, c0 + flex(h, k, N_MODES)):
-        s, o = column(h, j), momentum(h, j)
-        w[index(h[MODAL_BIAS] + j)] += dot6(w, s, w, wrench(h, i))
+    for j in range(c0, c0 + m.FLEXES.n_modes(h, k)):
+        s, o = m.COLUMNS.row(h, j), m.MOMENTA.row(h, j)
+        w[h[m.MODAL_BIAS] + j] += dot6(w, s, w, m.WRENCH.row(h, i))
         omega, v = at(w, s), at(w, s + 3)
         # momentum of the deformation alone stays for the mass matrix
         for e in range(6):
-            w[index(h[DEFORMATION] + 6 * j + e)] = w[index(o + e)]
+            w[m.DEFORMATION.row(h, j) + e] = w[o + e]
         accumulate(w, o, add(turn_symmetric(J, omega), cross(c, v)))
-        accumulate(w, o + 3, add(scale(w[index(own)], v), cross(omega, c)))
+        accumulate(w, o + 3, add(scale(w[own], v), cross(omega, c)))
 
 
 @kernel
@@ -109,26 +75,50 @@ def stiffness(h, f, w, k):
     """Elastic and damping forces join the modal forces; the power lost to damping joins the ledger."""
     n, x, u, data = places(h, k)
     K = data + 12 * n + n * n
-    bias, rate = h[MODAL_BIAS] + flex(h, k, FLEX_C0), h[POSITION_RATE] + flex(h, k, FLEX_Q0)
+    bias, rate = h[m.MODAL_BIAS] + m.FLEXES.c0(h, k), h[m.POSITION_RATE] + m.FLEXES.q0(h, k)
     for j in range(n):
-        speed = w[index(u + j)]
-        damping = f[index(K + n + j)] * speed
-        w[index(bias + j)] += f[index(K + j)] * w[index(x + j)] + damping
-        w[index(rate + j)] = speed
-        w[h[LEDGER_RATE] + MODAL_LOSS] += damping * speed
+        speed = w[u + j]
+        damping = f[K + n + j] * speed
+        w[bias + j] += f[K + j] * w[x + j] + damping
+        w[rate + j] = speed
+        w[h[m.LEDGER_RATE] + m.MODAL_LOSS] += damping * speed
 
 
 @kernel
-def mass_matrix(h, f, w, k):
+def body_mass_matrix(h, f, w, k):
     """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
     n, _, _, data = places(h, k)
-    c0, moves = flex(h, k, FLEX_C0), flex(h, k, FLEX_INBOARD)
+    c0, moves = m.FLEXES.c0(h, k), m.FLEXES.inboard(h, k)
     for i in range(n):
-        e = h[ENVELOPE] + 2 * (c0 + i)
-        start = h[MASS] + h[index(e + 1)] - h[index(e)] + c0
+        start = h[m.MASS] + m.ENVELOPE.start(h, c0 + i) - m.ENVELOPE.first(h, c0 + i) + c0
         for j in range(i + 1):
-            value = f[index(data + 12 * n + i * n + j)]
+            value = f[data + 12 * n + i * n + j]
             if moves:
-                value += dot6(w, momentum(h, c0 + i), w, column(h, c0 + j))
-                value += dot6(w, column(h, c0 + i), w, h[DEFORMATION] + 6 * (c0 + j))
-            w[index(start + j)] += value
+                value += dot6(w, m.MOMENTA.row(h, c0 + i), w, m.COLUMNS.row(h, c0 + j))
+                value += dot6(w, m.COLUMNS.row(h, c0 + i), w, m.DEFORMATION.row(h, c0 + j))
+            w[start + j] += value
+
+
+@kernel
+def port_load(h, w, i):
+    """A link on a flexible parent also loads the parent's modes, through its port."""
+    p = m.LINKS.carried_by(h, i)
+    if p < 0:
+        return
+    b = m.PORTS.flex(h, p)
+    c0, first = m.FLEXES.c0(h, b), m.PORTS.column(h, p)
+    for j in range(m.FLEXES.n_modes(h, b)):
+        k = first + j
+        carry(h, w, i, k)
+        accumulate(w, m.MOMENTA.row(h, c0 + j), at(w, m.MOMENTA.row(h, k)))
+        accumulate(w, m.MOMENTA.row(h, c0 + j) + 3, at(w, m.MOMENTA.row(h, k) + 3))
+        w[h[m.MODAL_BIAS] + c0 + j] += dot6(w, m.COLUMNS.row(h, k), w, m.WRENCH.row(h, i))
+
+
+@kernel
+def modal_forces(h, w):
+    """Generalised forces of the modes."""
+    for b in range(h[m.N_FLEX]):
+        c0 = m.FLEXES.c0(h, b)
+        for j in range(c0, c0 + m.FLEXES.n_modes(h, b)):
+            w[h[m.BIAS] + j] = w[h[m.MODAL_BIAS] + j]

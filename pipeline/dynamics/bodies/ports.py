@@ -8,35 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.tables import (
-    ACCELERATION,
-    ALPHA,
-    AXES,
-    DU,
-    FLEX_C0,
-    FLEX_INBOARD,
-    FLEX_LINK,
-    FLEX_Q0,
-    INBOARD_PORT,
-    N_MODES,
-    OMEGA,
-    ORIGIN,
-    PORT_COLUMN,
-    PORT_DATA,
-    PORT_FLEX,
-    PORT_NUMBERS,
-    PORT_SHAPES,
-    VELOCITY,
-    U,
-    X,
-    column,
-    flex,
-    link,
-    link_frame,
-    port,
-    site_frame,
-    site_port,
-)
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import (
     accumulate,
     add,
@@ -44,8 +17,6 @@ from pipeline.dynamics.vectors import (
     at9,
     cross,
     exponential,
-    index,
-    kernel,
     product,
     put,
     put9,
@@ -61,10 +32,10 @@ from pipeline.dynamics.vectors import (
 @kernel
 def _shape(f, first, n, j):
     """Column j of a 3 x n shape stored from `first`."""
-    return (f[index(first + j)], f[index(first + n + j)], f[index(first + 2 * n + j)])
+    return (f[first + j], f[first + n + j], f[first + 2 * n + j])
 
 
-def compose(shortening: Callable) -> tuple[Callable, Callable]:
+def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
     """The kernels `site` and `inboard`; shortening(h, f, w, p, j, vector) is what bending adds along x, or zero."""
 
     @kernel
@@ -73,22 +44,22 @@ def compose(shortening: Callable) -> tuple[Callable, Callable]:
 
         Body components.  The accelerations hold what the known modal accelerations give.
         """
-        k = port(h, p, PORT_FLEX)
-        n, x, c0 = flex(h, k, N_MODES), h[X] + flex(h, k, FLEX_Q0), flex(h, k, FLEX_C0)
-        u, du = h[U] + c0, h[DU] + c0
-        move = h[PORT_DATA] + port(h, p, PORT_SHAPES)
+        k = m.PORTS.flex(h, p)
+        n, x, c0 = m.FLEXES.n_modes(h, k), h[m.X] + m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
+        u, du = h[m.U] + c0, h[m.DU] + c0
+        move = h[m.PORT_DATA.place] + m.PORTS.shapes(h, p)
         spin = move + 3 * n
         zero = (0.0, 0.0, 0.0)
         s, s_rate, s_acc, theta, theta_rate, theta_acc = zero, zero, zero, zero, zero, zero
         for j in range(n):
             phi, psi, drawn = _shape(f, move, n, j), _shape(f, spin, n, j), shortening(h, f, w, p, j, x)
             bent = (phi[0] + drawn, phi[1], phi[2])
-            s = add(s, scale(w[index(x + j)], (phi[0] + 0.5 * drawn, phi[1], phi[2])))
-            s_rate, s_acc = add(s_rate, scale(w[index(u + j)], bent)), add(s_acc, scale(w[index(du + j)], bent))
-            s_acc = add(s_acc, (w[index(u + j)] * shortening(h, f, w, p, j, u), 0.0, 0.0))
-            theta, theta_rate = add(theta, scale(w[index(x + j)], psi)), add(theta_rate, scale(w[index(u + j)], psi))
-            theta_acc = add(theta_acc, scale(w[index(du + j)], psi))
-        numbers = h[PORT_NUMBERS] + 12 * p
+            s = add(s, scale(w[x + j], (phi[0] + 0.5 * drawn, phi[1], phi[2])))
+            s_rate, s_acc = add(s_rate, scale(w[u + j], bent)), add(s_acc, scale(w[du + j], bent))
+            s_acc = add(s_acc, (w[u + j] * shortening(h, f, w, p, j, u), 0.0, 0.0))
+            theta, theta_rate = add(theta, scale(w[x + j], psi)), add(theta_rate, scale(w[u + j], psi))
+            theta_acc = add(theta_acc, scale(w[du + j], psi))
+        numbers = m.PORT_NUMBERS.row(h, p)
         local = add(at(f, numbers), s)
         turned = product(exponential(theta), at9(f, numbers + 3))
         alpha = add(tangent_rate(theta, theta_rate), tangent(theta, theta_acc))
@@ -100,50 +71,50 @@ def compose(shortening: Callable) -> tuple[Callable, Callable]:
 
         Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port.
         """
-        k = port(h, p, PORT_FLEX)
-        n, move, x = flex(h, k, N_MODES), h[PORT_DATA] + port(h, p, PORT_SHAPES), h[X] + flex(h, k, FLEX_Q0)
+        k = m.PORTS.flex(h, p)
+        n, move, x = m.FLEXES.n_modes(h, k), h[m.PORT_DATA.place] + m.PORTS.shapes(h, p), h[m.X] + m.FLEXES.q0(h, k)
         for j in range(n):
             phi = _shape(f, move, n, j)
             bent = (phi[0] + shortening(h, f, w, p, j, x), phi[1], phi[2])
             angular = scale(sign, turn(R, tangent(theta, _shape(f, move + 3 * n, n, j))))
             linear = scale(sign, turn(R, bent))
-            o = column(h, first + j)
+            o = m.COLUMNS.row(h, first + j)
             accumulate(w, o, angular)
             accumulate(w, o + 3, add(linear, cross(origin, angular)))
 
     @kernel
     def site(h, f, w, s):
         """Motion of a site on a flexible link, and the columns of its port."""
-        p = site_port(h, s)
-        k = port(h, p, PORT_FLEX)
+        p = m.SITES.port(h, s)
+        k = m.PORTS.flex(h, p)
         local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
-        frame = link_frame(h, flex(h, k, FLEX_LINK))
-        R, omega, alpha = at9(w, frame + AXES), at(w, frame + OMEGA), at(w, frame + ALPHA)
+        frame = m.LINK_FRAMES.row(h, m.FLEXES.link(h, k))
+        R, omega, alpha = at9(w, frame + m.FRAME.axes), at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
         arm, turning, sliding = turn(R, local), turn(R, omega_l), turn(R, v_l)
-        origin, swing = add(at(w, frame + ORIGIN), arm), cross(omega, arm)
-        a = add(at(w, frame + ACCELERATION), add(cross(alpha, arm), cross(omega, swing)))
+        origin, swing = add(at(w, frame + m.FRAME.origin), arm), cross(omega, arm)
+        a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, swing)))
         a = add(a, add(scale(2.0, cross(omega, sliding)), turn(R, a_l)))
-        o = site_frame(h, s)
-        put(w, o + ORIGIN, origin)
-        put9(w, o + AXES, product(R, turned))
-        put(w, o + OMEGA, add(omega, turning))
-        put(w, o + VELOCITY, add(at(w, frame + VELOCITY), add(swing, sliding)))
-        put(w, o + ALPHA, add(alpha, add(turn(R, alpha_l), cross(omega, turning))))
-        put(w, o + ACCELERATION, a)
-        moves, first, c0 = flex(h, k, FLEX_INBOARD), port(h, p, PORT_COLUMN), flex(h, k, FLEX_C0)
-        for j in range(flex(h, k, N_MODES)):
+        o = m.SITE_FRAMES.row(h, s)
+        put(w, o + m.FRAME.origin, origin)
+        put9(w, o + m.FRAME.axes, product(R, turned))
+        put(w, o + m.FRAME.omega, add(omega, turning))
+        put(w, o + m.FRAME.velocity, add(at(w, frame + m.FRAME.velocity), add(swing, sliding)))
+        put(w, o + m.FRAME.alpha, add(alpha, add(turn(R, alpha_l), cross(omega, turning))))
+        put(w, o + m.FRAME.acceleration, a)
+        moves, first, c0 = m.FLEXES.inboard(h, k), m.PORTS.column(h, p), m.FLEXES.c0(h, k)
+        for j in range(m.FLEXES.n_modes(h, k)):
             for e in range(6):
-                w[index(column(h, first + j) + e)] = w[index(column(h, c0 + j) + e)] if moves else 0.0
+                w[m.COLUMNS.row(h, first + j) + e] = w[m.COLUMNS.row(h, c0 + j) + e] if moves else 0.0
         modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
 
     @kernel
     def inboard(h, f, w, i, origin, R, omega, v, alpha, a):
         """From the inboard joint frame G, which the modes may move in the body, to the body frame."""
-        p = link(h, i, INBOARD_PORT)
-        k = port(h, p, PORT_FLEX)
-        if flex(h, k, FLEX_INBOARD) == 0:
+        p = m.LINKS.inboard_port(h, i)
+        k = m.PORTS.flex(h, p)
+        if m.FLEXES.inboard(h, k) == 0:
             # the reference condition holds this frame still in the body: a rigid step
-            numbers = h[PORT_NUMBERS] + 12 * p
+            numbers = m.PORT_NUMBERS.row(h, p)
             R_WB = product(R, transpose(at9(f, numbers + 3)))
             arm = turn(R_WB, at(f, numbers))
             swing = cross(omega, arm)
@@ -158,10 +129,10 @@ def compose(shortening: Callable) -> tuple[Callable, Callable]:
         v_B = sub(v, add(swing, sliding))
         a_B = sub(a, add(cross(alpha_B, arm), cross(omega_B, swing)))
         a_B = sub(a_B, add(scale(2.0, cross(omega_B, sliding)), turn(R_WB, a_l)))
-        c0 = flex(h, k, FLEX_C0)
-        for j in range(flex(h, k, N_MODES)):
+        c0 = m.FLEXES.c0(h, k)
+        for j in range(m.FLEXES.n_modes(h, k)):
             for e in range(6):
-                w[index(column(h, c0 + j) + e)] = 0.0
+                w[m.COLUMNS.row(h, c0 + j) + e] = 0.0
         modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c0)
         return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
 

@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics.tables import (
-    ACCELERATION,
-    ALPHA,
-    AXES,
-    INERTIA_SIZE,
-    LINK_NUMBERS,
-    OMEGA,
-    ORIGIN,
-    OWN,
-    VELOCITY,
-    link_frame,
-    wrench,
-)
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import (
+    accumulate,
     add,
     at,
     at6,
@@ -23,14 +13,11 @@ from pipeline.dynamics.vectors import (
     congruence,
     cross,
     dot,
-    kernel,
     put,
     scale,
     turn,
     turn_symmetric,
 )
-
-MASS, COM, TENSOR, NUMBERS = 0, 1, 4, 10  # fields of LINK_NUMBERS
 
 
 @kernel
@@ -54,18 +41,18 @@ def inertia(h, f, w, i):
     The wrench is what the accelerations now in its frame need, gravity being an acceleration of
     the ground.
     """
-    frame, numbers = link_frame(h, i), h[LINK_NUMBERS] + NUMBERS * i
-    R = at9(w, frame + AXES)
-    omega, alpha = at(w, frame + OMEGA), at(w, frame + ALPHA)
-    arm = turn(R, at(f, numbers + COM))
-    c = add(at(w, frame + ORIGIN), arm)
-    mass = f[numbers + MASS]
-    J = congruence(R, at6(f, numbers + TENSOR))
-    spatial(w, h[OWN] + INERTIA_SIZE * i, mass, c, J)
-    a = add(at(w, frame + ACCELERATION), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
+    R = at9(w, frame + m.FRAME.axes)
+    omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
+    arm = turn(R, at(f, numbers + m.LINK_NUMBERS.com))
+    c = add(at(w, frame + m.FRAME.origin), arm)
+    mass = f[numbers + m.LINK_NUMBERS.mass]
+    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
+    spatial(w, m.OWN.row(h, i), mass, c, J)
+    a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
     force = scale(mass, a)
     moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
-    o = wrench(h, i)
+    o = m.WRENCH.row(h, i)
     put(w, o, add(moment, cross(c, force)))
     put(w, o + 3, force)
 
@@ -73,9 +60,33 @@ def inertia(h, f, w, i):
 @kernel
 def kinetic_energy(h, f, w, i):
     """Kinetic energy [J] of a rigid link."""
-    frame, numbers = link_frame(h, i), h[LINK_NUMBERS] + NUMBERS * i
-    R = at9(w, frame + AXES)
-    omega = at(w, frame + OMEGA)
-    v = add(at(w, frame + VELOCITY), cross(omega, turn(R, at(f, numbers + COM))))
-    J = congruence(R, at6(f, numbers + TENSOR))
-    return 0.5 * (f[numbers + MASS] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
+    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
+    R = at9(w, frame + m.FRAME.axes)
+    omega = at(w, frame + m.FRAME.omega)
+    v = add(at(w, frame + m.FRAME.velocity), cross(omega, turn(R, at(f, numbers + m.LINK_NUMBERS.com))))
+    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
+    return 0.5 * (f[numbers + m.LINK_NUMBERS.mass] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
+
+
+@kernel
+def carry(h, w, i, k):
+    """Store the momentum of the subtree of link i moving with column k."""
+    I, s, o = m.INERTIA.row(h, i), m.COLUMNS.row(h, k), m.MOMENTA.row(h, k)
+    omega, v, c = at(w, s), at(w, s + 3), at(w, I + m.INERTIA.moment)
+    put(w, o, add(turn_symmetric(at6(w, I + m.INERTIA.inertia), omega), cross(c, v)))
+    put(w, o + 3, add(scale(w[I + m.INERTIA.mass], v), cross(omega, c)))
+
+
+@kernel
+def apply_wrench(h, w, s, moment, force):
+    """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
+    o = m.WRENCH.row(h, m.SITES.link(h, s))
+    accumulate(w, o, scale(-1.0, moment))
+    accumulate(w, o + 3, scale(-1.0, force))
+    p = m.SITES.port(h, s)
+    if p >= 0:
+        b = m.PORTS.flex(h, p)
+        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b), m.PORTS.column(h, p)
+        for j in range(m.FLEXES.n_modes(h, b)):
+            o = m.COLUMNS.row(h, first + j)
+            w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)

@@ -15,8 +15,8 @@ International Journal for Numerical Methods in Engineering 32, 1833-1850.
 
 from __future__ import annotations
 
-from pipeline.dynamics.tables import DATA0, FLEX_DATA, N_MODES, PORT_DATA, PORT_FLEX, PORT_SHAPES, flex, port
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
@@ -24,26 +24,26 @@ def _form(f, w, o, n, vector):
     """A row of a form, from place o, times a vector in w."""
     total = 0.0
     for i in range(n):
-        total += f[index(o + i)] * w[index(vector + i)]
+        total += f[o + i] * w[vector + i]
     return total
 
 
 @kernel
 def first_moment(h, f, w, k, j, vector):
     """Row j of int rho B of body k, times a vector in w."""
-    n = flex(h, k, N_MODES)
-    return _form(f, w, h[FLEX_DATA] + flex(h, k, DATA0) + (14 + n + j) * n, n, vector)
+    n = m.FLEXES.n_modes(h, k)
+    return _form(f, w, h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + (14 + n + j) * n, n, vector)
 
 
 @kernel
 def second_moment(h, f, w, k, j, vector):
     """Row j of int rho x B of body k, times a vector in w."""
-    n = flex(h, k, N_MODES)
-    return _form(f, w, h[FLEX_DATA] + flex(h, k, DATA0) + (14 + 2 * n + j) * n, n, vector)
+    n = m.FLEXES.n_modes(h, k)
+    return _form(f, w, h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + (14 + 2 * n + j) * n, n, vector)
 
 
 @kernel
 def at_port(h, f, w, p, j, vector):
     """Row j of B at port p, times a vector in w."""
-    n = flex(h, port(h, p, PORT_FLEX), N_MODES)
-    return _form(f, w, h[PORT_DATA] + port(h, p, PORT_SHAPES) + (6 + j) * n, n, vector)
+    n = m.FLEXES.n_modes(h, m.PORTS.flex(h, p))
+    return _form(f, w, h[m.PORT_DATA.place] + m.PORTS.shapes(h, p) + (6 + j) * n, n, vector)

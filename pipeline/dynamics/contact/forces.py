@@ -10,94 +10,34 @@ material points there, so that rolling is no sliding. Acting at one point keeps 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics.tables import (
-    AXES,
-    BENT,
-    BRISTLE,
-    CLEARANCE,
-    CONTACT_SLOTS,
-    DAMPING_LOSS,
-    DAMPING_POWER,
-    FLEX_C0,
-    FLOOR,
-    FRICTION_KIND,
-    FRICTION_LAW,
-    FRICTION_LOSS,
-    FRICTION_POWER,
-    GAP,
-    IMPULSE,
-    INNER,
-    LATCHED,
-    LEDGER_RATE,
-    MODAL_BIAS,
-    MODE,
-    N_CONTACTS,
-    N_MODES,
-    NORMAL_FORCE,
-    NORMAL_KIND,
-    NORMAL_LAW,
-    NQ,
-    NV,
-    OMEGA,
-    ORIGIN,
-    OUTER,
-    PER_CONTACT,
-    PORT_COLUMN,
-    PORT_FLEX,
-    RADIUS,
-    RATE,
-    SLIP,
-    STATE,
-    STORED,
-    SURFACES,
-    TOUCH_FORCE,
-    TOUCH_OFFSET,
-    TOUCH_POINT,
-    VELOCITY,
-    column,
-    contact,
-    contact_numbers,
-    flex,
-    port,
-    site_frame,
-    site_link,
-    site_port,
-    touch,
-    wrench,
-)
-from pipeline.dynamics.vectors import accumulate, add, at, at9, cross, dot, kernel, put, scale, sub, turn, turn_back
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import apply_wrench
+from pipeline.dynamics.choice import choose
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import add, at, at9, cross, dot, put, scale, sub, turn, turn_back
 
 
 @kernel
 def contact_slots(h, c):
     """Where w holds the rates of contact c's slots in the ledger."""
-    return h[LEDGER_RATE] + CONTACT_SLOTS + PER_CONTACT * c
+    return h[m.LEDGER_RATE] + m.CONTACT_SLOTS + m.PER_CONTACT * c
 
 
 @kernel
 def push(h, w, s, point, force):
-    """Apply a force [N] at a point, both world, on the link (and its modes) that carries site s."""
-    moment = cross(point, force)
-    o = wrench(h, site_link(h, s))
-    accumulate(w, o, scale(-1.0, moment))
-    accumulate(w, o + 3, scale(-1.0, force))
-    p = site_port(h, s)
-    if p >= 0:
-        k = port(h, p, PORT_FLEX)
-        bias, first = h[MODAL_BIAS] + flex(h, k, FLEX_C0), port(h, p, PORT_COLUMN)
-        for j in range(flex(h, k, N_MODES)):
-            a = column(h, first + j)
-            w[bias + j] -= dot(at(w, a), moment) + dot(at(w, a + 3), force)
+    """Apply a force [N] at a point, both world, on the link that carries site s."""
+    apply_wrench(h, w, s, cross(point, force), force)
 
 
 @kernel
 def point_velocity(w, frame, point):
     """Velocity of the material point of a frame's body that is at `point`."""
-    arm = sub(point, at(w, frame + ORIGIN))
-    return add(at(w, frame + VELOCITY), cross(at(w, frame + OMEGA), arm))
+    arm = sub(point, at(w, frame + m.FRAME.origin))
+    return add(at(w, frame + m.FRAME.velocity), cross(at(w, frame + m.FRAME.omega), arm))
 
 
 @kernel
@@ -138,40 +78,55 @@ def rubbing(traction: Callable) -> Callable:
     @kernel
     def bristle_rate(h, w, n, c, axes, normal, turning, z, z_rate):
         """Rate of the deflection z, which the outer body carries and which stays tangent to the surface."""
-        place = contact(h, c, BRISTLE)
+        place = m.CONTACTS.bristle(h, c)
         transported = sub(tangential(normal, z_rate), scale(dot(turning, z), normal))
-        put(w, h[LEDGER_RATE] + place - h[NQ] - h[NV], turn_back(axes, transported))
+        put(w, h[m.LEDGER_RATE] + place - h[m.NQ] - h[m.NV], turn_back(axes, transported))
 
     @kernel
     def rub(h, f, w, n, c, normal, turning, p_WQ, f_n):
-        o, numbers, kind = touch(h, c), contact_numbers(h, c), contact(h, c, FRICTION_KIND)
+        o, numbers, kind = m.TOUCH.row(h, c), m.CONTACT_NUMBERS.row(h, c), m.CONTACTS.friction(h, c)
         if kind < 0:
             return (0.0, 0.0, 0.0)
-        outer, inner = site_frame(h, contact(h, c, OUTER)), site_frame(h, contact(h, c, INNER))
+        outer, inner = m.SITE_FRAMES.row(h, m.CONTACTS.outer(h, c)), m.SITE_FRAMES.row(h, m.CONTACTS.inner(h, c))
         slip = tangential(normal, sub(point_velocity(w, inner, p_WQ), point_velocity(w, outer, p_WQ)))
-        place, axes, z = contact(h, c, BRISTLE), at9(w, outer + AXES), (0.0, 0.0, 0.0)
+        place, axes, z = m.CONTACTS.bristle(h, c), at9(w, outer + m.FRAME.axes), (0.0, 0.0, 0.0)
         if place >= 0:
-            z = tangential(normal, turn(axes, at(w, n[STATE] + place)))
-        force, loss, bent, z_rate = traction(kind, z, slip, f_n, _friction_law(f, numbers + FRICTION_LAW))
+            z = tangential(normal, turn(axes, at(w, n[m.STATE] + place)))
+        force, loss, bent, z_rate = traction(
+            kind, z, slip, f_n, _friction_law(f, numbers + m.CONTACT_NUMBERS.friction_law)
+        )
         if place >= 0:
             bristle_rate(h, w, n, c, axes, normal, turning, z, z_rate)
-        w[o + FRICTION_POWER], w[o + BENT], w[o + SLIP] = -loss, bent, np.sqrt(dot(slip, slip))
-        w[contact_slots(h, c) + FRICTION_LOSS] = -dot(force, slip)
+        w[o + m.TOUCH.friction_power], w[o + m.TOUCH.bent], w[o + m.TOUCH.slip] = -loss, bent, np.sqrt(dot(slip, slip))
+        w[contact_slots(h, c) + m.FRICTION_LOSS] = -dot(force, slip)
         return force
 
     return rub
 
 
-def compose(separation: Callable, normal: Callable, stored: Callable, rub: Callable) -> Callable:
-    """The kernel that applies all contacts; separation, normal and stored choose by a kind, their first argument."""
+def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: tuple[Any, ...]) -> Callable:
+    """The kernel contacts(h, f, w, n) that applies all contacts, given the modules of their kinds.
+
+    surfaces: with `separation`.  forms: of normal forces, with `force` and `stored`.  frictions: laws with `traction`.
+    """
+    separation = choose(tuple(kind.separation for kind in surfaces))
+    normal, stored = choose(tuple(form.force for form in forms)), choose(tuple(form.stored for form in forms))
+    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless()
 
     @kernel
     def measure(h, f, w, c):
         """Gap, rate and offset of contact c, no force; returns the normal, its rate seen from the outer body."""
-        outer, inner, o = site_frame(h, contact(h, c, OUTER)), site_frame(h, contact(h, c, INNER)), touch(h, c)
-        p_OI = sub(at(w, inner + ORIGIN), at(w, outer + ORIGIN))
-        v_OI = sub(sub(at(w, inner + VELOCITY), at(w, outer + VELOCITY)), cross(at(w, outer + OMEGA), p_OI))
-        kind = contact(h, c, SURFACES)
+        outer, inner, o = (
+            m.SITE_FRAMES.row(h, m.CONTACTS.outer(h, c)),
+            m.SITE_FRAMES.row(h, m.CONTACTS.inner(h, c)),
+            m.TOUCH.row(h, c),
+        )
+        p_OI = sub(at(w, inner + m.FRAME.origin), at(w, outer + m.FRAME.origin))
+        v_OI = sub(
+            sub(at(w, inner + m.FRAME.velocity), at(w, outer + m.FRAME.velocity)),
+            cross(at(w, outer + m.FRAME.omega), p_OI),
+        )
+        kind = m.CONTACTS.surfaces(h, c)
         p, v = separation(kind, w, outer, p_OI), separation(kind, w, outer, v_OI)
         distance = np.sqrt(dot(p, p))
         # concentric surfaces have no normal; any does, since there is no force
@@ -179,39 +134,41 @@ def compose(separation: Callable, normal: Callable, stored: Callable, rub: Calla
         axis = scale(1.0 / distance, p) if known else (0.0, 0.0, 1.0)
         rate = dot(axis, v)
         turning = scale(1.0 / distance, sub(v, scale(rate, axis))) if known else (0.0, 0.0, 0.0)
-        w[o + GAP] = f[contact_numbers(h, c) + CLEARANCE] - distance
-        w[o + RATE] = rate
-        for k in range(NORMAL_FORCE, TOUCH_OFFSET):
+        w[o + m.TOUCH.gap] = f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.clearance] - distance
+        w[o + m.TOUCH.rate] = rate
+        for k in range(m.TOUCH.normal_force, m.TOUCH.offset):
             w[o + k] = 0.0
-        put(w, o + TOUCH_OFFSET, turn_back(at9(w, outer + AXES), p_OI))
+        put(w, o + m.TOUCH.offset, turn_back(at9(w, outer + m.FRAME.axes), p_OI))
         return axis, turning
 
     @kernel
     def forces(h, f, w, n, c, axis, turning):
         """Forces of a closed contact, on both bodies, and their powers."""
-        o, numbers = touch(h, c), contact_numbers(h, c)
-        depth, rate = max(0.0, -w[o + GAP]), w[o + RATE]
-        law, kind = _law(f, numbers + NORMAL_LAW), contact(h, c, NORMAL_KIND)
-        impact_rate = max(w[h[LATCHED] + c], f[numbers + FLOOR])
+        o, numbers = m.TOUCH.row(h, c), m.CONTACT_NUMBERS.row(h, c)
+        depth, rate = max(0.0, -w[o + m.TOUCH.gap]), w[o + m.TOUCH.rate]
+        law, kind = _law(f, numbers + m.CONTACT_NUMBERS.normal_law), m.CONTACTS.normal(h, c)
+        impact_rate = max(w[h[m.LATCHED] + c], f[numbers + m.CONTACT_NUMBERS.floor])
         elastic, damping = normal(kind, depth, rate, impact_rate, law)
         f_n = max(0.0, elastic + damping)
-        w[o + NORMAL_FORCE], w[o + STORED] = f_n, stored(kind, depth, law)
-        w[o + DAMPING_POWER] = damping * rate
+        w[o + m.TOUCH.normal_force], w[o + m.TOUCH.stored] = f_n, stored(kind, depth, law)
+        w[o + m.TOUCH.damping_power] = damping * rate
         slots = contact_slots(h, c)
-        w[slots + DAMPING_LOSS], w[slots + IMPULSE] = damping * rate, f_n
-        outer, inner = contact(h, c, OUTER), contact(h, c, INNER)
-        p_WQ = add(at(w, site_frame(h, inner) + ORIGIN), scale(f[numbers + RADIUS], axis))
+        w[slots + m.DAMPING_LOSS], w[slots + m.IMPULSE] = damping * rate, f_n
+        outer, inner = m.CONTACTS.outer(h, c), m.CONTACTS.inner(h, c)
+        p_WQ = add(
+            at(w, m.SITE_FRAMES.row(h, inner) + m.FRAME.origin), scale(f[numbers + m.CONTACT_NUMBERS.radius], axis)
+        )
         force = add(scale(-f_n, axis), rub(h, f, w, n, c, axis, turning, p_WQ, f_n))
-        put(w, o + TOUCH_FORCE, force)
-        put(w, o + TOUCH_POINT, p_WQ)
+        put(w, o + m.TOUCH.force, force)
+        put(w, o + m.TOUCH.point, p_WQ)
         push(h, w, inner, p_WQ, force)
         push(h, w, outer, p_WQ, scale(-1.0, force))
 
     @kernel
     def contacts(h, f, w, n):
-        for c in range(h[N_CONTACTS]):
+        for c in range(h[m.N_CONTACTS]):
             axis, turning = measure(h, f, w, c)
-            if n[n[MODE] + c] == 1:
+            if n[n[m.MODE] + c] == 1:
                 forces(h, f, w, n, c, axis, turning)
 
     return contacts

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.tables import place
-from pipeline.dynamics.vectors import index, kernel
-
-PIECE_HARMONICS, HARMONICS = place("PIECE_HARMONICS"), place("HARMONICS")
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel
 def oscillate(h, f, w, law, piece, s):
     """Add the harmonics of a piece, s seconds after its start, to the value and rates stored from `law`."""
-    o = h[PIECE_HARMONICS] + 2 * piece
-    first = h[index(o)]
-    for k in range(first, first + h[index(o + 1)]):
-        term = h[HARMONICS] + 3 * k
-        amplitude, omega = f[index(term)], f[index(term + 1)]
-        phase = omega * s + f[index(term + 2)]
+    first = m.PIECE_HARMONICS.harmonic0(h, piece)
+    for k in range(first, first + m.PIECE_HARMONICS.n_harmonics(h, piece)):
+        o = m.HARMONICS.row(h, k)
+        amplitude, omega = f[o + m.HARMONICS.amplitude], f[o + m.HARMONICS.frequency]
+        phase = omega * s + f[o + m.HARMONICS.phase]
         sine = amplitude * np.sin(phase)
-        w[index(law)] += sine
-        w[index(law + 1)] += amplitude * omega * np.cos(phase)
-        w[index(law + 2)] -= omega * omega * sine
+        w[law] += sine
+        w[law + 1] += amplitude * omega * np.cos(phase)
+        w[law + 2] -= omega * omega * sine

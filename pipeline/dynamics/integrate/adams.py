@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.integrate import hermite, rk4, stages
-from pipeline.dynamics.integrate.method import Method
-from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
-from pipeline.dynamics.tables import CONTROL, EVALUATION, MEMORY, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate import hermite, rk4
+from pipeline.dynamics.integrate.method import Method, slope
+from pipeline.dynamics.integrate.runge_kutta import make_stages
+from pipeline.dynamics.kernels import kernel
 
-ORDER, LAST = 4, rk4.STAGES
+LAST = rk4.STAGES
 # memory: number of slopes kept, their distance, then the slopes themselves, the latest first
 COUNT, DISTANCE, KEPT = range(3)
 MOST = 3
@@ -34,53 +35,62 @@ def memory(nq: int, nv: int, ny: int) -> int:
 @kernel
 def begin(h, f, w, n):
     """Forget all earlier slopes."""
-    w[index(h[MEMORY] + COUNT)] = 0.0
+    w[h[m.MEMORY] + COUNT] = 0.0
 
 
 @kernel
 def alike(h, w, step):
     """Whether a step is as long as those between the slopes that are kept."""
-    distance = w[index(h[MEMORY] + DISTANCE)]
+    distance = w[h[m.MEMORY] + DISTANCE]
     return abs(step - distance) <= ALIKE * distance
 
 
 @kernel
 def keep(h, f, w, n, step):
     """Remember the slope where an accepted step started."""
-    o, size = h[MEMORY], h[NY]
-    if w[index(o + COUNT)] == 0.0 or not alike(h, w, step):
-        w[index(o + COUNT)], w[index(o + DISTANCE)] = 0.0, step
+    o, size = h[m.MEMORY], h[m.NY]
+    if w[o + COUNT] == 0.0 or not alike(h, w, step):
+        w[o + COUNT], w[o + DISTANCE] = 0.0, step
     for c in range(size):
-        w[index(o + KEPT + 2 * size + c)] = w[index(o + KEPT + size + c)]
-        w[index(o + KEPT + size + c)] = w[index(o + KEPT + c)]
-        w[index(o + KEPT + c)] = w[index(h[SLOPES] + c)]
-    w[index(o + COUNT)] = min(w[index(o + COUNT)] + 1.0, MOST)
+        w[o + KEPT + 2 * size + c] = w[o + KEPT + size + c]
+        w[o + KEPT + size + c] = w[o + KEPT + c]
+        w[o + KEPT + c] = w[slope(h, 0) + c]
+    w[o + COUNT] = min(w[o + COUNT] + 1.0, MOST)
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple:
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
-    _, start = stages.compose(evaluate, rk4.A, rk4.B, rk4.C)
+    _, runge_kutta_step = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
 
     @kernel
     def attempt(h, f, w, n, step):
         """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
-        o, size, slope = h[MEMORY], h[NY], h[SLOPES]
-        if w[index(o + COUNT)] < MOST or not alike(h, w, step):
-            return start(h, f, w, n, step)
+        o, size, now, predicted = h[m.MEMORY], h[m.NY], slope(h, 0), slope(h, 1)
+        if w[o + COUNT] < MOST or not alike(h, w, step):
+            return runge_kutta_step(h, f, w, n, step)
         one, two, three = o + KEPT, o + KEPT + size, o + KEPT + 2 * size
         for c in range(size):
-            ahead = 55.0 * w[index(slope + c)] - 59.0 * w[index(one + c)]
-            ahead += 37.0 * w[index(two + c)] - 9.0 * w[index(three + c)]
-            w[index(h[Y_STAGE] + c)] = w[index(h[Y] + c)] + step / 24.0 * ahead
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_STAGE], slope + size)
-        n[EVALUATIONS] += 1
+            ahead = 55.0 * w[now + c] - 59.0 * w[one + c]
+            ahead += 37.0 * w[two + c] - 9.0 * w[three + c]
+            w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], predicted)
+        n[m.EVALUATIONS] += 1
         for c in range(size):
-            ahead = 9.0 * w[index(slope + size + c)] + 19.0 * w[index(slope + c)]
-            ahead += w[index(two + c)] - 5.0 * w[index(one + c)]
-            w[index(h[Y_NEW] + c)] = w[index(h[Y] + c)] + step / 24.0 * ahead
-        return n[EVALUATION] == OK
+            ahead = 9.0 * w[predicted + c] + 19.0 * w[now + c]
+            ahead += w[two + c] - 5.0 * w[one + c]
+            w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
+        return n[m.EVALUATION] == m.OK
 
     return begin, attempt, None, hermite.make_extend(LAST), keep
 
 
-METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, memory=memory)
+METHOD = Method(
+    traits=INTEGRATORS["adams-bashforth-moulton"],
+    slopes=LAST + 2,
+    last=LAST,
+    dense=hermite.ROWS,
+    make_kernels=make_kernels,
+    interpolate=hermite.interpolate,
+    gap=0.25,
+    memory=memory,
+)

@@ -11,28 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics.integrate import straddle
-from pipeline.dynamics.integrate.state import (
-    END,
-    EVALUATIONS,
-    FIRST,
-    FRESH,
-    LAST_NORM,
-    MOST_GROWTH,
-    NO_START,
-    NOT_A_NUMBER,
-    REJECTED_NORM,
-    REJECTED_STEP,
-    SPAN,
-    STATUS,
-    STEP,
-    TIME,
-    TOUCHED_STEP,
-)
-from pipeline.dynamics.integrate.stepper import FAILED, finite, scaled_norm, set_magnitudes
-from pipeline.dynamics.integrate.straddle import steer
-from pipeline.dynamics.tables import CONTROL, EVALUATION, MAGNITUDE, N_GROUPS, NY, OK, SLOPES, Y_NEW, Y_STAGE, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate import singular_step
+from pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
+from pipeline.dynamics.integrate.singular_step import steer
+from pipeline.dynamics.integrate.stepper import FAILED
+from pipeline.dynamics.kernels import kernel
 
 # the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
 # the memory keeps steps quiet where stability, not accuracy, limits them
@@ -46,58 +30,58 @@ STRICTER = 10.0
 STRETCH = 1.1
 
 
-def compose(
+def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
+    """The kernels first_step, error_norm, after_rejection, next_step, choose_step and foresee of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
     steady, gap = method.steady, method.gap
-    start_watch, closed = contacts
+    watch_start, any_closed = contacts
 
     @kernel
     def first_step(h, f, w, n):
         """Slope at the start of a segment, and a first step; False when the equations have no solution here."""
-        c, y, slope = h[CONTROL], h[Y], h[SLOPES]
-        other = slope + h[NY]
-        evaluate(h, f, w, n, w[index(c + TIME)], y, slope)
-        n[EVALUATIONS] += 2
-        if n[EVALUATION] != OK or not finite(h, w, slope):
-            n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == OK else NO_START
+        c, y, slope = h[m.CONTROL], h[m.Y], h[m.SLOPES]
+        other = slope + h[m.NY]
+        evaluate(h, f, w, n, w[c + m.TIME], y, slope)
+        n[m.EVALUATIONS] += 2
+        if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
+            n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
             return False
-        start_watch(h, w)
-        set_magnitudes(h, f, w, y)
+        watch_start(h, w)
+        set_error_scales(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
-        step = 1e-6 * w[index(c + SPAN)]
+        step = 1e-6 * w[c + m.SPAN]
         if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
-            step = min(0.01 * size / steepness, 0.01 * w[index(c + SPAN)])
-        step = min(step, w[index(c + END)] - w[index(c + TIME)])
-        for k in range(h[NY]):
-            w[index(h[Y_STAGE] + k)] = w[index(y + k)] + step * w[index(slope + k)]
-        evaluate(h, f, w, n, w[index(c + TIME)] + step, h[Y_STAGE], other)
-        if n[EVALUATION] == OK:
-            for k in range(h[NY]):
-                w[index(other + k)] -= w[index(slope + k)]
+            step = min(0.01 * size / steepness, 0.01 * w[c + m.SPAN])
+        step = min(step, w[c + m.END] - w[c + m.TIME])
+        for k in range(h[m.NY]):
+            w[h[m.Y_STAGE] + k] = w[y + k] + step * w[slope + k]
+        evaluate(h, f, w, n, w[c + m.TIME] + step, h[m.Y_STAGE], other)
+        if n[m.EVALUATION] == m.OK:
+            for k in range(h[m.NY]):
+                w[other + k] -= w[slope + k]
             steepness = max(steepness, scaled_norm(h, w, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        if closed(h, n) and w[index(c + TOUCHED_STEP)] > 0.0:
-            step = min(step, w[index(c + TOUCHED_STEP)])
-        w[index(c + STEP)] = step
-        w[index(c + FIRST)], w[index(c + REJECTED_STEP)] = 1.0, 0.0
-        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = LEAST_NORM, GROW
-        n[FRESH] = 0
+        if any_closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
+            step = min(step, w[c + m.TOUCHED_STEP])
+        w[c + m.STEP] = step
+        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 1.0, 0.0
+        w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = LEAST_NORM, GROW
+        n[m.FRESH] = 0
         begin(h, f, w, n)
         return True
 
     @kernel
-    def judge(h, f, w, n, step):
+    def error_norm(h, f, w, n, step):
         """Error norm of the step to Y_NEW, 1 at the tolerance."""
-        set_magnitudes(h, f, w, h[Y_NEW])
-        if closed(h, n):
-            for g in range(h[N_GROUPS]):
-                w[index(h[MAGNITUDE] + g)] /= STRICTER
+        set_error_scales(h, f, w, h[m.Y_NEW])
+        if any_closed(h, n):
+            for g in range(h[m.N_GROUPS]):
+                w[h[m.MAGNITUDE] + g] /= STRICTER
         return error(h, f, w, n, step)
 
     @kernel
@@ -106,8 +90,8 @@ def compose(
 
         Where a contact begins or friction turns, the solution has less derivatives than the method asks for.
         """
-        c = h[CONTROL]
-        longer, worse = w[index(c + REJECTED_STEP)], w[index(c + REJECTED_NORM)]
+        c = h[m.CONTROL]
+        longer, worse = w[c + m.REJECTED_STEP], w[c + m.REJECTED_NORM]
         if longer == 0.0 or worse >= FAILED:
             return 1.0 * order
         if norm >= worse:
@@ -117,28 +101,28 @@ def compose(
     @kernel
     def after_rejection(h, w, n, step, norm):
         """Try again with a shorter step."""
-        c = h[CONTROL]
-        w[index(c + STEP)] = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(h, w, step, norm)))
-        w[index(c + REJECTED_STEP)], w[index(c + REJECTED_NORM)] = step, norm
-        w[index(c + MOST_GROWTH)] = 1.0
+        c = h[m.CONTROL]
+        w[c + m.STEP] = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(h, w, step, norm)))
+        w[c + m.REJECTED_STEP], w[c + m.REJECTED_NORM] = step, norm
+        w[c + m.MOST_GROWTH] = 1.0
         return True
 
     @kernel
     def next_step(h, w, n, step, norm):
         """Length of the step after the one that has just been accepted."""
-        c = h[CONTROL]
-        if w[index(c + FIRST)] > 0.0 and closed(h, n):
-            w[index(c + TOUCHED_STEP)] = step
-        w[index(c + FIRST)], w[index(c + REJECTED_STEP)] = 0.0, 0.0
+        c = h[m.CONTROL]
+        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
+            w[c + m.TOUCHED_STEP] = step
+        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
         norm = max(norm, LEAST_NORM)
-        growth = SAFETY * norm**remembering * w[index(c + LAST_NORM)] ** MEMORY
-        growth = min(w[index(c + MOST_GROWTH)], max(SHRINK, growth))
-        w[index(c + LAST_NORM)], w[index(c + MOST_GROWTH)] = norm, GROW
+        growth = SAFETY * norm**remembering * w[c + m.LAST_NORM] ** MEMORY
+        growth = min(w[c + m.MOST_GROWTH], max(SHRINK, growth))
+        w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 
     @kernel
-    def lay(h, w, t):
+    def choose_step(h, w, t):
         """Length of the step to try from t: as planned, unless a singular pose is ahead."""
-        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap, STRETCH)
+        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, STRETCH)
 
-    return first_step, judge, after_rejection, next_step, lay, straddle.compose(evaluate)
+    return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)

@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.integrate import stages
-from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
-from pipeline.dynamics.integrate.stages import slope
-from pipeline.dynamics.integrate.state import EVALUATIONS, TIME
-from pipeline.dynamics.tables import CONTROL, DENSE, EVALUATION, GROUPS, MAGNITUDE, NY, OK, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from pipeline.dynamics.integrate.norms import error_scale
+from pipeline.dynamics.integrate.runge_kutta import make_stages
+from pipeline.dynamics.kernels import kernel
 
 STAGES, ERROR_ORDER = 6, 4
 A = np.zeros((STAGES, STAGES))
@@ -46,58 +46,68 @@ def weighted(h, w, weights, c):
     """Weighted sum of the slopes of state variable c."""
     total = 0.0
     for j in range(STAGES + 1):
-        total += weights[j] * w[index(h[SLOPES] + h[NY] * j + c)]
+        total += weights[j] * w[slope(h, j) + c]
     return total
 
 
 @kernel
 def error(h, f, w, n, step):
-    """Norm of the local error, 1 at the tolerance; MAGNITUDE holds each group's scale."""
+    """Norm of the local error, 1 at the tolerance."""
     total = 0.0
-    for c in range(h[NY]):
-        total += (step * weighted(h, w, E, c) / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
-    return np.sqrt(total / h[NY])
+    for c in range(h[m.NY]):
+        total += (step * weighted(h, w, E, c) / error_scale(h, w, c)) ** 2
+    return np.sqrt(total / h[m.NY])
 
 
 @kernel
 def extend(h, f, w, n, step):
     """Prepare the dense output of the step to Y_NEW."""
-    size, F = h[NY], h[DENSE]
+    size, dense = h[m.NY], h[m.DENSE]
     for c in range(size):
-        delta = w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
-        bend = step * w[index(h[SLOPES] + c)] - delta
-        w[index(F + c)] = w[index(h[Y] + c)]
-        w[index(F + size + c)] = delta
-        w[index(F + 2 * size + c)] = bend
-        w[index(F + 3 * size + c)] = delta - step * w[index(slope(h, STAGES) + c)] - bend
-        w[index(F + 4 * size + c)] = step * weighted(h, w, D, c)
+        delta = w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
+        bend = step * w[slope(h, 0) + c] - delta
+        w[dense + c] = w[h[m.Y] + c]
+        w[dense + size + c] = delta
+        w[dense + 2 * size + c] = bend
+        w[dense + 3 * size + c] = delta - step * w[slope(h, STAGES) + c] - bend
+        w[dense + 4 * size + c] = step * weighted(h, w, D, c)
 
 
 @kernel
 def interpolate(h, w, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, F, s = h[NY], h[DENSE], 1.0 - theta
+    size, dense, s = h[m.NY], h[m.DENSE], 1.0 - theta
     for c in range(size):
-        v = w[index(F + 3 * size + c)] + s * w[index(F + 4 * size + c)]
-        v = w[index(F + size + c)] + s * (w[index(F + 2 * size + c)] + theta * v)
-        w[index(out + c)] = w[index(F + c)] + theta * v
+        v = w[dense + 3 * size + c] + s * w[dense + 4 * size + c]
+        v = w[dense + size + c] + s * (w[dense + 2 * size + c] + theta * v)
+        w[out + c] = w[dense + c] + theta * v
 
 
-def compose(evaluate: Callable, displace: Callable) -> tuple:
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
-    _, advance = stages.compose(evaluate, A, B, C)
+    _, advance = make_stages(evaluate, A, B, C)
 
     @kernel
     def attempt(h, f, w, n, step):
         """A step with the slope at its end, which the error estimate needs."""
         if not advance(h, f, w, n, step):
             return False
-        evaluate(h, f, w, n, w[index(h[CONTROL] + TIME)] + step, h[Y_NEW], slope(h, STAGES))
-        n[EVALUATIONS] += 1
-        return n[EVALUATION] == OK
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], slope(h, STAGES))
+        n[m.EVALUATIONS] += 1
+        return n[m.EVALUATION] == m.OK
 
     return begin_afresh, attempt, error, extend, keep_nothing
 
 
-# 3.25: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
-METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, gap=0.55, stability=3.25)
+METHOD = Method(
+    traits=INTEGRATORS["dopri5"],
+    slopes=STAGES + 2,
+    last=STAGES,
+    dense=5,
+    make_kernels=make_kernels,
+    interpolate=interpolate,
+    error_order=ERROR_ORDER,
+    ends=True,
+    gap=0.55,
+    stability=3.25,  # Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
+)

@@ -6,76 +6,64 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics.integrate import straddle
-from pipeline.dynamics.integrate.state import (
-    EVALUATIONS,
-    FIXED,
-    FRESH,
-    LOST_CLOSURE,
-    NO_CONVERGENCE,
-    NO_START,
-    NOT_A_NUMBER,
-    STATUS,
-    STEP,
-    TIME,
-)
-from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
-from pipeline.dynamics.integrate.straddle import steer
-from pipeline.dynamics.tables import CONTROL, EVALUATION, NOT_FINITE, OK, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate import singular_step
+from pipeline.dynamics.integrate.norms import finite, set_error_scales
+from pipeline.dynamics.integrate.singular_step import steer
+from pipeline.dynamics.kernels import kernel
 
 
-def compose(
+def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
+    """The kernels first_step, error_norm, after_rejection, next_step, choose_step and foresee of the stepper."""
     gap = method.gap
-    start_watch, _ = contacts
+    watch_start, _ = contacts
 
     @kernel
     def first_step(h, f, w, n):
         """Slope at the start of a segment; False when the equations have no solution here."""
-        c, slope = h[CONTROL], h[SLOPES]
-        evaluate(h, f, w, n, w[index(c + TIME)], h[Y], slope)
-        n[EVALUATIONS] += 1
-        if n[EVALUATION] != OK or not finite(h, w, slope):
-            n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == OK else NO_START
+        c, slope = h[m.CONTROL], h[m.SLOPES]
+        evaluate(h, f, w, n, w[c + m.TIME], h[m.Y], slope)
+        n[m.EVALUATIONS] += 1
+        if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
+            n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
             return False
-        start_watch(h, w)
-        w[index(c + STEP)] = w[index(c + FIXED)]
-        n[FRESH] = 0
+        watch_start(h, w)
+        w[c + m.STEP] = w[c + m.FIXED]
+        n[m.FRESH] = 0
         begin(h, f, w, n)
         return True
 
     @kernel
-    def judge(h, f, w, n, step):
+    def no_error(h, f, w, n, step):
         """Every step that could be made is good."""
         return 0.0
 
     @kernel
-    def judge_with_scales(h, f, w, n, step):
+    def no_error_with_scales(h, f, w, n, step):
         """The same, of a method that looks for stiffness, which measures changes in units of the tolerance."""
-        set_magnitudes(h, f, w, h[Y_NEW])
+        set_error_scales(h, f, w, h[m.Y_NEW])
         return 0.0
 
     @kernel
     def after_rejection(h, w, n, step, norm):
         """There is no shorter step to try."""
-        if n[EVALUATION] == OK:
-            n[STATUS] = NO_CONVERGENCE
+        if n[m.EVALUATION] == m.OK:
+            n[m.STATUS] = m.NO_CONVERGENCE
         else:
-            n[STATUS] = NOT_A_NUMBER if n[EVALUATION] == NOT_FINITE else LOST_CLOSURE
+            n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.NOT_FINITE else m.LOST_CLOSURE
         return False
 
     @kernel
     def next_step(h, w, n, step, norm):
         """All steps are alike."""
-        return w[index(h[CONTROL] + FIXED)]
+        return w[h[m.CONTROL] + m.FIXED]
 
     @kernel
-    def lay(h, w, t):
+    def choose_step(h, w, t):
         """Length of the step to try from t: as given, unless a singular pose is ahead."""
-        return steer(h, w, t, w[index(h[CONTROL] + STEP)], gap, 1.0)
+        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, 1.0)
 
-    good = judge if method.stability is None else judge_with_scales
-    return first_step, good, after_rejection, next_step, lay, straddle.compose(evaluate)
+    error_norm = no_error if method.stability is None else no_error_with_scales
+    return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.tables import DENSE, NY, SLOPES, Y_NEW, Y
-from pipeline.dynamics.vectors import index, kernel
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.method import slope
+from pipeline.dynamics.kernels import kernel
 
+#: rows of DENSE: coefficients of the powers of the share of the step
 ROWS = 4
 
 
@@ -18,15 +20,14 @@ def make_extend(last: int) -> Callable:
 
     @kernel
     def extend(h, f, w, n, step):
-        size, F, first = h[NY], h[DENSE], h[SLOPES]
-        final = first + size * last
+        size, dense, first, final = h[m.NY], h[m.DENSE], slope(h, 0), slope(h, last)
         for c in range(size):
-            y, delta = w[index(h[Y] + c)], w[index(h[Y_NEW] + c)] - w[index(h[Y] + c)]
-            start, end = step * w[index(first + c)], step * w[index(final + c)]
-            w[index(F + c)] = y
-            w[index(F + size + c)] = start
-            w[index(F + 2 * size + c)] = 3.0 * delta - 2.0 * start - end
-            w[index(F + 3 * size + c)] = start + end - 2.0 * delta
+            y, delta = w[h[m.Y] + c], w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
+            start, end = step * w[first + c], step * w[final + c]
+            w[dense + c] = y
+            w[dense + size + c] = start
+            w[dense + 2 * size + c] = 3.0 * delta - 2.0 * start - end
+            w[dense + 3 * size + c] = start + end - 2.0 * delta
 
     return extend
 
@@ -34,7 +35,7 @@ def make_extend(last: int) -> Callable:
 @kernel
 def interpolate(h, w, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`); any cubic in DENSE."""
-    size, F = h[NY], h[DENSE]
+    size, dense = h[m.NY], h[m.DENSE]
     for c in range(size):
-        v = w[index(F + 3 * size + c)] * theta + w[index(F + 2 * size + c)]
-        w[index(out + c)] = (v * theta + w[index(F + size + c)]) * theta + w[index(F + c)]
+        v = w[dense + 3 * size + c] * theta + w[dense + 2 * size + c]
+        w[out + c] = (v * theta + w[dense + size + c]) * theta + w[dense + c]

@@ -10,70 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.projection import keep_scales, largest
+from pipeline.dynamics.integrate.norms import finite
+from pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
+from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
+from pipeline.dynamics.integrate.stiffness import make_detect_stiffness
+from pipeline.dynamics.kernels import kernel
 
-from pipeline.dynamics.assembly.places import LAST_PIVOT, PIVOT, WANTED_PIVOT
-from pipeline.dynamics.integrate.project import largest
-from pipeline.dynamics.integrate.rows import hold_modes, snapshot
-from pipeline.dynamics.integrate.scales import keep_scales
-from pipeline.dynamics.integrate.state import (
-    AT_SINGULAR,
-    BLIND_STEPS,
-    BUDGET,
-    CAP,
-    CAP_REACHED,
-    DRIFT,
-    END,
-    EVALUATIONS,
-    EVENTS_OF_A_CONTACT,
-    FRESH,
-    FULL,
-    LENGTH,
-    LOST_CLOSURE,
-    N_EVENTS,
-    N_RECORDED,
-    NEXT_OUTPUT,
-    NOT_A_NUMBER,
-    PAUSED,
-    PROJECTION_EVALUATIONS,
-    PROJECTIONS,
-    RATE_DRIFT,
-    REJECTED,
-    ROOM,
-    RTOL,
-    SEGMENT_END,
-    SPAN,
-    STATUS,
-    STEP_TOO_SMALL,
-    STEPS,
-    STRADDLING,
-    TIME,
-    WORN_ROWS,
-)
-from pipeline.dynamics.integrate.stiffness import detect
-from pipeline.dynamics.integrate.straddle import allowed, forget, near, note, plan
-from pipeline.dynamics.tables import (
-    CONTROL,
-    EVALUATION,
-    FLOORS,
-    GROUPS,
-    MAGNITUDE,
-    N_CLOSURE_ROWS,
-    N_CONTACTS,
-    N_GROUPS,
-    NOT_FINITE,
-    NY,
-    OK,
-    RESIDUAL,
-    RESIDUAL_RATE,
-    SLOPES,
-    Y_NEW,
-    Y_STAGE,
-    Y,
-)
-from pipeline.dynamics.vectors import index, kernel
-
-#: what settle returns for an event after which integration starts afresh; another positive number only records it
+#: what resolve_events returns for an event after which integration starts afresh; another positive number only
+#: records it
 RESTART = 1
 #: share of the mechanism's size to which closures are closed before a singular pose
 TIGHTLY = 1e-15
@@ -83,40 +29,6 @@ MOST_BLIND = 20.0
 FAILED = 1e9
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
-
-
-@kernel
-def set_magnitudes(h, f, w, y):
-    """Scale of each error group: tolerance times its floor plus the length of its vector at the step's ends.
-
-    The length, not the largest component: that would depend on the axes in which a scene is written.
-    """
-    m, o = h[MAGNITUDE], h[Y]
-    for g in range(h[N_GROUPS]):
-        w[index(m + g)] = 0.0
-    for c in range(h[NY]):
-        g = m + h[index(h[GROUPS] + c)]
-        w[index(g)] += 0.5 * (w[index(y + c)] ** 2 + w[index(o + c)] ** 2)
-    for g in range(h[N_GROUPS]):
-        w[index(m + g)] = w[index(h[CONTROL] + RTOL)] * (f[index(h[FLOORS] + g)] + np.sqrt(w[index(m + g)]))
-
-
-@kernel
-def scaled_norm(h, w, a):
-    """Root mean square of the stretch of w from a, in units of the magnitudes."""
-    total = 0.0
-    for c in range(h[NY]):
-        total += (w[index(a + c)] / w[index(h[MAGNITUDE] + h[index(h[GROUPS] + c)])]) ** 2
-    return np.sqrt(total / h[NY])
-
-
-@kernel
-def finite(h, w, a):
-    """Whether the stretch of w from a holds numbers only."""
-    result = True
-    for c in range(h[NY]):
-        result &= abs(w[index(a + c)]) <= 1e300
-    return result
 
 
 @kernel
@@ -130,96 +42,87 @@ def none_closed(h, n):
     return False
 
 
-def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-    """The stepper without root finding."""
+def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+    """The kernel resolve_events of a stepper that looks for none."""
 
     @kernel
-    def settle(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, events):
         return 0, False, t_new, step
 
-    return settle
+    return resolve_events
 
 
-def compose(
+#: `events` of scenes without contacts
+NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
+
+
+def make_advance(
     evaluate: Callable,
     project: Callable,
-    displace: Callable,
+    retract: Callable,
     method: Any,
-    stepping: Callable,
-    contact_events: tuple[Callable, Callable, Callable],
+    stepping: Any,
+    events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
-    stepping: `compose` of `adaptive` or `fixed`.
-    contact_events: start_watch, make_settle and closed of `events` or `step_ends`, or those that do nothing.
+    stepping: the module `adaptive` or `fixed`.
+    events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    begin, attempt, error, extend, keep = method.compose(evaluate, displace)
-    interpolate, last, ends = method.interpolate, method.last, method.ends
-    start_watch, make_settle, closed = contact_events
-    settle = make_settle(evaluate, attempt, extend, project, method)
-    feel = detect(method)
-    first_step, judge, after_rejection, next_step, lay, foresee = stepping(
-        evaluate, (start_watch, closed), begin, error, method
+    begin, attempt, error, extend, keep = method.make_kernels(evaluate, retract)
+    last, ends = method.last, method.ends
+    watch_start, make_resolve_events, any_closed = events
+    resolve_events = make_resolve_events(evaluate, attempt, extend, project, method)
+    record_outputs = make_record_outputs(extend, method.interpolate)
+    detect_stiffness = make_detect_stiffness(method)
+    first_step, error_norm, after_rejection, next_step, choose_step, foresee = stepping.make_step_control(
+        evaluate, (watch_start, any_closed), begin, error, method
     )
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
         """Whether to return now, with the reason in n[STATUS]."""
-        c, waiting = h[CONTROL], outputs.shape[0] - n[NEXT_OUTPUT]
-        if w[index(c + TIME)] >= w[index(c + END)]:
-            n[STATUS] = SEGMENT_END
-        elif n[EVALUATIONS] >= n[CAP]:
-            n[STATUS] = CAP_REACHED
-        elif n[EVALUATIONS] >= n[BUDGET]:
-            n[STATUS] = PAUSED
-        elif w[index(c + BLIND_STEPS)] > MOST_BLIND:
-            n[STATUS] = AT_SINGULAR
-        elif w[index(h[PIVOT] + LAST_PIVOT)] < w[index(h[PIVOT] + WANTED_PIVOT)]:
-            n[STATUS] = WORN_ROWS
+        c, waiting = h[m.CONTROL], outputs.shape[0] - n[m.NEXT_OUTPUT]
+        if w[c + m.TIME] >= w[c + m.END]:
+            n[m.STATUS] = m.SEGMENT_END
+        elif n[m.EVALUATIONS] >= n[m.CAP]:
+            n[m.STATUS] = m.CAP_REACHED
+        elif n[m.EVALUATIONS] >= n[m.BUDGET]:
+            n[m.STATUS] = m.PAUSED
+        elif w[c + m.BLIND_STEPS] > MOST_BLIND:
+            n[m.STATUS] = m.AT_SINGULAR
+        elif w[h[m.PIVOT] + m.LAST_PIVOT] < w[h[m.PIVOT] + m.WANTED_PIVOT]:
+            n[m.STATUS] = m.WORN_ROWS
         elif (
-            n[N_RECORDED] + waiting + ROOM > rows.shape[0]
-            or n[N_EVENTS] + ROOM + EVENTS_OF_A_CONTACT * h[N_CONTACTS] > events.shape[0]
+            n[m.N_RECORDED] + waiting + m.ROOM > rows.shape[0]
+            or n[m.N_EVENTS] + m.ROOM + m.EVENTS_OF_A_CONTACT * h[m.N_CONTACTS] > events.shape[0]
         ):
-            n[STATUS] = FULL
+            n[m.STATUS] = m.FULL
         else:
             return False
         return True
 
     @kernel
-    def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
-        """Snapshots at the output times up to t_end, from the dense output."""
-        t = w[index(h[CONTROL] + TIME)]
-        while n[NEXT_OUTPUT] < outputs.shape[0] and outputs[n[NEXT_OUTPUT]] <= t_end:
-            wanted = outputs[n[NEXT_OUTPUT]]
-            if wanted > t:
-                if not ready:
-                    extend(h, f, w, n, step)
-                    ready = True
-                interpolate(h, w, (wanted - t) / step, h[Y_STAGE])
-                snapshot(h, w, n, rows, wanted, h[Y_STAGE])
-            n[NEXT_OUTPUT] += 1
-
-    @kernel
     def finish(h, f, w, n, t_new):
         """Slope at Y_NEW with the loops closed; False when they cannot be."""
-        c, slope = h[CONTROL], h[SLOPES] + h[NY] * last
+        c, slope = h[m.CONTROL], h[m.SLOPES] + h[m.NY] * last
         if not ends:
-            evaluate(h, f, w, n, t_new, h[Y_NEW], slope)
-            n[EVALUATIONS] += 1
-        if n[EVALUATION] != OK:
+            evaluate(h, f, w, n, t_new, h[m.Y_NEW], slope)
+            n[m.EVALUATIONS] += 1
+        if n[m.EVALUATION] != m.OK:
             return False
-        if not (finite(h, w, slope) and finite(h, w, h[Y_NEW])):
-            n[EVALUATION] = NOT_FINITE
+        if not (finite(h, w, slope) and finite(h, w, h[m.Y_NEW])):
+            n[m.EVALUATION] = m.NOT_FINITE
             return False
-        w[index(c + DRIFT)] = max(w[index(c + DRIFT)], largest(w, h[RESIDUAL], h[N_CLOSURE_ROWS]))
-        w[index(c + RATE_DRIFT)] = max(w[index(c + RATE_DRIFT)], largest(w, h[RESIDUAL_RATE], h[N_CLOSURE_ROWS]))
-        share = TIGHTLY if near(h, w, t_new) else w[index(c + RTOL)]
-        used = project(h, f, w, n, t_new, h[Y_NEW], slope, share * w[index(c + LENGTH)])
+        w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
+        w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS]))
+        share = TIGHTLY if near(h, w, t_new) else w[c + m.RTOL]
+        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, share * w[c + m.LENGTH])
         note(h, w)
         if used > 0:
-            n[EVALUATIONS] += used
-            n[PROJECTION_EVALUATIONS] += used
-            n[PROJECTIONS] += 1
+            n[m.EVALUATIONS] += used
+            n[m.PROJECTION_EVALUATIONS] += used
+            n[m.PROJECTIONS] += 1
         return used >= 0
 
     @kernel
@@ -227,65 +130,65 @@ def compose(
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
         if not attempt(h, f, w, n, step):
             return FAILED
-        norm = judge(h, f, w, n, step)
+        norm = error_norm(h, f, w, n, step)
         if norm != norm:
-            n[EVALUATION] = NOT_FINITE
+            n[m.EVALUATION] = m.NOT_FINITE
             return FAILED
         if norm > allowed(h, w):
             return min(norm, FAILED)
         if not finish(h, f, w, n, t_new):
             return FAILED
-        feel(h, w, n, step)
+        detect_stiffness(h, w, n, step)
         return norm
 
     @kernel
     def accept(h, w, t_new):
         """Make the end of the step the start of the next."""
-        slope = h[SLOPES]
-        final = slope + h[NY] * last
-        for k in range(h[NY]):
-            w[index(h[Y] + k)] = w[index(h[Y_NEW] + k)]
-            w[index(slope + k)] = w[index(final + k)]
-        w[index(h[CONTROL] + TIME)] = t_new
+        slope = h[m.SLOPES]
+        final = slope + h[m.NY] * last
+        for k in range(h[m.NY]):
+            w[h[m.Y] + k] = w[h[m.Y_NEW] + k]
+            w[slope + k] = w[final + k]
+        w[h[m.CONTROL] + m.TIME] = t_new
         keep_scales(h, w)
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
-        c = h[CONTROL]
+        c = h[m.CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
-            t = w[index(c + TIME)]
-            if n[FRESH]:
+            t = w[c + m.TIME]
+            if n[m.FRESH]:
                 if not first_step(h, f, w, n):
                     return
                 note(h, w)
                 forget(h, w, t)
-            step = lay(h, w, t)
-            final = t + 1.0001 * step >= w[index(c + END)]
+            step = choose_step(h, w, t)
+            final = t + 1.0001 * step >= w[c + m.END]
             if final:
-                step = w[index(c + END)] - t
-            if not step > SMALLEST_STEP * max(abs(t), w[index(c + SPAN)]):
-                if n[EVALUATION] == NOT_FINITE:
-                    n[STATUS] = NOT_A_NUMBER
+                step = w[c + m.END] - t
+            if not step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
+                if n[m.EVALUATION] == m.NOT_FINITE:
+                    n[m.STATUS] = m.NOT_A_NUMBER
                 else:
-                    n[STATUS] = LOST_CLOSURE if n[EVALUATION] != OK else STEP_TOO_SMALL
+                    n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
                 return
-            t_new = w[index(c + END)] if final else t + step
+            t_new = w[c + m.END] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
             if norm > allowed(h, w):
-                n[REJECTED] += 1
+                n[m.REJECTED] += 1
                 if not after_rejection(h, w, n, step, norm):
                     return
                 continue
             following = next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
+            happened, ready, t_new, step = resolve_events(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
-            n[STEPS] += 1
-            straddling = w[index(c + STRADDLING)] > 0.0
+            n[m.STEPS] += 1
+            straddling = w[c + m.STRADDLING] > 0.0
             if straddling:
-                snapshot(h, w, n, rows, t, h[Y])
+                snapshot(h, w, n, rows, t, h[m.Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
             keep(h, f, w, n, step)
             accept(h, w, t_new)
@@ -293,8 +196,8 @@ def compose(
             foresee(h, f, w, n, t_new)
             if happened > 0 or straddling:
                 hold_modes(h, w, n)
-                snapshot(h, w, n, rows, t_new, h[Y])
+                snapshot(h, w, n, rows, t_new, h[m.Y])
             if happened > 0:
-                n[FRESH] = 1 if happened == RESTART else 0
+                n[m.FRESH] = 1 if happened == RESTART else 0
 
     return advance

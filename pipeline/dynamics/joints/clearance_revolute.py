@@ -8,14 +8,15 @@ not modelled.
 
 from __future__ import annotations
 
-from pipeline.dynamics.tables import AXES
-from pipeline.dynamics.vectors import at9, axis, dot, kernel, scale, sub
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import at9, axis, dot, scale, sub
 
 
 @kernel
 def separation(w, outer, p):
     """Offset of the pin's centre that closes the gap [m]: the part of p normal to the journal's axis."""
-    z = axis(at9(w, outer + AXES), 2)
+    z = axis(at9(w, outer + m.FRAME.axes), 2)
     return sub(p, scale(dot(z, p), z))
 
 

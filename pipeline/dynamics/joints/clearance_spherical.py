@@ -5,7 +5,7 @@ Nothing but the contact (`contact.forces`) joins the bodies.
 
 from __future__ import annotations
 
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel

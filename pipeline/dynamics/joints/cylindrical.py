@@ -5,28 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics.joints.coordinate import ROTATION, TRANSLATION, angle_about_z
-from pipeline.dynamics.tables import (
-    J_ACCELERATION,
-    J_ALPHA,
-    J_COLUMNS,
-    J_OMEGA,
-    J_POSITION,
-    J_ROTATION,
-    J_VELOCITY,
-)
-from pipeline.dynamics.vectors import about_z, kernel, put9
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import ZERO, about_z
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x radians about z, then metres along z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 12):
-        w[joint + k] = 0.0
-    put9(w, joint + J_ROTATION, about_z(w[x]))
-    w[joint + J_POSITION + 2] = w[x + 1]
-    w[joint + J_OMEGA + 2], w[joint + J_VELOCITY + 2] = w[u], w[u + 1]
-    w[joint + J_ALPHA + 2], w[joint + J_ACCELERATION + 2] = w[du], w[du + 1]
-    w[joint + J_COLUMNS + 2] = w[joint + J_COLUMNS + 6 + 5] = 1.0
+    for k in range(12):
+        w[S + k] = 0.0
+    w[S + 2] = w[S + 6 + 5] = 1.0
+    return about_z(w[x]), (0.0, 0.0, w[x + 1]), ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The positions' rates are the speeds."""
     w[rate], w[rate + 1] = w[u], w[u + 1]
 
 
@@ -37,7 +31,6 @@ class Cylindrical:
     TRANSLATIONS: tuple[int, ...] = (0, 1)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
     COORDINATES = (ROTATION, TRANSLATION)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

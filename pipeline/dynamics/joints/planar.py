@@ -5,33 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z
-from pipeline.dynamics.tables import (
-    J_ACCELERATION,
-    J_ALPHA,
-    J_COLUMNS,
-    J_OMEGA,
-    J_POSITION,
-    J_ROTATION,
-    J_VELOCITY,
-)
-from pipeline.dynamics.vectors import about_z, kernel, put9
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import ZERO, about_z
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x metres along x and y of F, radians about z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 18):
-        w[joint + k] = 0.0
-    put9(w, joint + J_ROTATION, about_z(w[x + 2]))
-    for k in range(2):
-        w[joint + J_POSITION + k] = w[x + k]
-        w[joint + J_VELOCITY + k] = w[u + k]
-        w[joint + J_ACCELERATION + k] = w[du + k]
-        w[joint + J_COLUMNS + 7 * k + 3] = 1.0
-        w[rate + k] = w[u + k]
-    w[joint + J_OMEGA + 2] = w[rate + 2] = w[u + 2]
-    w[joint + J_ALPHA + 2] = w[du + 2]
-    w[joint + J_COLUMNS + 12 + 2] = 1.0
+    for k in range(18):
+        w[S + k] = 0.0
+    w[S + 3] = w[S + 6 + 4] = w[S + 12 + 2] = 1.0
+    return about_z(w[x + 2]), (w[x], w[x + 1], 0.0), ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The positions' rates are the speeds."""
+    w[rate], w[rate + 1], w[rate + 2] = w[u], w[u + 1], w[u + 2]
 
 
 class Planar:
@@ -41,7 +31,6 @@ class Planar:
     TRANSLATIONS: tuple[int, ...] = (2,)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
     COORDINATES = (Coordinate("x", False, axis=0), Coordinate("y", False, axis=1), ROTATION)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -5,19 +5,22 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics.joints.coordinate import ROTATION, angle_about_z
-from pipeline.dynamics.tables import J_ALPHA, J_COLUMNS, J_OMEGA, J_ROTATION
-from pipeline.dynamics.vectors import about_z, kernel, put9
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import ZERO, about_z
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x radians about z (see `spherical.motion`)."""
-    for k in range(J_COLUMNS + 6):
-        w[joint + k] = 0.0
-    put9(w, joint + J_ROTATION, about_z(w[x]))
-    w[joint + J_OMEGA + 2] = w[u]
-    w[joint + J_ALPHA + 2] = w[du]
-    w[joint + J_COLUMNS + 2] = 1.0
+    for k in range(6):
+        w[S + k] = 0.0
+    w[S + 2] = 1.0
+    return about_z(w[x]), ZERO, ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The position's rate is the speed."""
     w[rate] = w[u]
 
 
@@ -28,7 +31,6 @@ class Revolute:
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
     COORDINATES = (ROTATION,)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -11,13 +11,13 @@ import xarray as xr
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.assembly import initial, selection
-from pipeline.dynamics.assembly.numbers import tabulate
-from pipeline.dynamics.assembly.system import build
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.integrate import singular
-from pipeline.dynamics.integrate.engine import Engine, Progress, observe, prepare
-from pipeline.dynamics.tables import MODE, OK, PIECE_SIZE
+from pipeline.dynamics.model import initial, selection
+from pipeline.dynamics.model.mechanism import build
+from pipeline.dynamics.model.model import tabulate
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine, Progress, observe, prepare
 
 #: impact rate that a contact is given: at rest the hysteresis of an impact long past has no say
 NO_IMPACT = 1e300
@@ -43,7 +43,7 @@ class Bench:
     @property
     def contacts(self) -> int:
         """Number of clearance joints."""
-        return self.engine.built.packed.sizes["N_CONTACTS"]
+        return self.engine.model.arrays.size(m.N_CONTACTS)
 
 
 @dataclass(frozen=True)
@@ -77,71 +77,71 @@ def hold(
     """
     driven, given = scene, dict[str, Pieces]()
     if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
-        from pipeline.dynamics.inverse import actuated
+        from pipeline.dynamics.run.inverse import actuated
 
         driven, given = actuated(scene, bundles, progress)
-    built = tabulate(build(driven, bundles), given)
-    packed = replace(built.packed, h=built.packed.h.copy(), f=built.packed.f.copy())
-    engine = prepare(replace(built, packed=packed), progress)
+    model = tabulate(build(driven, bundles), given)
+    arrays = replace(model.arrays, h=model.arrays.h.copy(), f=model.arrays.f.copy())
+    engine = prepare(replace(model, arrays=arrays), progress)
     engine.select_pieces(engine.start)
-    singular.select_rows(engine, initial.start_state(built), engine.start)
+    singular.select_rows(engine, initial.start_state(model), engine.start)
     at = engine.start if time is None else time
     first, last = drive_state(engine, engine.start), drive_state(engine, at)
     if not moving:
         last[:, 1] = 0.0
     for name, value in (drives or {}).items():
-        if name not in built.system.drives:
-            known = built.system.drives
+        if name not in model.mechanism.drives:
+            known = model.mechanism.drives
             remedy = suggestion(name, known) if known else "the scene has no drives"
             raise InputError(f"drive '{name}'", "there is no such drive", remedy)
-        k = built.system.drives.index(name)
+        k = model.mechanism.drives.index(name)
         last[k, 0] = sense(engine)[k] * value
-    engine.n[engine.n[MODE] : engine.n[MODE] + packed.sizes["N_CONTACTS"]] = 1
-    engine.view("LATCHED", packed.sizes["N_CONTACTS"])[:] = NO_IMPACT
+    engine.n[engine.n[m.MODE] : engine.n[m.MODE] + arrays.size(m.N_CONTACTS)] = 1
+    engine.view(m.LATCHED, arrays.size(m.N_CONTACTS))[:] = NO_IMPACT
     first[:, 1] = 0.0
-    bench = Bench(scene, engine, at, first, np.zeros(packed.sizes["N_TURNS"]))
+    bench = Bench(scene, engine, at, first, np.zeros(arrays.size(m.N_TURNS)))
     set_drives(bench, first)
-    state = initial.start_state(built)
-    q = carry(bench, closed(bench, state[: built.layout.nq]), last[:, 0])
+    state = initial.start_state(model)
+    q = carry(bench, closed(bench, state[: model.numbering.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
 
 
 def sense(engine: Engine) -> np.ndarray:
     """+1 per drive, -1 where the tree meets its joint from the second frame."""
-    system = engine.built.system
-    sign_of = {name: link.stage.sign for link in system.links if link.stage for name in link.drives}
-    return np.array([sign_of[name] for name in system.drives])
+    mechanism = engine.model.mechanism
+    sign_of = {name: link.stage.sign for link in mechanism.links if link.stage for name in link.drives}
+    return np.array([sign_of[name] for name in mechanism.drives])
 
 
 def drive_state(engine: Engine, time: float) -> np.ndarray:
     """Position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
     engine.select_pieces(time)
     # the laws say so on their way to any evaluation; the pose does not matter
-    engine.evaluate(initial.start_state(engine.built), time)
-    nq, nv, known = engine.built.layout.nq, engine.built.layout.nv, engine.built.layout.known
-    return np.stack([engine.view("X", nq + known)[nq:], engine.view("U", nv + known)[nv:]], axis=1)
+    engine.evaluate(initial.start_state(engine.model), time)
+    nq, nv, known = engine.model.numbering.nq, engine.model.numbering.nv, engine.model.numbering.known
+    return np.stack([engine.view(m.X, nq + known)[nq:], engine.view(m.U, nv + known)[nv:]], axis=1)
 
 
 def set_drives(bench: Bench, drives: np.ndarray) -> None:
     """Replace every drive's law by the straight one through a position, with a speed, at the bench's time."""
-    packed = bench.engine.built.packed
-    for (first, count), (position, speed) in zip(packed.table("LAWS"), drives, strict=False):
-        straight = np.zeros(PIECE_SIZE)
-        straight[:3] = bench.time, position, speed
-        packed.table("PIECES")[first : first + count] = straight
-        selection.view(packed, bench.engine.h, "PIECE_HARMONICS")[first : first + count, 1] = 0
+    arrays = bench.engine.model.arrays
+    for (first, count), (position, speed) in zip(arrays.table(m.LAWS), drives, strict=False):
+        straight = np.zeros(1, dtype=m.row_type(m.PIECES))
+        straight["start"], straight["coefficients"][:, :2] = bench.time, (position, speed)
+        arrays.table(m.PIECES)[first : first + count] = straight
+        arrays.table(m.PIECE_HARMONICS, bench.engine.h)["n_harmonics"][first : first + count] = 0
     bench.engine.select_pieces(bench.time)
 
 
 def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Positions after the drives have gone to `target` in strides, the loops closed after each."""
     origin, share, stride = bench.drives[:, 0], 0.0, 1.0
-    if not bench.engine.built.system.closures:
+    if not bench.engine.model.mechanism.closures:
         share = 1.0
     else:
         way = float(np.max(np.abs(target - origin), initial=0.0))
-        stride = min(1.0, STRIDE * min(bench.engine.built.system.length, 1.0) / way) if way > 0.0 else 1.0
+        stride = min(1.0, STRIDE * min(bench.engine.model.mechanism.length, 1.0) / way) if way > 0.0 else 1.0
     while share < 1.0:
         attempt = min(1.0, share + stride)
         try:
@@ -156,8 +156,8 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
 
 def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarray:
     """State vector with positions q and speeds v (at rest when None)."""
-    y = np.zeros(bench.engine.built.packed.sizes["NY"])
-    nq, nv = bench.engine.built.layout.nq, bench.engine.built.layout.nv
+    y = np.zeros(bench.engine.model.arrays.size(m.NY))
+    nq, nv = bench.engine.model.numbering.nq, bench.engine.model.numbering.nv
     y[:nq] = q
     if v is not None:
         y[nq : nq + nv] = v
@@ -175,19 +175,17 @@ def seen(bench: Bench, states: np.ndarray) -> dict[str, np.ndarray]:
 def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
     """Positions with the loops closed, loads following their angles; SolverError when that fails."""
     found = seen(bench, state(bench, q)[None, :])
-    if found["status"][0, 0] != OK:
+    if found["status"][0, 0] != m.OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
     if len(bench.turns):
-        from pipeline.dynamics.loads.fields import TURNS, VALUE
-
-        turn = bench.engine.built.packed.table("LOADS")[:, TURNS]
-        bench.turns[turn[turn >= 0]] = found["load"][0].reshape(len(turn), -1)[turn >= 0, VALUE]
+        turn = bench.engine.model.arrays.table(m.LOADS)["turns"]
+        bench.turns[turn[turn >= 0]] = m.named(m.LOAD, found["load"][0])["value"][turn >= 0]
     return found["state"][0, : len(q)].copy()
 
 
 def displacement_map(bench: Bench, q: np.ndarray) -> np.ndarray:
     """Change of the positions per small displacement of each coordinate, shape (nq, nv)."""
-    nq, nv = bench.engine.built.layout.nq, bench.engine.built.layout.nv
+    nq, nv = bench.engine.model.numbering.nq, bench.engine.model.numbering.nv
     return np.array([bench.engine.evaluate(state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]).T.reshape(nq, nv)
 
 
@@ -195,20 +193,20 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
-    sizes, nv = engine.built.packed.sizes, engine.built.layout.nv
+    arrays, nv = engine.model.arrays, engine.model.numbering.nv
     return Balance(
-        engine.view("BIAS", nv).copy(),
+        engine.view(m.BIAS, nv).copy(),
         _mass(engine),
-        engine.rows("JACOBIAN"),
-        engine.view("RESIDUAL_RATE", sizes["N_CLOSURE_ROWS"])[selection.kept_places(engine.built, engine.h)],
+        engine.rows(m.JACOBIAN),
+        engine.view(m.RESIDUAL_RATE, arrays.size(m.N_CLOSURE_ROWS))[selection.kept_places(engine.model, engine.h)],
     )
 
 
 def _mass(engine: Engine) -> np.ndarray:
     """M = L L^T from the factor that the last evaluation left in its envelope."""
-    packed = engine.built.packed
-    L = np.zeros((engine.built.layout.nv,) * 2)
-    entries = engine.view("MASS", packed.sizes["MASS_SIZE"])
-    for i, (first, start) in enumerate(packed.table("ENVELOPE")):
+    arrays = engine.model.arrays
+    L = np.zeros((engine.model.numbering.nv,) * 2)
+    entries = engine.view(m.MASS, arrays.size(m.MASS_SIZE))
+    for i, (first, start) in enumerate(arrays.table(m.ENVELOPE)):
         L[i, first : i + 1] = entries[start : start + i + 1 - first]
     return L @ L.T

@@ -9,16 +9,16 @@ from pipeline.dynamics.linear.bench import Bench
 
 def owners(bench: Bench) -> list[str]:
     """Owner of every free coordinate: ``joint B2``, ``body ball`` (held by no joint), ``rod1`` (its deformation)."""
-    layout, links = bench.engine.built.layout, bench.engine.built.system.links
-    found = [""] * layout.nv
+    numbering, links = bench.engine.model.numbering, bench.engine.model.mechanism.links
+    found = [""] * numbering.nv
     for i, link in enumerate(links[1:], start=1):
-        if i in layout.modes:
-            first = layout.flex_c0[i]
-            found[first : first + layout.modes[i]] = [f"deformation of {link.flexible}"] * layout.modes[i]
-        if layout.driven(i) < 0:
-            edge, n = link.branch.edge, layout.n_speeds(i)
+        if i in numbering.modes:
+            first = numbering.flex_c0[i]
+            found[first : first + numbering.modes[i]] = [f"deformation of {link.flexible}"] * numbering.modes[i]
+        if numbering.driven(i) < 0:
+            edge, n = link.branch.edge, numbering.n_speeds(i)
             name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
-            found[layout.c0[i] : layout.c0[i] + n] = [name] * n
+            found[numbering.c0[i] : numbering.c0[i] + n] = [name] * n
     return found
 
 

@@ -6,26 +6,26 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.motion import Motion, body_motions, modal
 
 Seen = dict[str, np.ndarray]
 
 
-def by_body(built: Tables, rows: Seen, links: list[Motion]) -> dict[str, np.ndarray]:
+def by_body(model: Model, rows: Seen, links: list[Motion]) -> dict[str, np.ndarray]:
     """Twice the kinetic energy of every moving body in states, by name, shape (rows - 1,) each.
 
     rows: the pose with its drives' motion alone, which is taken off, then with the speeds of vibrations.
     The shortening of bent beams, which is of second order here, is left out.
     """
     found: dict[str, np.ndarray] = {}
-    motions = body_motions(built, rows, links)
-    for name, body in built.system.scene.rigid().items():
+    motions = body_motions(model, rows, links)
+    for name, body in model.scene.rigid().items():
         found[name] = _rigid(body, motions[name])
-    for i in sorted(built.layout.modes):
-        name = str(built.system.links[i].flexible)
-        state = modal(built, i, rows)
-        found[name] = _flexible(built.system.bundles[name], links[i], state.q[0], state.u[1:] - state.u[0])
+    for i in sorted(model.numbering.modes):
+        name = str(model.mechanism.links[i].flexible)
+        state = modal(model, i, rows)
+        found[name] = _flexible(model.mechanism.bundles[name], links[i], state.q[0], state.u[1:] - state.u[0])
     return found
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import Bench, balance, displacement_map
 from pipeline.dynamics.linear.differences import Rounding, derivative
 
@@ -69,9 +70,9 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 
 def scales(bench: Bench) -> np.ndarray:
     """Size of a large displacement of every coordinate: the mechanism's size, or a radian; shape (nv,)."""
-    packed, layout = bench.engine.built.packed, bench.engine.built.layout
-    groups = packed.table("GROUPS")[layout.nq : layout.nq + layout.nv, 0]
-    return packed.table("FLOORS")[groups, 0]
+    arrays, numbering = bench.engine.model.arrays, bench.engine.model.numbering
+    groups = arrays.table(m.GROUPS)["group"][numbering.nq : numbering.nq + numbering.nv]
+    return arrays.table(m.FLOORS)["magnitude"][groups]
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,116 +7,62 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.tables import (
-    AXES,
-    FLEX_C0,
-    LAW,
-    LAW_SIZE,
-    LEDGER_RATE,
-    LOAD,
-    LOAD_SIZE,
-    LOAD_STORED,
-    MODAL_BIAS,
-    N_MODES,
-    OMEGA,
-    ORIGIN,
-    PORT_COLUMN,
-    PORT_FLEX,
-    TURN,
-    VELOCITY,
-    column,
-    flex,
-    place,
-    port,
-    site_frame,
-    site_link,
-    site_port,
-    wrench,
-)
-from pipeline.dynamics.vectors import accumulate, add, at, at9, axis, cross, dot, index, kernel, put, scale, sub
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import apply_wrench
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, put, scale, sub
 
-LOADS, LOAD_KINDS, LOAD_NUMBERS, LOAD_SLOT = (
-    place(name) for name in ("LOADS", "LOAD_KINDS", "LOAD_NUMBERS", "LOAD_SLOT")
-)
-# fields of a load: sites (a is -1 where the world holds against it), its first law, the angle that it follows or -1,
-# whether it turns with its frame, and how its coordinate is measured: turning, frame and axis, entries of R_FG
-A, B, LAW0, TURNS, FOLLOWS, TURNING, SIDE, AXIS, SINE, COSINE = 0, 1, 2, 3, 4, 5, 6, 7, 8, 10
-WIDTH, NUMBERS = 12, 5
-# what it does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored energy
-# (tables.LOAD_STORED), power that it brings in, power that it loses
-FORCE, MOMENT, VALUE, RATE, STORED, POWER, LOSS = 0, 3, 6, 7, LOAD_STORED, 9, 10
 ZERO = (0.0, 0.0, 0.0)
-
-
-@kernel
-def field(h, k, which):
-    """A field of load k."""
-    return h[index(h[LOADS] + WIDTH * k + which)]
 
 
 @kernel
 def number(h, f, k, which):
     """A number of load k."""
-    return f[index(h[LOAD_NUMBERS] + NUMBERS * k + which)]
+    return f[m.LOAD_NUMBERS.row(h, k) + which]
 
 
 @kernel
 def law(h, w, k, which):
     """Present value of a law of load k."""
-    return w[index(h[LAW] + LAW_SIZE * (field(h, k, LAW0) + which))]
-
-
-@kernel
-def push(h, w, s, moment, force):
-    """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
-    o = wrench(h, site_link(h, s))
-    accumulate(w, o, scale(-1.0, moment))
-    accumulate(w, o + 3, scale(-1.0, force))
-    p = site_port(h, s)
-    if p >= 0:
-        b = port(h, p, PORT_FLEX)
-        bias, first = h[MODAL_BIAS] + flex(h, b, FLEX_C0), port(h, p, PORT_COLUMN)
-        for j in range(flex(h, b, N_MODES)):
-            o = column(h, first + j)
-            w[index(bias + j)] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)
+    return w[m.LAW.row(h, m.LOADS.law0(h, k) + which)]
 
 
 @kernel
 def act(h, w, k, moment, force, value, rate, stored, power, loss):
     """Apply the wrench of load k on b and against it on a; note what it does, and book power and loss."""
-    o = h[LOAD] + LOAD_SIZE * k
-    put(w, o + FORCE, force)
-    put(w, o + MOMENT, moment)
-    w[index(o + VALUE)], w[index(o + RATE)], w[index(o + STORED)] = value, rate, stored
-    w[index(o + POWER)], w[index(o + LOSS)] = power, loss
-    ledger = h[LEDGER_RATE] + h[LOAD_SLOT]
-    w[index(ledger)] += power
-    w[index(ledger + 1)] += loss
-    push(h, w, field(h, k, B), moment, force)
-    if field(h, k, A) >= 0:
-        push(h, w, field(h, k, A), scale(-1.0, moment), scale(-1.0, force))
+    o = m.LOAD.row(h, k)
+    put(w, o + m.LOAD.force, force)
+    put(w, o + m.LOAD.moment, moment)
+    w[o + m.LOAD.value], w[o + m.LOAD.rate], w[o + m.LOAD.stored] = value, rate, stored
+    w[o + m.LOAD.power], w[o + m.LOAD.loss] = power, loss
+    ledger = h[m.LEDGER_RATE] + h[m.LOAD_SLOT]
+    w[ledger] += power
+    w[ledger + 1] += loss
+    apply_wrench(h, w, m.LOADS.b(h, k), moment, force)
+    if m.LOADS.a(h, k) >= 0:
+        apply_wrench(h, w, m.LOADS.a(h, k), scale(-1.0, moment), scale(-1.0, force))
 
 
 @kernel
 def measure(h, w, k):
     """Coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
-    a, b = site_frame(h, field(h, k, A)), site_frame(h, field(h, k, B))
-    F, G = at9(w, a + AXES), at9(w, b + AXES)
-    along = axis(F if field(h, k, SIDE) == 0 else G, field(h, k, AXIS))
-    omega = at(w, a + OMEGA)
-    if field(h, k, TURNING):
-        sine = dot(axis(F, field(h, k, SINE)), axis(G, field(h, k, SINE + 1)))
-        cosine = dot(axis(F, field(h, k, COSINE)), axis(G, field(h, k, COSINE + 1)))
-        return np.arctan2(sine, cosine), dot(along, sub(at(w, b + OMEGA), omega)), along, ZERO
-    p = at(w, b + ORIGIN)
-    r = sub(p, at(w, a + ORIGIN))
-    slide = sub(at(w, b + VELOCITY), add(at(w, a + VELOCITY), cross(omega, r)))
+    a, b = m.SITE_FRAMES.row(h, m.LOADS.a(h, k)), m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
+    F, G = at9(w, a + m.FRAME.axes), at9(w, b + m.FRAME.axes)
+    along = axis(F if m.LOADS.side(h, k) == 0 else G, m.LOADS.axis(h, k))
+    omega = at(w, a + m.FRAME.omega)
+    if m.LOADS.turning(h, k):
+        sine = dot(axis(F, m.LOADS.sine_f(h, k)), axis(G, m.LOADS.sine_g(h, k)))
+        cosine = dot(axis(F, m.LOADS.cosine_f(h, k)), axis(G, m.LOADS.cosine_g(h, k)))
+        return np.arctan2(sine, cosine), dot(along, sub(at(w, b + m.FRAME.omega), omega)), along, ZERO
+    p = at(w, b + m.FRAME.origin)
+    r = sub(p, at(w, a + m.FRAME.origin))
+    slide = sub(at(w, b + m.FRAME.velocity), add(at(w, a + m.FRAME.velocity), cross(omega, r)))
     return dot(along, r), dot(along, slide), cross(p, along), along
 
 
 @kernel
 def unwound(h, w, k, angle, rate):
     """The angle of load k with the full turns that it has made; its state follows the rate."""
-    turn = field(h, k, TURNS)
-    w[index(h[LEDGER_RATE] + h[LOAD_SLOT] + 2 + turn)] = rate
-    return angle + 2.0 * np.pi * np.round((w[index(h[TURN] + turn)] - angle) / (2.0 * np.pi))
+    turn = m.LOADS.turns(h, k)
+    w[h[m.LEDGER_RATE] + h[m.LOAD_SLOT] + 2 + turn] = rate
+    return angle + 2.0 * np.pi * np.round((w[h[m.TURN] + turn] - angle) / (2.0 * np.pi))

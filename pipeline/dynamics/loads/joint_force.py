@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pipeline.core.scene.loads import JointForce as Declared
 from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.loads.fields import act, law, measure
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import kernel, scale
+from pipeline.dynamics.vectors import scale
 
 
 @kernel

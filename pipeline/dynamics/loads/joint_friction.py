@@ -10,9 +10,10 @@ from pipeline.core.scene.loads import JointFriction as Declared
 from pipeline.core.units import quantity
 from pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.loads.fields import act, measure, number
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import kernel, scale
+from pipeline.dynamics.vectors import scale
 
 
 @kernel

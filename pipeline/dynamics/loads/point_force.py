@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from pipeline.core.scene.loads import PointForce as Declared
-from pipeline.dynamics.loads.fields import FOLLOWS, B, act, field, law
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.loads.fields import act, law
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.tables import AXES, ORIGIN, VELOCITY, site_frame
-from pipeline.dynamics.vectors import at, at9, cross, dot, kernel, turn
+from pipeline.dynamics.vectors import at, at9, cross, dot, turn
 
 
 @kernel
 def apply(h, f, w, k):
     """Apply load k."""
-    o = site_frame(h, field(h, k, B))
+    o = m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
     force = (law(h, w, k, 0), law(h, w, k, 1), law(h, w, k, 2))
-    if field(h, k, FOLLOWS):
-        force = turn(at9(w, o + AXES), force)
-    power = dot(force, at(w, o + VELOCITY))
-    act(h, w, k, cross(at(w, o + ORIGIN), force), force, 0.0, 0.0, 0.0, power, 0.0)
+    if m.LOADS.follows(h, k):
+        force = turn(at9(w, o + m.FRAME.axes), force)
+    power = dot(force, at(w, o + m.FRAME.velocity))
+    act(h, w, k, cross(at(w, o + m.FRAME.origin), force), force, 0.0, 0.0, 0.0, power, 0.0)
 
 
 class PointForce:

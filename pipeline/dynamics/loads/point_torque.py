@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from pipeline.core.scene.loads import PointTorque as Declared
-from pipeline.dynamics.loads.fields import FOLLOWS, ZERO, B, act, field, law
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.loads.fields import ZERO, act, law
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.tables import AXES, OMEGA, site_frame
-from pipeline.dynamics.vectors import at, at9, dot, kernel, turn
+from pipeline.dynamics.vectors import at, at9, dot, turn
 
 
 @kernel
 def apply(h, f, w, k):
     """Apply load k."""
-    o = site_frame(h, field(h, k, B))
+    o = m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
     torque = (law(h, w, k, 0), law(h, w, k, 1), law(h, w, k, 2))
-    if field(h, k, FOLLOWS):
-        torque = turn(at9(w, o + AXES), torque)
-    act(h, w, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, at(w, o + OMEGA)), 0.0)
+    if m.LOADS.follows(h, k):
+        torque = turn(at9(w, o + m.FRAME.axes), torque)
+    act(h, w, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, at(w, o + m.FRAME.omega)), 0.0)
 
 
 class PointTorque:

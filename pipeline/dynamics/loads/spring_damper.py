@@ -11,21 +11,22 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.scene.loads import SpringDamper as Declared
-from pipeline.dynamics.loads.fields import A, B, act, field, number
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.loads.fields import act, number
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.tables import ORIGIN, VELOCITY, site_frame
-from pipeline.dynamics.vectors import at, cross, dot, kernel, scale, sub
+from pipeline.dynamics.vectors import at, cross, dot, scale, sub
 
 
 @kernel
 def apply(h, f, w, k):
     """Apply load k."""
-    a, b = site_frame(h, field(h, k, A)), site_frame(h, field(h, k, B))
-    p = at(w, b + ORIGIN)
-    r = sub(p, at(w, a + ORIGIN))
+    a, b = m.SITE_FRAMES.row(h, m.LOADS.a(h, k)), m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
+    p = at(w, b + m.FRAME.origin)
+    r = sub(p, at(w, a + m.FRAME.origin))
     length = np.sqrt(dot(r, r))
     along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
-    rate = dot(along, sub(at(w, b + VELOCITY), at(w, a + VELOCITY)))
+    rate = dot(along, sub(at(w, b + m.FRAME.velocity), at(w, a + m.FRAME.velocity)))
     stretch, damped = length - number(h, f, k, 2), number(h, f, k, 1) * rate
     force = scale(-(number(h, f, k, 0) * stretch + damped), along)
     stored = 0.5 * number(h, f, k, 0) * stretch * stretch

@@ -16,16 +16,15 @@ from pipeline.core.artifacts.schema import ENSEMBLE, conform
 from pipeline.core.errors import InputError
 from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
-from pipeline.dynamics.integrate import state
-from pipeline.dynamics.integrate.engine import Engine, Progress, consistent_start
-from pipeline.dynamics.integrate.trajectory import Trajectory, output_times
-from pipeline.dynamics.perturbation import offset_jacobian, perturbed
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.record.dataset import attributes
-from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
-from pipeline.dynamics.run import engines, observed
-from pipeline.dynamics.switching import follow
-from pipeline.dynamics.tables import NORMAL_FORCE, TOUCH_OFFSET, TOUCH_SIZE
+from pipeline.dynamics.run.engine import Engine, Progress, consistent_start
+from pipeline.dynamics.run.ledger import require_closed
+from pipeline.dynamics.run.perturbation import offset_jacobian, perturbed
+from pipeline.dynamics.run.run import engines, observed
+from pipeline.dynamics.run.switching import follow
+from pipeline.dynamics.run.trajectory import Trajectory, output_times
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -59,10 +58,12 @@ def _quiet(share: float | None, text: str) -> None:
 
 
 def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
-    system = engine.built.system
-    known = [n for n, b in system.scene.body.items() if b.type != "ground"]
+    mechanism = engine.model.mechanism
+    known = [n for n, b in mechanism.scene.body.items() if b.type != "ground"]
     if wanted.bodies is None:
-        return sorted({system.frames[f].body for _, joint, _, _ in system.contacts for f in joint.between} & set(known))
+        return sorted(
+            {mechanism.frames[f].body for _, joint, _, _ in mechanism.contacts for f in joint.between} & set(known)
+        )
     for name in wanted.bodies:
         if name not in known:
             raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
@@ -70,25 +71,25 @@ def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
-    scene = engine.built.system.scene
+    scene = engine.model.scene
     regular = output_times(engine.breaks, scene.output.interval)
     rows = np.searchsorted(trajectory.time, regular)
     peak, count, share = _contact_statistics(engine, trajectory)
     kept = replace(trajectory, rows=trajectory.rows[rows])
     seen = observed(engine, kept)
-    require_closed(engine.built, kept, seen)
-    motions = body_motions(engine.built, seen, link_motions(engine.built, seen["link_frame"]))
+    require_closed(engine.model, kept, seen)
+    motions = body_motions(engine.model, seen, link_motions(engine.model, seen["link_frame"]))
     chosen = [motions[n] for n in names]
-    touch = seen["touch"].reshape(len(rows), -1, TOUCH_SIZE)
+    touch = seen["touch"].reshape(len(rows), -1, m.TOUCH.size)
     variables = {
-        **_series(chosen, engine.built.system.origin),
-        "contact_normal_force": (("time", "contact"), touch[..., NORMAL_FORCE]),
-        "contact_offset": (("time", "contact", "axis"), touch[..., TOUCH_OFFSET : TOUCH_OFFSET + 3]),
+        **_series(chosen, engine.model.mechanism.origin),
+        "contact_normal_force": (("time", "contact"), touch[..., m.TOUCH.normal_force]),
+        "contact_offset": (("time", "contact", "axis"), touch[..., m.TOUCH.offset : m.TOUCH.offset + 3]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
-    contacts = [name for name, *_ in engine.built.system.contacts]
+    contacts = [name for name, *_ in engine.model.mechanism.contacts]
     return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
 
 
@@ -108,12 +109,12 @@ def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndar
     e = trajectory.events
     span = engine.end - engine.start
     peak, count, share = [], [], []
-    for c in range(engine.built.packed.sizes["N_CONTACTS"]):
-        closing = e[(e[:, state.EVENT_CONTACT] == c) & (e[:, state.EVENT_KIND] == state.CLOSING)]
+    for c in range(engine.model.arrays.size(m.N_CONTACTS)):
+        closing = e[(e[:, m.EVENT.contact] == c) & (e[:, m.EVENT.kind] == m.CLOSING)]
         lasting = np.where(
-            np.isnan(closing[:, state.DURATION]), engine.end - closing[:, state.EVENT_TIME], closing[:, state.DURATION]
+            np.isnan(closing[:, m.EVENT.duration]), engine.end - closing[:, m.EVENT.time], closing[:, m.EVENT.duration]
         )
-        peak.append(closing[:, state.PEAK_FORCE].max(initial=0.0))
-        count.append(int((closing[:, state.SPEED] > IMPACT).sum()))
+        peak.append(closing[:, m.EVENT.peak_force].max(initial=0.0))
+        count.append(int((closing[:, m.EVENT.speed] > IMPACT).sum()))
         share.append(lasting.sum() / span)
     return np.array(peak), np.array(count), np.array(share)

@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.assembly.flexible_numbers import bow
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics.model.flexible_bodies import bow
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.deformation import shift
 from pipeline.dynamics.record.motion import Motion, modal
 
 
 def frame_velocities(
-    built: Tables, seen: dict[str, np.ndarray], links: list[Motion]
+    model: Model, seen: dict[str, np.ndarray], links: list[Motion]
 ) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Velocity of the origin and angular velocity of every named frame, world axes, shape (time, 3) each."""
-    system = built.system
+    mechanism = model.mechanism
     found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for name, frame in system.frames.items():
-        i = system.link_of[frame.body]
-        place = system.links[i].places[frame.body].of(frame.place)
-        if not system.links[i].flexible:
+    for name, frame in mechanism.frames.items():
+        i = mechanism.link_of[frame.body]
+        place = mechanism.links[i].places[frame.body].of(frame.place)
+        if not mechanism.links[i].flexible:
             motion = links[i].at(place.p)
             found[name] = motion.v, motion.omega
             continue
-        bundle, label = system.bundles[frame.body], name.partition(".")[2]
-        state = modal(built, i, seen)
+        bundle, label = mechanism.bundles[frame.body], name.partition(".")[2]
+        state = modal(model, i, seen)
         S, P = (bundle[f"frame_{k}_shape"].sel(frame=label).values for k in ("translation", "rotation"))
-        arm, rate, second = shift(S, bow(system, frame.body, label), state.q, state.u, state.du)
+        arm, rate, second = shift(S, bow(mechanism, frame.body, label), state.q, state.u, state.du)
         turning = _angular_velocity(state.q @ P.T, state.u @ P.T)
         found[name] = (
             links[i].moving(place.p + arm, rate, second).v,

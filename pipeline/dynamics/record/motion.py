@@ -8,10 +8,10 @@ import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics.assembly.flexible_numbers import bow
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.flexible_bodies import bow
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.deformation import shift
-from pipeline.dynamics.tables import ACCELERATION, ALPHA, AXES, FRAME_SIZE, OMEGA, ORIGIN, VELOCITY
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,18 @@ class Motion:
         return Motion(self.p + r, self.R, self.v + swing + s, self.omega, a, self.alpha)
 
 
-def link_motions(built: Tables, frames: np.ndarray) -> list[Motion]:
+def link_motions(model: Model, frames: np.ndarray) -> list[Motion]:
     """Motion of every link's frame, gravity's upward acceleration of the ground taken out."""
-    gravity = built.packed.table("GRAVITY")[0]
-    frames = frames.reshape(len(frames), -1, FRAME_SIZE)
+    gravity = model.arrays.table(m.GRAVITY)["acceleration"][0]
+    frames = frames.reshape(len(frames), -1, m.FRAME.size)
     found = []
     for i in range(frames.shape[1]):
         f = frames[:, i]
-        R = f[:, AXES : AXES + 9].reshape(-1, 3, 3)
-        p, omega, v, alpha, a = (f[:, o : o + 3] for o in (ORIGIN, OMEGA, VELOCITY, ALPHA, ACCELERATION))
+        R = f[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3)
+        p, omega, v, alpha, a = (
+            f[:, o : o + 3]
+            for o in (m.FRAME.origin, m.FRAME.omega, m.FRAME.velocity, m.FRAME.alpha, m.FRAME.acceleration)
+        )
         found.append(Motion(p, R, v, omega, a + gravity, alpha))
     return found
 
@@ -66,43 +69,43 @@ class Modal:
     du: np.ndarray
 
 
-def modal(built: Tables, link: int, seen: dict[str, np.ndarray]) -> Modal:
+def modal(model: Model, link: int, seen: dict[str, np.ndarray]) -> Modal:
     """Modal coordinates of a flexible link."""
-    layout = built.layout
-    q0, c0, n = layout.flex_q0[link], layout.flex_c0[link], layout.modes[link]
+    numbering = model.numbering
+    q0, c0, n = numbering.flex_q0[link], numbering.flex_c0[link], numbering.modes[link]
     return Modal(
         seen["coordinate"][:, q0 : q0 + n], seen["speed"][:, c0 : c0 + n], seen["acceleration"][:, c0 : c0 + n]
     )
 
 
-def body_motions(built: Tables, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, Motion]:
+def body_motions(model: Model, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, Motion]:
     """Motion of each moving body's centre of mass and axes, by name."""
-    system, found = built.system, {}
-    for name, body in system.scene.body.items():
-        i = system.link_of[name]
+    mechanism, found = model.mechanism, {}
+    for name, body in mechanism.scene.body.items():
+        i = mechanism.link_of[name]
         if isinstance(body, RigidBody):
-            place = system.links[i].places[name]
+            place = mechanism.links[i].places[name]
             found[name] = links[i].at(place.p + place.R @ np.array(body.com), place.R)
-        elif i and system.links[i].flexible == name:
-            bundle, state = system.bundles[name], modal(built, i, seen)
+        elif i and mechanism.links[i].flexible == name:
+            bundle, state = mechanism.bundles[name], modal(model, i, seen)
             C, mass = bundle["modal_first_moment"].values, float(bundle["mass"])
-            arm, rate, second = shift(C, bow(system, name), state.q, state.u, state.du)
+            arm, rate, second = shift(C, bow(mechanism, name), state.q, state.u, state.du)
             found[name] = links[i].moving((bundle["first_moment"].values + arm) / mass, rate / mass, second / mass)
     return found
 
 
-def frame_positions(built: Tables, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, np.ndarray]:
+def frame_positions(model: Model, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, np.ndarray]:
     """Origin of every named frame, kernels' origin, shape (time, 3)."""
-    system, found = built.system, {}
-    for name, frame in system.frames.items():
-        i = system.link_of[frame.body]
-        place = system.links[i].places[frame.body].of(frame.place)
+    mechanism, found = model.mechanism, {}
+    for name, frame in mechanism.frames.items():
+        i = mechanism.link_of[frame.body]
+        place = mechanism.links[i].places[frame.body].of(frame.place)
         arm = np.broadcast_to(place.p, (len(links[i].p), 3))
-        if system.links[i].flexible:
-            bundle, label = system.bundles[frame.body], name.partition(".")[2]
-            state = modal(built, i, seen)
+        if mechanism.links[i].flexible:
+            bundle, label = mechanism.bundles[frame.body], name.partition(".")[2]
+            state = modal(model, i, seen)
             S = bundle["frame_translation_shape"].sel(frame=label).values
-            arm = arm + shift(S, bow(system, frame.body, label), state.q, state.u, state.du)[0]
+            arm = arm + shift(S, bow(mechanism, frame.body, label), state.q, state.u, state.du)[0]
         found[name] = links[i].p + np.einsum("tij,tj->ti", links[i].R, arm)
     return found
 

@@ -20,7 +20,8 @@ import xarray as xr
 
 from pipeline.core.algebra import skew
 from pipeline.core.errors import InputError
-from pipeline.dynamics.assembly.numbers import Tables
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal
 from pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
 
@@ -44,7 +45,7 @@ class Motion:
 
 
 def record(
-    built: Tables, seen: Seen, names: tuple[str, ...], variables: Variables, coordinates: dict[str, object]
+    model: Model, seen: Seen, names: tuple[str, ...], variables: Variables, coordinates: dict[str, object]
 ) -> None:
     """Add section forces and peak stresses of the bodies `names` to a run's variables and coordinates.
 
@@ -53,10 +54,10 @@ def record(
     """
     forces, peaks, places, owners = [], [], [], []
     for name in names:
-        bundle = built.system.bundles[name]
+        bundle = model.mechanism.bundles[name]
         if "section_place" not in bundle:
             raise InputError("[output] stress", f"the bundle of '{name}' has no sections", "make it with the scene")
-        found = section_forces(bundle, *_motion_and_loads(built, seen, name))
+        found = section_forces(bundle, *_motion_and_loads(model, seen, name))
         forces.append(found)
         places.append(bundle["section_place"].values)
         owners += [name] * found.shape[1]
@@ -149,33 +150,33 @@ def _turn(v: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * (X @ X)
 
 
-def _motion_and_loads(built: Tables, seen: Seen, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
-    link = built.system.link_of[name]
-    frame, state = link_motions(built, seen["link_frame"])[link], modal(built, link, seen)
-    gravity = built.packed.table("GRAVITY")[0]
+def _motion_and_loads(model: Model, seen: Seen, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
+    link = model.mechanism.link_of[name]
+    frame, state = link_motions(model, seen["link_frame"])[link], modal(model, link, seen)
+    gravity = model.arrays.table(m.GRAVITY)["acceleration"][0]
     R_BW = np.swapaxes(frame.R, 1, 2)
     a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - gravity, frame.omega, frame.alpha))
-    names = [f"{name}.{label}" for label in built.system.bundles[name]["frame"].values]
+    names = [f"{name}.{label}" for label in model.mechanism.bundles[name]["frame"].values]
     moment, force = np.zeros((len(a), len(names), 3)), np.zeros((len(a), len(names), 3))
-    for at, n, f in _loads(built, seen, name):
+    for at, n, f in _loads(model, seen, name):
         k = names.index(at)
         moment[:, k] += np.einsum("tij,tj->ti", R_BW, n - np.cross(frame.p, f))
         force[:, k] += np.einsum("tij,tj->ti", R_BW, f)
     return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
 
 
-def _loads(built: Tables, seen: Seen, name: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _loads(model: Model, seen: Seen, name: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """What joints, paths and loads do to a body: its frame, moment about the kernels' origin, force, world axes."""
-    scene, found = built.system.scene, []
-    links = link_motions(built, seen["link_frame"])
-    places = frame_positions(built, seen, links)
-    for joint, (n, f) in joint_wrenches(built, seen, body_motions(built, seen, links), places).items():
+    scene, found = model.scene, []
+    links = link_motions(model, seen["link_frame"])
+    places = frame_positions(model, seen, links)
+    for joint, (n, f) in joint_wrenches(model, seen, body_motions(model, seen, links), places).items():
         between = scene.joint[joint].between
         about_origin = n + np.cross(places[between[1]], f)
         found += [(at, sign * about_origin, sign * f) for at, sign in zip(between, (-1.0, 1.0), strict=True)]
-    found += [(frame, n, f) for frame, n, f in path_wrenches(built, seen)]
+    found += [(frame, n, f) for frame, n, f in path_wrenches(model, seen)]
     if scene.forces():
         from pipeline.dynamics.record.loads import on_frames
 
-        found += on_frames(built, seen, name)
-    return [load for load in found if built.system.frames[load[0]].body == name]
+        found += on_frames(model, seen, name)
+    return [load for load in found if model.mechanism.frames[load[0]].body == name]

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
-from pipeline.dynamics.assembly import selection
-from pipeline.dynamics.integrate import singular
-from pipeline.dynamics.integrate.engine import Engine
-from pipeline.dynamics.integrate.trajectory import Trajectory
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import selection
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
@@ -41,7 +42,7 @@ def topology(
     """Variables and coordinates of the run dataset; joints: names along its joint dimension."""
     redundant = np.array([name in engine.mobility.redundant_joints for name in joints], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
-    rows, nv = len(trajectory.rows), engine.built.layout.nv
+    rows, nv = len(trajectory.rows), engine.model.numbering.nv
     values = _singular_values(engine, trajectory, seen)
     rank = np.zeros(rows, dtype=np.int32)
     if values.shape[1]:
@@ -67,8 +68,8 @@ def _jacobians(engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarra
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
-        J = selection.dense(engine.built, engine.h, seen["jacobian"][part])
-        parts.append(singular.scaled(engine.built, engine.h, J))
+        J = selection.dense(engine.model, engine.h, seen["jacobian"][part])
+        parts.append(singular.scaled(engine.model, engine.h, J))
     return np.concatenate(parts)
 
 
@@ -121,21 +122,21 @@ def _between(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int
     """
     from scipy.interpolate import KroghInterpolator
 
-    times, first = trajectory.time, 1 + 2 * len(engine.built.system.contacts)
+    times, first = trajectory.time, 1 + 2 * len(engine.model.mechanism.contacts)
     start, end = float(times[regular[k - 1]]), float(times[regular[k]])
     engine.keep(trajectory.selection(int(regular[k])))
     engine.select_pieces(0.5 * (start + end))
-    nodes = regular[k - 1 : k + 1] if engine.built.system.contacts else _smooth(engine, times, regular, k)
+    nodes = regular[k - 1 : k + 1] if engine.model.mechanism.contacts else _smooth(engine, times, regular, k)
     states, rates = trajectory.rows[nodes, first:], []
     for t, y in zip(times[nodes], states, strict=True):
         engine.attempt(y, float(t))
-        rates.append(engine.view("SLOPES", len(y)).copy())
+        rates.append(engine.view(m.SLOPES, len(y)).copy())
     values = np.stack([states, np.array(rates) * (end - start)], axis=1).reshape(-1, states.shape[1])
     path = KroghInterpolator(np.repeat((times[nodes] - start) / (end - start), 2), values)
 
     def jacobian(share: float) -> np.ndarray:
         engine.attempt(path(share), start + share * (end - start))
-        return singular.scaled(engine.built, engine.h, engine.rows("JACOBIAN"))
+        return singular.scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
 
     return jacobian
 

@@ -7,7 +7,7 @@ Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445.
 from __future__ import annotations
 
 from pipeline.dynamics.contact.form.elastic import power, stored
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 __all__ = ["force", "stored"]
 

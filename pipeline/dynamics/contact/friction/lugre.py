@@ -18,7 +18,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.scene import clearance
-from pipeline.dynamics.vectors import add, dot, kernel, scale, sub
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import add, dot, scale, sub
 
 
 @kernel

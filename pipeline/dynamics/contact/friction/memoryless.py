@@ -6,7 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.vectors import dot, kernel, scale
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import dot, scale
 
 
 def sliding(coefficient: Callable) -> Callable:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from pipeline.core.scene import clearance
 from pipeline.dynamics.contact.friction.memoryless import sliding
-from pipeline.dynamics.vectors import kernel
+from pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -1,0 +1,77 @@
+"""A second process that compiles beside this one, into the same folder.
+
+It is no worker: it takes files that nobody is compiling, and leaves their code on disk. Whatever becomes of it, this
+process compiles what is not there, and reports what cannot be compiled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from numba import config
+
+from pipeline.core.workflow.cores import free
+from pipeline.dynamics.compile.files import claimed, take
+
+# started by a command, since multiprocessing would run the user's script again in the child
+COMMAND = """import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from pipeline.dynamics.compile.compiler_process import work
+work(sys.argv[2:])
+"""
+
+
+@contextmanager
+def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None]:
+    """Meanwhile a second process compiles the files, in this order; None where there is to be none.
+
+    There is at most one for a folder of kernels, whoever started it.
+    """
+    with ExitStack() as stack:
+        process = None
+        if len(paths) > 1 and wanted():
+            alone = stack.enter_context(claimed(paths[0].with_name("compiler"), wait=False))
+            process = _start(paths) if alone else None
+        if process is not None:
+            stack.enter_context(process)  # waits for it, so that it is no zombie
+            stack.callback(process.kill)  # first: nothing is left to do, or this process was interrupted
+        yield process
+
+
+def wanted() -> bool:
+    """Whether a second process is of use, and can be started."""
+    # a program packed into one file would start itself again
+    startable = bool(sys.executable) and not getattr(sys, "frozen", False)
+    return startable and not config.DISABLE_JIT and free()
+
+
+def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:
+    folders = json.dumps([str(folder) for folder in sys.path])
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-c", COMMAND, folders, *map(str, paths)],
+            stdin=subprocess.PIPE,  # ends when this process does
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+    except OSError:
+        return None
+
+
+def work(paths: list[str]) -> None:
+    """What the second process does."""
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    for path in paths:
+        take(Path(path), lambda _: None)
+
+
+def _follow_parent() -> None:
+    os.read(0, 1)
+    os._exit(1)

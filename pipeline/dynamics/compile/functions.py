@@ -1,0 +1,166 @@
+"""The compiled functions of a mechanism, cached on disk across processes.
+
+Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
+reach and of the versions of the compiler, because Numba's own cache looks at that file alone and
+would keep stale callees. The functions call each other by address (`calls`), so that mechanisms
+share those which are alike.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import ModuleType
+
+import llvmlite
+import numba
+import numpy as np
+
+from pipeline.core.artifacts.paths import kernel_root
+from pipeline.core.workflow.fingerprint import TREE, Sources, imported
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.compile.compiler_process import second_process
+from pipeline.dynamics.compile.files import bring, compiled
+from pipeline.dynamics.compile.sources import sources
+from pipeline.dynamics.effects import Parts, Scheme
+
+SOURCES = Sources(TREE)
+#: what the functions are to who waits for them
+WORDS = {
+    "evaluate": "equations of motion",
+    "project": "closing of the loops",
+    "retract": "retractions",
+    "observe": "recorded quantities",
+    "advance": "integrator",
+}
+#: what others call, and where the header keeps its address
+ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
+#: what this process compiles first and the second one last: the others have kernels in common, compiled once each
+OURS = "advance"
+_FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
+
+
+@dataclass(frozen=True)
+class Entry:
+    """The compiled functions of a mechanism; h must have been given their addresses."""
+
+    modules: dict[str, ModuleType]
+
+    def connect(self, h: np.ndarray) -> None:
+        """Write into the header where this process has put the functions that others call."""
+        for name, place in ADDRESSES.items():
+            module = self.modules.get(name)
+            h[place] = getattr(module, name).address if module else 0
+
+    def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
+        """Slope of the state in Y at time t, into the first row of SLOPES."""
+        self.modules["advance"].advance(h, f, w, n, t, repeat, _FLOATS, _TABLE, _TABLE)
+
+    def advance(
+        self,
+        h: np.ndarray,
+        f: np.ndarray,
+        w: np.ndarray,
+        n: np.ndarray,
+        outputs: np.ndarray,
+        rows: np.ndarray,
+        events: np.ndarray,
+    ) -> None:
+        """Step to the end of the segment or of the budget."""
+        self.modules["advance"].advance(h, f, w, n, 0.0, -1, outputs, rows, events)
+
+    def observe(
+        self,
+        h: np.ndarray,
+        f: np.ndarray,
+        w: np.ndarray,
+        n: np.ndarray,
+        rows: np.ndarray,
+        pieces: np.ndarray,
+        tolerance: float,
+        out: np.ndarray,
+    ) -> None:
+        """Evaluate what is recorded of every row."""
+        self.modules["observe"].observe(h, f, w, n, rows, pieces, tolerance, out)
+
+
+def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
+    """The compiled functions for these parts; `tell` hears of what has to be compiled."""
+    folder, began = _folder(tell), time.monotonic()
+    files = {name: _file(folder, name, source) for name, source in sources(parts, scheme).items()}
+    names = {path: name for name, path in files.items() if path.stem not in sys.modules}
+    ours_first = sorted(names, key=lambda path: names[path] != OURS)
+    ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
+    with second_process(ours_last):
+        bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
+    return Entry({name: sys.modules[path.stem] for name, path in files.items()})
+
+
+def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
+    seconds = time.monotonic() - began
+    so_far = f", {seconds:.0f} s so far" if seconds >= 1.0 else ""
+    tell(f"compiling for this kind of mechanism (once; later runs fetch it from disk): {what}{so_far}")
+
+
+def _folder(tell: Callable[[str], None]) -> Path:
+    """The folder of compiled kernels; where it cannot be written, one that lasts as long as this process."""
+    folder = kernel_root()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        problem = "" if os.access(folder, os.W_OK) else "not writable"
+    except OSError as error:
+        problem = error.strerror or str(error)
+    if problem:
+        tell(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
+        return Path(_temporary().name)
+    return folder
+
+
+@cache
+def _temporary() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="flexclear_kernels_")
+
+
+def _file(folder: Path, name: str, source: str) -> Path:
+    path = folder / f"flexclear_{name}_{digest(source)}.py"
+    if not path.exists():
+        temporary = path.with_suffix(f".{os.getpid()}.tmp")
+        temporary.write_text(source)
+        os.replace(temporary, path)
+    return path
+
+
+@cache
+def digest(source: str) -> str:
+    """Digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
+    total = hashlib.sha256(source.encode())
+    total.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
+    for name, source_digest in sorted(reached(source).items()):
+        total.update(f"{name} {source_digest}".encode())
+    return total.hexdigest()[:20]
+
+
+def reached(source: str) -> dict[str, str]:
+    """Digests of this tower's modules that a generated source imports, directly or not.
+
+    Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
+    """
+    found: dict[str, str] = {}
+    waiting = sorted(imported(source.encode(), "entry", package=False)[0])
+    while waiting:
+        name = waiting.pop()
+        module = SOURCES.module(name)
+        package = (SOURCES.root / Path(*name.split("."))).is_dir()
+        if module is None or name in found or not name.startswith("pipeline.dynamics"):
+            continue
+        if not package:
+            found[name] = module.digest
+            waiting.extend(module.own)
+    return found

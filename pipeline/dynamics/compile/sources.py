@@ -1,0 +1,188 @@
+"""Sources of the functions that are compiled for a mechanism, each in a file of its own: lists of parts.
+
+A file composes exactly the kernels of the kinds present: what a scene does not call for is neither
+imported nor compiled. Of no more than it needs, so that mechanisms share files: steps depend on
+the integrator and on whether there are closures and contacts, not on joints or bodies.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from pipeline.core import integrators
+from pipeline.core.registry import listed
+from pipeline.core.workflow.fingerprint import TREE, imported, source_file
+from pipeline.dynamics.effects import (
+    FORMS,
+    FRICTION_LAWS,
+    INTEGRATORS,
+    JOINTS,
+    LOADS,
+    Parts,
+    Scheme,
+    most_parts,
+    named,
+    schemes,
+)
+
+if TYPE_CHECKING:
+    from pipeline.core.scene.schema import Scene
+
+DYNAMICS = "pipeline.dynamics"
+#: what others are called by
+CALLS = (f"{DYNAMICS}.compile", "calls")
+Imports = list[tuple[str, str]]  #: (module, name) each
+
+
+def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
+    """Source by name of what it compiles, in the order of which calls which."""
+    found = {"evaluate": _evaluate(parts)}
+    if parts.closures:
+        found["project"] = _project(parts)
+    if integrators.INTEGRATORS[scheme.integrator].retracts:
+        found["retract"] = _retract(parts)
+    return found | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
+
+
+def modules(scene: Scene) -> tuple[str, ...]:
+    """Modules that a run of the scene reaches by names: those of its parts, and those that its generated files import.
+
+    Raises InputError when a name is not listed in its family.
+    """
+    found = {part.module for part in named(scene)}
+    for scheme in schemes(scene):
+        for source in sources(most_parts(scene), scheme).values():
+            names = imported(source.encode(), "entry", package=False)[0]
+            found |= {name for name in names if source_file(TREE, name)}  # others are in modules
+    return tuple(sorted(found))
+
+
+def _evaluate(parts: Parts) -> str:
+    given, imports = _forces(parts)
+    if parts.closures:
+        given["closures"] = _import(imports, f"{DYNAMICS}.equations", "closures")
+    if parts.harmonics:
+        given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
+    maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
+    return _file(f"right-hand side of {', '.join(parts.joints)}", imports, "right_hand_side", maker, given, EVALUATE)
+
+
+def _project(parts: Parts) -> str:
+    given, imports = _joints(parts)
+    given = {"evaluate": "calls.evaluate", **given}
+    given["closures"] = _import(imports, f"{DYNAMICS}.equations", "closures")
+    maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
+    return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
+
+
+def _retract(parts: Parts) -> str:
+    given, imports = _joints(parts)
+    maker = _import(imports, f"{DYNAMICS}.equations.retraction", "make_retraction")
+    return _file(f"retraction of {', '.join(parts.joints)}", imports, "retraction", maker, given, RETRACT)
+
+
+def _observe(parts: Parts) -> str:
+    given, imports = _forces(parts)
+    given = {"evaluate": "calls.evaluate", "project": _projection(imports, parts), **given}
+    maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
+    return _file(f"what is recorded of {', '.join(parts.joints)}", imports, "observation", maker, given, OBSERVE)
+
+
+def _advance(parts: Parts, scheme: Scheme) -> str:
+    module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
+    imports: Imports = []
+    given = {
+        "evaluate": "calls.evaluate",
+        "project": _projection(imports, parts),
+        "retract": "calls.retract",
+        "method": _import(imports, f"{INTEGRATORS}.{module}", method),
+        "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
+    }
+    if parts.surfaces and scheme.located:
+        located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
+        regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
+        given["events"] = f"{located}({regimes})"
+    elif parts.surfaces:
+        given["events"] = _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    _import(imports, DYNAMICS, "memory as m")
+    maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
+    return _file(f"steps of {scheme}", imports, "steps", maker, given, ADVANCE)
+
+
+def _joints(parts: Parts) -> tuple[dict[str, str], Imports]:
+    imports: Imports = []
+    return {"joints": _family(imports, JOINTS, parts.joints)}, imports
+
+
+def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
+    """What acts in the mechanism: joints, flexible bodies, contacts, loads."""
+    given, imports = _joints(parts)
+    if parts.flexible:
+        bodies = _import(imports, f"{DYNAMICS}.bodies.flexible", "flexible_bodies")
+        shortening = _import(imports, f"{DYNAMICS}.bodies", "shortening") if parts.stiffening else ""
+        given["flexible"] = f"{bodies}({shortening})"
+    if parts.surfaces:
+        surfaces = _family(imports, JOINTS, parts.surfaces, "CONTACTS")
+        forms, frictions = _family(imports, FORMS, parts.forms), _family(imports, FRICTION_LAWS, parts.frictions)
+        maker = _import(imports, f"{DYNAMICS}.contact.forces", "make_contacts")
+        given["contacts"] = f"{maker}(surfaces={surfaces}, forms={forms}, frictions={frictions})"
+    if parts.loads:
+        kinds = _family(imports, LOADS, parts.loads)
+        given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}({kinds})"
+    return given, imports
+
+
+def _projection(imports: Imports, parts: Parts) -> str:
+    return "calls.project" if parts.closures else _import(imports, f"{DYNAMICS}.equations.projection", "no_projection")
+
+
+def _family(imports: Imports, package: str, names: tuple[str, ...], table: str = "NAMES") -> str:
+    """A tuple of the modules of a family's parts."""
+    modules = [_import(imports, package, listed(package, name, where="parts", table=table)[0]) for name in names]
+    return "(" + "".join(f"{module}, " for module in modules) + ")"
+
+
+def _import(imports: Imports, module: str, name: str) -> str:
+    """Note an import; the name."""
+    others = {known for package, known in imports if package != module}
+    assert name not in others, f"two parts of one mechanism are called {name}"
+    imports.append((module, name))
+    return name
+
+
+def _file(what: str, imports: Imports, result: str, maker: str, given: dict[str, str], function: str) -> str:
+    lines = sorted({f"from {module} import {name}" for module, name in [CALLS, *imports]})
+    arguments = [f"    {key}={value}," for key, value in given.items()]
+    return "\n".join(
+        [f'"""Generated: {what}."""', *lines, "", f"{result} = {maker}(", *arguments, ")", "", "", function]
+    )
+
+
+EVALUATE = """@calls.exported("evaluate")
+def evaluate(h, f, w, n, t, y, dy):
+    right_hand_side(h, f, w, n, t, y, dy)
+    return 0
+"""
+PROJECT = """@calls.exported("project")
+def project(h, f, w, n, t, y, dy, tolerance):
+    return projection(h, f, w, n, t, y, dy, tolerance)
+"""
+RETRACT = """@calls.exported("retract")
+def retract(h, w, y, displacement, out, total):
+    retraction(h, w, y, displacement, out, total)
+    return 0
+"""
+OBSERVE = """@calls.called(calls.OBSERVE)
+def observe(h, f, w, n, rows, pieces, tolerance, out):
+    h, f, w, n = calls.flat(h), calls.flat(f), calls.flat(w), calls.flat(n)
+    observation(h, f, w, n, rows, pieces, tolerance, out)
+"""
+# one function for both tasks: each would be an object of its own to fetch
+ADVANCE = """@calls.called(calls.ADVANCE)
+def advance(h, f, w, n, t, repeat, outputs, rows, events):
+    h, f, w, n = calls.flat(h), calls.flat(f), calls.flat(w), calls.flat(n)
+    if repeat < 0:
+        steps(h, f, w, n, outputs, rows, events)
+    for _ in range(repeat):
+        calls.evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
+"""

@@ -1,0 +1,69 @@
+"""Cholesky factors in envelope form: row i is contiguous from its first nonzero column.
+
+In the order "descendants before ancestors" the mass matrix of a tree has no fill outside this
+envelope (Featherstone, *Rigid Body Dynamics Algorithms*, sec. 6.5), so that the cost follows the
+branches of the mechanism. A matrix lies in w from place `a`; its row table (first column, start)
+in h from place `e`, for `n` rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.kernels import kernel
+
+
+@kernel
+def base(h, e, a, i):
+    """Place in w of column 0 of row i (which may lie before the row's first entry)."""
+    return a + h[e + 2 * i + 1] - h[e + 2 * i]
+
+
+@kernel
+def factor(h, e, w, a, n, threshold):
+    """Overwrite a symmetric matrix with its factor L; returns the smallest pivot ratio.
+
+    A pivot is compared with its diagonal entry before elimination; a result <= threshold means
+    that the matrix is not positive definite to working precision, and the factor is unusable.
+    """
+    worst = 1.0
+    for i in range(n):
+        first, row = h[e + 2 * i], base(h, e, a, i)
+        diagonal = w[row + i]
+        for j in range(first, i):
+            other = base(h, e, a, j)
+            total = w[row + j]
+            for k in range(max(first, h[e + 2 * j]), j):
+                total -= w[row + k] * w[other + k]
+            w[row + j] = total / w[other + j]
+        pivot = diagonal
+        for k in range(first, i):
+            pivot -= w[row + k] * w[row + k]
+        ratio = pivot / diagonal
+        if not ratio > threshold:
+            return ratio
+        worst = min(worst, ratio)
+        w[row + i] = np.sqrt(pivot)
+    return worst
+
+
+@kernel
+def forward(h, e, w, a, n, b):
+    """L^-1 applied to the vector in w from place b."""
+    for i in range(n):
+        row = base(h, e, a, i)
+        total = w[b + i]
+        for k in range(h[e + 2 * i], i):
+            total -= w[row + k] * w[b + k]
+        w[b + i] = total / w[row + i]
+
+
+@kernel
+def backward(h, e, w, a, n, b):
+    """L^-T applied to the vector in w from place b."""
+    for i in range(n - 1, -1, -1):
+        row = base(h, e, a, i)
+        value = w[b + i] / w[row + i]
+        w[b + i] = value
+        for k in range(h[e + 2 * i], i):
+            w[b + k] -= w[row + k] * value

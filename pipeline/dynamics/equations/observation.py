@@ -1,0 +1,153 @@
+"""What is recorded of a state: true accelerations, joint forces, contacts, energies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies import rigid
+from pipeline.dynamics.equations.kinematics import make_kinematics
+from pipeline.dynamics.equations.projection import BLIND, keep_scales, largest
+from pipeline.dynamics.equations.right_hand_side import make_forces, nothing
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import accumulate, at, dot
+
+
+def widths(size: Callable[[int], int]) -> dict[str, int]:
+    """Number of columns of each observed field, in their order; size: of a place in the header."""
+    drives = size(m.N_DRIVES)
+    return {
+        "state": size(m.NY),
+        "coordinate": size(m.NQ) + drives,
+        "speed": size(m.NV) + drives,
+        "acceleration": size(m.NV) + drives,
+        "link_frame": m.FRAME.size * size(m.N_LINKS),
+        "site_frame": m.FRAME.size * size(m.N_SITES),
+        "link_wrench": 6 * size(m.N_LINKS),
+        "closure_wrench": 6 * size(m.N_CLOSURES),
+        "touch": m.TOUCH.size * size(m.N_CONTACTS),
+        "load": m.LOAD.size * size(m.N_LOADS),
+        "drive_force": drives,
+        "energy": 3,  # kinetic, potential of gravity, elastic
+        "jacobian": size(m.JACOBIAN_SIZE),
+        "residual": 1,
+        "status": 1,
+    }
+
+
+@kernel
+def no_energy(h, f, w):
+    """Kinetic and elastic energy where no body is flexible."""
+    return 0.0, 0.0
+
+
+@kernel
+def _copy(w, first, count, out, column):
+    for k in range(count):
+        out[column + k] = w[first + k]
+    return column + count
+
+
+def make_observation(
+    evaluate: Callable,
+    project: Callable,
+    joints: tuple[Any, ...],
+    flexible: Any = None,
+    contacts: Callable | None = None,
+    loads: Callable | None = None,
+) -> Callable:
+    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
+
+    evaluate, project: as the stepper calls them; the other arguments are those of `make_right_hand_side`.
+    """
+    kinematics = make_kinematics(joints, flexible)
+    forces = make_forces(flexible, contacts, loads)
+    modal_inertia = nothing if flexible is None else flexible.modal_inertia
+    flexible_energy = no_energy if flexible is None else flexible.energies
+
+    @kernel
+    def closure_wrenches(h, w, out, column):
+        """Wrench of every closure on its second body; taken off the links that it acts on."""
+        for c in range(h[m.N_CLOSURES]):
+            for e in range(6):
+                total = 0.0
+                for k in range(m.CLOSURES.n_kept(h, c)):
+                    wrench_row = m.ROWS.row(h, m.CLOSURES.row0(h, c) + k)
+                    total += w[wrench_row + e] * w[h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c) + k]
+                out[column + 6 * c + e] = total
+                w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_b(h, c))) + e] -= total
+                w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_a(h, c))) + e] += total
+        return column + 6 * h[m.N_CLOSURES]
+
+    @kernel
+    def joint_wrenches(h, f, w, n, out, column):
+        """Wrench on every link through its inboard joint, at the accelerations in DU (Newton-Euler)."""
+        kinematics(h, f, w)
+        forces(h, f, w, n)
+        modal_inertia(h, f, w, n)
+        after = closure_wrenches(h, w, out, column + 6 * h[m.N_LINKS])
+        for i in range(h[m.N_LINKS] - 1, 0, -1):
+            up = m.WRENCH.row(h, m.LINKS.parent(h, i))
+            accumulate(w, up, at(w, m.WRENCH.row(h, i)))
+            accumulate(w, up + 3, at(w, m.WRENCH.row(h, i) + 3))
+        _copy(w, h[m.WRENCH.place], 6 * h[m.N_LINKS], out, column)
+        return after
+
+    @kernel
+    def energies(h, f, w, out, column):
+        """Kinetic energy, potential of gravity, energy stored in bodies and contacts."""
+        kinetic, elastic = flexible_energy(h, f, w)
+        potential = 0.0
+        for i in range(1, h[m.N_LINKS]):
+            if m.LINKS.flex(h, i) < 0:
+                kinetic += rigid.kinetic_energy(h, f, w, i)
+            potential -= dot(at(f, h[m.GRAVITY.place]), at(w, m.OWN.row(h, i) + m.OWN.moment))
+        for c in range(h[m.N_CONTACTS]):
+            elastic += w[m.TOUCH.row(h, c) + m.TOUCH.stored] + w[m.TOUCH.row(h, c) + m.TOUCH.bent]
+        for k in range(h[m.N_LOADS]):
+            elastic += w[m.LOAD.row(h, k) + m.LOAD.stored]
+        out[column], out[column + 1], out[column + 2] = kinetic, potential, elastic
+        return column + 3
+
+    @kernel
+    def evaluate_closed(h, f, w, n, t, tolerance):
+        """Evaluate the state in Y with its loops closed to `tolerance`."""
+        evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
+        if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
+            n[m.EVALUATION] = m.NOT_CLOSED
+        if n[m.EVALUATION] == m.OK and h[m.N_KEPT_ROWS] > 0 and w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
+            n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
+
+    @kernel
+    def observe(h, f, w, n, rows, pieces, tolerance, out):
+        contacts_count = h[m.N_CONTACTS]
+        for r in range(rows.shape[0]):
+            row, line = rows[r], out[r]
+            for c in range(contacts_count):
+                n[n[m.MODE] + c] = int(row[1 + c])
+                w[h[m.LATCHED] + c] = row[1 + contacts_count + c]
+            for k in range(h[m.NY]):
+                w[h[m.Y] + k] = row[1 + 2 * contacts_count + k]
+            for k in range(h[m.N_LAWS]):
+                n[n[m.ACTIVE] + k] = pieces[r, k]
+            evaluate_closed(h, f, w, n, row[0], tolerance)
+            if n[m.EVALUATION] == m.OK:
+                keep_scales(h, w)
+            status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
+            o = _copy(w, h[m.Y], h[m.NY], line, 0)
+            o = _copy(w, h[m.X], h[m.NQ] + h[m.N_DRIVES], line, o)
+            o = _copy(w, h[m.U], h[m.NV] + h[m.N_DRIVES], line, o)
+            o = _copy(w, h[m.DU], h[m.NV] + h[m.N_DRIVES], line, o)
+            frames = o
+            o = joint_wrenches(h, f, w, n, line, o + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES]))
+            frames = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], line, frames)
+            _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], line, frames)
+            o = _copy(w, h[m.TOUCH.place], m.TOUCH.size * contacts_count, line, o)
+            o = _copy(w, h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS], line, o)
+            o = _copy(w, h[m.DRIVE_FORCE], h[m.N_DRIVES], line, o)
+            o = energies(h, f, w, line, o)
+            o = _copy(w, h[m.JACOBIAN], h[m.JACOBIAN_SIZE], line, o)
+            line[o], line[o + 1] = residual, status
+
+    return observe

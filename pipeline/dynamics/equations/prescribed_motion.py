@@ -1,0 +1,46 @@
+"""Known motion: every law of time at the present time, and the prescribed coordinates from theirs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+
+
+@kernel
+def no_harmonics(h, f, w, law, piece, s):
+    """Polynomials only."""
+
+
+def make_known_motion(harmonics: Callable | None = None) -> Callable:
+    """The kernel known_motion(h, f, w, n, t); harmonics(h, f, w, law, piece, s) adds to value, rate, second rate."""
+    add_harmonics = no_harmonics if harmonics is None else harmonics
+
+    @kernel
+    def laws(h, f, w, n, t):
+        """Value, rate and second rate of every law, from its piece in force."""
+        for k in range(h[m.N_LAWS]):
+            piece = n[n[m.ACTIVE] + k]
+            o = m.PIECES.row(h, piece)
+            s = t - f[o + m.PIECES.start]
+            x, v, a = f[o + m.PIECES.size - 1], 0.0, 0.0
+            for c in range(m.PIECES.size - 2, 0, -1):
+                a = a * s + 2.0 * v
+                v = v * s + x
+                x = x * s + f[o + c]
+            law = m.LAW.row(h, k)
+            w[law], w[law + 1], w[law + 2] = x, v, a
+            add_harmonics(h, f, w, law, piece, s)
+
+    @kernel
+    def known_motion(h, f, w, n, t):
+        """Prescribed coordinates, speeds and accelerations at time t: the first laws are the drives'."""
+        laws(h, f, w, n, t)
+        for d in range(h[m.N_DRIVES]):
+            law = m.LAW.row(h, d)
+            w[h[m.X] + h[m.NQ] + d] = w[law]
+            w[h[m.U] + h[m.NV] + d] = w[law + 1]
+            w[h[m.DU] + h[m.NV] + d] = w[law + 2]
+
+    return known_motion

@@ -1,0 +1,85 @@
+"""Back onto the closures: positions and speeds, by the least change in the metric of the mass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.retraction import make_position_rates
+from pipeline.dynamics.kernels import kernel
+
+ITERATIONS = 8
+#: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)
+BLIND = 1e-8
+#: rounding may stop the residuals this far above a very tight tolerance
+ROUNDING = 1e3
+
+
+@kernel
+def largest(w, first, count):
+    """Largest magnitude of a stretch of w; NaN counts as infinite."""
+    result = 0.0
+    for k in range(first, first + count):
+        if not abs(w[k]) <= result:
+            result = abs(w[k]) if w[k] == w[k] else 1e300
+    return result
+
+
+@kernel
+def no_projection(h, f, w, n, t, y, dy, tolerance):
+    """A tree cannot drift."""
+    return 0
+
+
+@kernel
+def keep_scales(h, w):
+    """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
+    for r in range(h[m.N_KEPT_ROWS]):
+        o = h[m.ROW_SCALE] + r
+        w[o] = max(w[o], w[o + h[m.N_CLOSURE_ROWS]])
+
+
+def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) -> Callable:
+    """The kernel project(h, f, w, n, t, y, dy, tolerance).
+
+    evaluate: the right-hand side.  joints: modules of the joint types.  closures: the module of that name.
+    """
+    position_rates, correction = make_position_rates(joints), closures.correction
+
+    @kernel
+    def move(h, w, y, step):
+        """Add to the positions of y the change that a small displacement of the coordinates means."""
+        for k in range(h[m.NV]):
+            w[h[m.U] + k] = w[step + k]
+        position_rates(h, w)
+        for k in range(h[m.NQ]):
+            w[y + k] += w[h[m.POSITION_RATE] + k]
+
+    @kernel
+    def project(h, f, w, n, t, y, dy, tolerance):
+        """Correct y until residuals [m] and their rates [m/s] are below `tolerance`.
+
+        Needs the work space of evaluate(t, y); leaves it, and dy, up to date.  Returns the number
+        of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
+        residual says little about the error behind it, nothing is changed.
+        """
+        rows, step, used = h[m.N_CLOSURE_ROWS], h[m.CORRECTION], 0
+        if w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
+            return 0
+        for _ in range(ITERATIONS):
+            worst = max(largest(w, h[m.RESIDUAL], rows), largest(w, h[m.RESIDUAL_RATE], rows))
+            if worst <= tolerance:
+                return used
+            correction(h, w, h[m.RESIDUAL_RATE], step)
+            for k in range(h[m.NV]):
+                w[y + h[m.NQ] + k] += w[step + k]
+            correction(h, w, h[m.RESIDUAL], step)
+            move(h, w, y, step)
+            evaluate(h, f, w, n, t, y, dy)
+            used += 1
+            if n[m.EVALUATION] != m.OK:
+                return -1
+        return used if largest(w, h[m.RESIDUAL], rows) <= ROUNDING * tolerance else -1
+
+    return project

@@ -1,0 +1,109 @@
+r"""Static equilibrium: positions in which the forces along all free motions vanish.
+
+Newton's method on those forces, in the metric of the mass. The stiffness enters by the magnitude of its eigenvalues, so
+that a step goes downhill also where a mechanism is about to tip over; it is limited in length, and a line search on the
+power of the unbalanced force along the step halves it until it no longer shoots far past the balance. The power, not
+an energy, because a force need not have a potential; a ball finds the floor of its socket, where the stiffness jumps
+from nothing to 1e8 N/m, in some thirty steps.
+
+Source: line search by the power: Crisfield, *Non-linear Finite Element Analysis*, vol. 1, sec. 9.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.errors import SolverError
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.linear.bench import Bench, closed
+from pipeline.dynamics.linear.names import leading
+from pipeline.dynamics.linear.tangent import Tangent, magnitude, scales, stiffness, tangent
+
+#: iterations before giving up
+MOST = 200
+#: longest step, as a share of the mechanism's size or of a radian
+LONGEST = 0.2
+#: balanced: unbalanced force below this share of those in balance (or of the weight), or a step too short to matter
+BALANCED, SHORT = 1e-12, 1e-14
+#: what rounding may leave when iterations no longer gain
+ROUNDING = 1e-8
+#: eigenvalues of the stiffness below this share of the largest hold nothing
+LIMP = 1e-12
+#: a step may end with this share of the starting power turned against it
+OVERSHOOT = 0.5
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """An equilibrium. residual: largest unbalanced force, moments divided by the mechanism's size [N]."""
+
+    at: Tangent
+    residual: float
+    iterations: int
+
+
+def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
+    """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
+    at = tangent(bench, q)
+    best, since = np.inf, 0
+    for iteration in range(MOST):
+        size = float(np.linalg.norm(at.unbalanced))
+        largest = max(weight(bench), magnitude(at.Z, at))
+        since = 0 if size < 0.5 * best else since + 1
+        best = min(best, size)
+        if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):
+            return Equilibrium(at, residual(bench, at), iteration)
+        step = _step(bench, at, BALANCED * largest)
+        if float(np.max(np.abs(at.Z @ step) / scales(bench))) <= SHORT:
+            return Equilibrium(at, residual(bench, at), iteration)
+        at = _search(bench, at, step)
+    loose = leading(bench, at.Z @ at.unbalanced, at.mass)
+    raise SolverError(
+        f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
+        f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
+    )
+
+
+def weight(bench: Bench) -> float:
+    """Norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
+    arrays = bench.engine.model.arrays
+    mass = arrays.table(m.LINK_NUMBERS)["mass"].sum() + arrays.table(m.FLEX_NUMBERS)["mass"].sum()
+    return float(np.sqrt(mass) * np.linalg.norm(arrays.table(m.GRAVITY)["acceleration"][0]))
+
+
+def residual(bench: Bench, at: Tangent) -> float:
+    """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
+    forces = at.mass @ at.Z @ at.unbalanced
+    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.model.mechanism.length
+
+
+def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
+    """Displacement along the free motions, towards balance."""
+    K, _ = stiffness(bench, at, at.Z)
+    k, axes = np.linalg.eigh(0.5 * (K + K.T))
+    force = axes.T @ at.unbalanced
+    floor = max(LIMP * float(np.max(np.abs(k))), 1e-30)
+    along = np.where(np.abs(force) > negligible / len(k), -force / np.maximum(np.abs(k), floor), 0.0)
+    size = scales(bench)[:, None]
+    reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
+    along = np.clip(along, -LONGEST / reach, LONGEST / reach)
+    step = axes @ along
+    return step * min(1.0, LONGEST / max(float(np.max(np.abs(at.Z @ step) / size[:, 0])), 1e-300))
+
+
+def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
+    """The pose after the step or a part of it."""
+    direction = at.Z @ step
+    share, power = 1.0, -float(step @ at.unbalanced)
+    for _ in range(80):
+        try:
+            new = tangent(bench, closed(bench, at.q + share * (at.moves @ direction)))
+        except SolverError:
+            share *= 0.5
+            continue
+        if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
+            return new
+        share *= 0.5
+    raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")

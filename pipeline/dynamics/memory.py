@@ -1,0 +1,264 @@
+"""The memory through which scene and compiled kernels speak: every place, row and field is declared here, once.
+
+A kernel's code depends only on the kinds of parts present. Everything else, how many there
+are, what is joined to what, every number, stands in four flat arrays that every kernel takes:
+
+- ``h`` (integers): a header with sizes and offsets, then the wiring tables;
+- ``f`` (floats): the numbers of the scene;
+- ``w`` (floats): the work space, the integrator's state and stages included;
+- ``n`` (integers): what changes while a run goes on.
+
+Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the place in w where a stretch begins,
+``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the place of row i of a
+table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.
+
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
+
+Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
+that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
+speed; free ones come first, in the order of elimination (descendants before ancestors), prescribed ones after. A
+*column* is the twist (angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
+coordinate has one, and every port one more per mode.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import count
+from typing import Any
+
+import numpy as np
+
+from pipeline.dynamics.kernels import kernel
+
+_place = count()
+#: tables in h, f and w, in their order there
+TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
+_ROWS: dict[int, np.dtype[Any]] = {}
+
+
+def _places(number: int) -> list[int]:
+    """The next places of the header of h."""
+    return [next(_place) for _ in range(number)]
+
+
+def _row_reader(place: int, size: int) -> Callable[[Any, Any], Any]:
+    @kernel
+    def row(h, i):
+        return h[place] + size * i
+
+    return row
+
+
+def _field_reader(place: int, size: int, field: int) -> Callable[[Any, Any], Any]:
+    @kernel
+    def read(h, i):
+        return h[h[place] + size * i + field]
+
+    return read
+
+
+def _fields(declared: str) -> tuple[dict[str, int], int]:
+    """Where the fields of a row begin ("name" or "name:length"), and how long a row is."""
+    begins, end = dict[str, int](), 0
+    for field in declared.split():
+        name, _, length = field.partition(":")
+        begins[name] = end
+        end += int(length or 1)
+    return begins, end
+
+
+def record(declared: str) -> Any:
+    """Where the fields of a row begin, and its `size`."""
+    begins, size = _fields(declared)
+    make: Any = namedtuple
+    kind = make("Record", [*begins, "size"])
+    return kind(*begins.values(), size)
+
+
+def _table(array: str, declared: str, fields: Callable[[int, int, int], Any]) -> Any:
+    (place,), (begins, size) = _places(1), _fields(declared)
+    make: Any = namedtuple
+    kind = make("Table", ["place", "size", "row", *begins])
+    found = kind(place, size, _row_reader(place, size), *(fields(place, size, begin) for begin in begins.values()))
+    TABLES[array].append(found)
+    widths = np.diff([*begins.values(), size])
+    number = np.int64 if array == "h" else np.float64
+    _ROWS[place] = np.dtype(
+        [(name, number, (int(k),) if k > 1 else ()) for name, k in zip(begins, widths, strict=True)]
+    )
+    return found
+
+
+def wiring(declared: str) -> Any:
+    """A table in h: its `place` in the header, `size` and `row(h, i)` of its rows, and for each field field(h, i)."""
+    return _table("h", declared, _field_reader)
+
+
+def numbers(declared: str) -> Any:
+    """A table in f: its `place` in the header, `size` and `row(h, i)` of its rows, and where each field begins."""
+    return _table("f", declared, lambda place, size, begin: begin)
+
+
+def work(declared: str) -> Any:
+    """A table in w, otherwise like `numbers`."""
+    return _table("w", declared, lambda place, size, begin: begin)
+
+
+def named(table: Any, entries: np.ndarray) -> np.ndarray:
+    """Rows of a table that stand one after the other along the last axis, with named fields; shape (..., rows)."""
+    return np.ascontiguousarray(entries).view(row_type(table))
+
+
+def row_type(table: Any) -> np.dtype[Any]:
+    """Rows of a table as NumPy has them, with named fields."""
+    return _ROWS[table.place]
+
+
+@dataclass(frozen=True)
+class Room:
+    """What an integration method needs of the work space, in rows of the state's length and in floats."""
+
+    slopes: int
+    dense: int
+    memory: int
+
+
+# Header of h: sizes --------------------------------------------------------------------------------------------------
+# fmt: off
+(
+    N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
+    N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
+    MOST_MODES, N_LAWS, N_LOADS, N_TURNS, LOAD_SLOT,
+) = _places(25)
+# fmt: on
+#: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
+EVALUATE, PROJECT, RETRACT = ADDRESSES = _places(3)
+
+# Wiring in h ---------------------------------------------------------------------------------------------------------
+#: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1
+LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
+SITES = wiring("link port")  # port: or -1
+#: data0: first of its numbers; inboard: whether modes move the inboard frame
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard")
+MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
+PORTS = wiring("flex column shapes")  # column, shapes: first of them
+PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
+KNOWN_PAIRS = wiring("momentum column drive coordinate")
+ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
+CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept")
+CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
+SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
+ENTRIES = wiring("slot column sign")  # slot: in the support
+KNOWN_ENTRIES = wiring("closure drive column sign")
+CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
+COMMON = wiring("a b")  # slots of a common coordinate
+CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
+#: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
+CONTACTS = wiring("outer inner normal friction surfaces bristle")
+LAWS = wiring("piece0 n_pieces")  # the drives' laws first
+PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
+#: a: site, -1 where the world holds against it; turns: angle that it follows or -1; follows: whether it turns with its
+#: frame; how its coordinate is measured: turning or sliding, frame (side) and axis, entries of R_FG
+LOADS = wiring("a b law0 turns follows turning side axis sine_f sine_g cosine_f cosine_g")
+LOAD_KINDS = wiring("load0 n_loads")
+GROUPS = wiring("group")  # error group of each state variable
+
+# Numbers in f --------------------------------------------------------------------------------------------------------
+LINK_NUMBERS = numbers("mass com:3 inertia:6")  # inertia about the centre of mass (xx yy zz xy xz yz), link axes
+SITE_NUMBERS = numbers("origin:3 axes:9")  # in the link
+FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:9")
+FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
+MOMENT_VALUES = numbers("value")
+PORT_NUMBERS = numbers("origin:3 axes:9")  # undeformed
+PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
+#: radius: of the inner surface
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6")
+PIECES = numbers("start coefficients:8")
+HARMONICS = numbers("amplitude frequency phase")  # angular frequency
+LOAD_NUMBERS = numbers("value:5")  # see `loads`
+GRAVITY = numbers("acceleration:3")
+FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
+
+# Work space in w -----------------------------------------------------------------------------------------------------
+#: a frame in world axes; the velocity is that of its origin
+_FRAME = "origin:3 axes:9 omega:3 velocity:3 alpha:3 acceleration:3"
+FRAME = record(_FRAME)
+X, U, DU = _places(3)
+LINK_FRAMES, SITE_FRAMES = work(_FRAME), work(_FRAME)
+#: the motion subspace S of one joint: a twist per freedom, axes of its first frame
+SUBSPACE = work("angular:3 linear:3")
+#: spatial inertia: mass, mass * centre, inertia about the kernels' origin (xx yy zz xy xz yz); of the link, of its tree
+OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
+WRENCH = work("moment:3 force:3")
+COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
+BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _places(9)
+ROWS = work("moment:3 force:3")  # wrenches of the closure rows
+#: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
+#: room for all rows, that of the last evaluation, which may be a trial far away
+JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _places(6)
+#: smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
+#: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
+LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
+#: what a contact does now; bent: what the bristles store
+TOUCH = work("gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3")
+LAW = work("value rate second_rate")
+#: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
+#: energy, power that it brings in, power that it loses
+LOAD = work("force:3 moment:3 value rate stored power loss")
+TURN, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
+MAGNITUDE, CORRECTION, LATCHED = _places(3)
+#: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
+#: slip_rate: rate of the sliding speed, 0 where it is not known; event_row: of its last closing; mode0, latched0: mode
+#: and impact rate that hold within the step
+WATCH = work(
+    "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1"
+)
+CONTROL = next(_place)
+HEADER = next(_place)
+
+# the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
+# work of drives, loss of modal damping
+DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
+# a contact's slots: losses of its damping and of friction, impulse of its normal force
+DAMPING_LOSS, FRICTION_LOSS, IMPULSE, PER_CONTACT = range(4)
+# what an evaluation reports in n[EVALUATION]
+OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
+
+# Control floats, from w[h[CONTROL]] on -------------------------------------------------------------------------------
+# time, next step, end of the segment, relative tolerance, length of the run, size of the mechanism, largest violation
+# of a closure before projection, error norm of the last accepted step, largest growth of the next (1 after a
+# rejection), length of fixed steps, the method's parameter, largest rate of a closure before projection, largest rate
+# of the equations that a step met;
+# then what `singular_step` keeps: independence of the closure rows at the end of the step and at its start, its start,
+# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one;
+# then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
+# length of the last first step with a contact closed, whether the next accepted step is the first of a segment
+TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
+SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS = range(13, 19)
+REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
+
+# Integers in n -------------------------------------------------------------------------------------------------------
+# report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
+# being evaluated starts in w; then the stepper's own
+# fmt: off
+(
+    EVALUATION, ACTIVE, MODE, STATE,
+    STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
+    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, INTEGERS,
+) = range(21)
+# fmt: on
+# values of n[STATUS]
+SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
+NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER = range(8, 13)
+
+# The record ----------------------------------------------------------------------------------------------------------
+#: a row of the event table
+EVENT = record("contact kind time speed peak_force peak_depth duration")
+CLOSING, OPENING, COMPRESSION, STICKING, SLIPPING = range(5)
+#: free rows that one step may need: of the record; of the events, per contact
+ROOM, EVENTS_OF_A_CONTACT = 8, 4
+#: rate of the force of a contact that begins: grows, who knows how fast
+STEEPLY = 1e300

@@ -1,0 +1,175 @@
+"""Tables and stretches into the flat arrays h, f, w and n that the kernels take."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """Wiring h and numbers f of a mechanism; `columns`: number of its twist columns."""
+
+    h: np.ndarray
+    f: np.ndarray
+    columns: int
+
+    def size(self, place: int) -> int:
+        """A size in the header."""
+        return int(self.h[place])
+
+    def offset(self, place: int) -> int:
+        """Where a table or a stretch begins in its array."""
+        return int(self.h[place])
+
+    def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
+        """A view of a wiring or number table with named fields, shape (rows,); of the wiring in another h if given."""
+        wiring = table in m.TABLES["h"]
+        array = (self.h if h is None else h) if wiring else self.f
+        tables = m.TABLES["h" if wiring else "f"]
+        k, start = tables.index(table), self.offset(table.place)
+        end = self.offset(tables[k + 1].place) if k + 1 < len(tables) else len(array)
+        return array[start:end].view(m.row_type(table))
+
+    def work_space(self, room: Callable[[int, int, int], m.Room]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A copy of h that knows where w keeps what, w zeroed with the ground in place, and the integers n.
+
+        room: room(NQ, NV, NY) that the integration method needs.
+        """
+        h, end = self.h.copy(), 0
+        for place, length in _work_lengths(h, room, self.columns).items():
+            h[place] = end
+            end += length
+        laws, contacts = self.size(m.N_LAWS), self.size(m.N_CONTACTS)
+        w, n = np.zeros(end), np.zeros(m.INTEGERS + laws + contacts, dtype=np.int64)
+        axes = h[m.LINK_FRAMES.place] + m.FRAME.axes
+        w[axes : axes + 9] = np.eye(3).ravel()
+        n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + laws
+        return h, w, n
+
+
+def rows(table: Any, entries: Any) -> np.ndarray:
+    """Rows of a table, shape (rows, size), from a sequence of rows or from an array with as many numbers."""
+    number = np.int64 if table in m.TABLES["h"] else np.float64
+    return np.asarray(entries, dtype=number).reshape(-1, table.size)
+
+
+def named(table: Any, entries: Any) -> np.ndarray:
+    """The same with named fields, shape (rows,)."""
+    return m.named(table, rows(table, entries).ravel())
+
+
+def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> Arrays:
+    """Pack tables, each a sequence of rows.
+
+    sizes: those of the header that do not follow from the tables.
+    """
+    h = np.zeros(m.HEADER, dtype=np.int64)
+    counts: dict[Any, int] = {}
+    arrays: dict[str, list[np.ndarray]] = {"h": [h], "f": []}
+    for array, start in (("h", m.HEADER), ("f", 0)):
+        for table in m.TABLES[array]:
+            found = rows(table, tables[table])
+            counts[table], h[table.place] = len(found), start
+            start += found.size
+            arrays[array].append(found.ravel())
+    for place, size in (_sizes(counts, tables) | dict(sizes)).items():
+        h[place] = size
+    return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), columns)
+
+
+def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:
+    """The header's sizes that follow from the tables."""
+    closures = named(m.CLOSURES, tables[m.CLOSURES])
+    return {
+        m.N_LINKS: count[m.LINKS],
+        m.N_SITES: count[m.SITES],
+        m.N_FLEX: count[m.FLEXES],
+        m.N_CLOSURES: count[m.CLOSURES],
+        m.N_CLOSURE_ROWS: count[m.CLOSURE_ROWS],
+        m.N_KEPT_ROWS: count[m.CLOSURE_ENVELOPE],
+        m.N_CONTACTS: count[m.CONTACTS],
+        m.N_LAWS: count[m.LAWS],
+        m.N_LOADS: count[m.LOADS],
+        m.NV: count[m.ENVELOPE],
+        m.NY: count[m.GROUPS],
+        m.N_PAIRS: count[m.PAIRS],
+        m.N_KNOWN_PAIRS: count[m.KNOWN_PAIRS],
+        m.N_KNOWN_ENTRIES: count[m.KNOWN_ENTRIES],
+        m.N_CLOSURE_PAIRS: count[m.CLOSURE_PAIRS],
+        m.N_GROUPS: count[m.FLOORS],
+        m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
+        m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
+        m.JACOBIAN_SIZE: int(np.sum(closures["n_rows"] * closures["n_support"])),
+    }
+
+
+def envelope_size(envelope: np.ndarray) -> int:
+    """Entries of a matrix whose rows begin as an envelope with named fields says."""
+    if not len(envelope):
+        return 0
+    last = len(envelope) - 1
+    return int(envelope["start"][last] + last - envelope["first"][last] + 1)
+
+
+def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], columns: int) -> dict[int, int]:
+    known, contacts, ny, nv = (int(h[place]) for place in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
+    closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
+    coordinates, positions = nv + known, nq + known
+    wanted = room(nq, nv, ny)
+    tables = {
+        m.LINK_FRAMES: links,
+        m.SITE_FRAMES: int(h[m.N_SITES]),
+        m.SUBSPACE: 6,
+        m.OWN: links,
+        m.INERTIA: links,
+        m.WRENCH: links,
+        m.COLUMNS: columns,
+        m.MOMENTA: columns,
+        m.DEFORMATION: nv,
+        m.ROWS: closure_rows,
+        m.TOUCH: contacts,
+        m.LAW: int(h[m.N_LAWS]),
+        m.LOAD: int(h[m.N_LOADS]),
+        m.WATCH: contacts,
+    }
+    lengths = {table.place: table.size * count for table, count in tables.items()} | {
+        m.X: positions,
+        m.U: coordinates,
+        m.DU: coordinates,
+        m.BIAS: coordinates,
+        m.MODAL_BIAS: nv,
+        m.MODAL: 18 * int(h[m.MOST_MODES]),
+        m.SCRATCH: 18,
+        m.MASS: int(h[m.MASS_SIZE]),
+        m.FORCE: nv,
+        m.RESIDUAL: closure_rows,
+        m.RESIDUAL_RATE: closure_rows,
+        m.GAMMA: closure_rows,
+        m.JACOBIAN: int(h[m.JACOBIAN_SIZE]),
+        m.SPREAD: int(h[m.JACOBIAN_SIZE]),
+        m.SCHUR: int(h[m.SCHUR_SIZE]),
+        m.ROW_SCALE: 2 * closure_rows,
+        m.PIVOT: m.PIVOT_SIZE,
+        m.MULTIPLIER: closure_rows,
+        m.TURN: int(h[m.N_TURNS]),
+        m.DRIVE_FORCE: known,
+        m.LEDGER_RATE: int(h[m.N_LEDGER]),
+        m.POSITION_RATE: positions,
+        m.Y: ny,
+        m.Y_NEW: ny,
+        m.Y_STAGE: ny,
+        m.SLOPES: wanted.slopes * ny,
+        m.DENSE: wanted.dense * ny,
+        m.MEMORY: wanted.memory,
+        m.MAGNITUDE: int(h[m.N_GROUPS]),
+        m.CORRECTION: nv,
+        m.LATCHED: contacts,
+        m.CONTROL: m.N_CONTROLS,
+    }
+    return dict(sorted(lengths.items()))

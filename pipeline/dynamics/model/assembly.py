@@ -1,0 +1,276 @@
+"""From the poses that a scene gives to poses in which all joints fit, or a refusal in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_array, diags_array, eye_array
+
+from pipeline.core.algebra import rotation_vector_to_matrix, skew
+from pipeline.core.errors import InputError
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model.chain import path_positions
+from pipeline.dynamics.model.constraints import NONE, Constraint, constraints, demands, massless, prescribed
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.mechanism import Link, Mechanism
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.tree import PATH
+
+#: a start further from closed than this share of the mechanism's size is a mistake, not rounding
+WORST_GUESS = 0.05
+#: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end
+EXACT, CLOSED = 1e-13, 1e-11
+ITERATIONS = 60
+#: least cosine between axes that a joint keeps parallel
+SAME_WAY = 0.5
+#: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
+LEAST_GYRATION = 0.01
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Residuals of all joints: `values` scaled by the mechanism's size, `gradient` against the links' motions.
+
+    The gradient is sparse: a joint concerns two links.
+    """
+
+    values: np.ndarray
+    gradient: csr_array
+
+    @property
+    def worst(self) -> float:
+        """Largest residual."""
+        return float(np.max(np.abs(self.values), initial=0.0))
+
+
+def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
+    """The system with links placed so that all joints fit and driven ones stand where their drives say.
+
+    Raises InputError for joints whose frames start far apart or face each other the wrong way, and
+    for a mechanism that cannot be assembled, with the residual of every joint.  A system with flexible bodies
+    or paths is only checked: deformation and prescribed poses are part of its closing, which the engine does.
+    given: laws that replace the scene's.
+    """
+    joints, poses = constraints(mechanism, given), [link.start for link in mechanism.links]
+    _refuse_apart(mechanism, joints, poses)
+    _refuse_opposite(joints, poses)
+    mechanism = replace(mechanism, start_residual=max(residuals(joints, poses).values(), default=0.0))
+    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in mechanism.links)
+    if paths or any(link.flexible for link in mechanism.links):
+        return settled(mechanism, poses)
+    closed = close(mechanism, joints, poses)
+    if closed is None:
+        _refuse_drives(mechanism, joints, poses)
+        raise _impossible(mechanism, joints, poses)
+    return settled(mechanism, closed)
+
+
+def close(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> list[Placement] | None:
+    """Poses nearby, in the metric of the mass, in which all joints fit; None when there are none.
+
+    Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints ask for the
+    same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
+    """
+    here = list(poses)
+    now = misfit(mechanism, joints, here)
+    if now.worst <= EXACT:
+        return here
+    from scipy.sparse.linalg import spsolve  # slow to import, and most scenes give poses that fit
+
+    mobility = diags_array(_mobilities(mechanism, here))
+    damping = 1.0
+    for _ in range(ITERATIONS):
+        G = now.gradient @ mobility
+        normal, rows = G @ now.gradient.T, len(now.values)
+        scale = damping * float(np.linalg.norm(now.values)) * normal.trace() / rows
+        step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
+        there = _moved(mechanism, here, step)
+        then = misfit(mechanism, joints, there)
+        if np.linalg.norm(then.values) < np.linalg.norm(now.values):
+            here, now, damping = there, then, 0.1 * damping
+        else:
+            damping *= 10.0
+        if now.worst <= EXACT or damping > 1e12:
+            break
+    return here if now.worst <= CLOSED else None
+
+
+def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Misfit:
+    """Residuals of all joints and driven coordinates.
+
+    Motions: per link but the ground its small rotation about its centre of mass, and that centre's displacement in
+    units of the mechanism's size.
+    """
+    L = mechanism.length
+    values, blocks, row = [], list[tuple[np.ndarray, int, int]](), 0
+    centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(mechanism.links, poses, strict=True)]
+    for joint in joints:
+        A, B = joint.frames(poses)
+        parts = [demands(joint.edge.kind, A, B)]
+        if joint.values:
+            parts.append(prescribed(joint.edge.kind, A, B, joint.values))
+        for residual, wrench in parts:
+            force = np.any(wrench[:, 3:] != 0.0, axis=1)
+            values.append(np.where(force, residual / L, residual))
+            for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
+                moment = wrench[:, :3] - wrench[:, 3:] @ skew(centres[link]).T
+                block = sign * np.hstack([np.where(force[:, None], moment / L, moment), wrench[:, 3:]])
+                if link:  # the ground does not move
+                    blocks.append((block, row, 6 * (link - 1)))
+            row += len(wrench)
+    shape = (row, 6 * (len(mechanism.links) - 1))
+    return Misfit(np.concatenate([*values, np.zeros(0)]), _sparse(blocks, shape))
+
+
+def _sparse(blocks: list[tuple[np.ndarray, int, int]], shape: tuple[int, int]) -> csr_array:
+    """Matrix of dense blocks, each with its first row and column; what overlaps is added."""
+    places = [np.add(np.indices(block.shape).reshape(2, -1), [[row], [column]]) for block, row, column in blocks]
+    entries = np.concatenate([*(block.ravel() for block, *_ in blocks), np.zeros(0)])
+    rows, columns = np.concatenate([*places, np.zeros((2, 0), dtype=np.int64)], axis=1)
+    return csr_array((entries, (rows, columns)), shape=shape)
+
+
+def _centre(link: Link) -> np.ndarray:
+    return link.inertia[1] if link.inertia is not None else np.zeros(3)
+
+
+def _mobilities(mechanism: Mechanism, poses: Sequence[Placement]) -> np.ndarray:
+    """Inverse of mass and least principal moment of inertia per motion, shape (6 (links - 1),)."""
+    L, result = mechanism.length, []
+    masses = [_mass(mechanism, link) for link in mechanism.links[1:]]
+    largest = max(masses, default=1.0)
+    for link, mass in zip(mechanism.links[1:], masses, strict=True):
+        if massless(link):
+            result += [0.0] * 6
+            continue
+        moment = float(np.linalg.eigvalsh(link.inertia[2])[0]) if link.inertia is not None else 0.0
+        result += [largest / max(moment / L**2, mass * LEAST_GYRATION**2)] * 3 + [largest / mass] * 3
+    return np.array(result)
+
+
+def _mass(mechanism: Mechanism, link: Link) -> float:
+    if link.inertia is not None:
+        return link.inertia[0]
+    return 0.0 if massless(link) else float(mechanism.bundles[str(link.flexible)]["mass"])
+
+
+def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> list[Placement]:
+    moved = [poses[0]]
+    for i, link in enumerate(mechanism.links[1:], start=1):
+        turn, shift = step[6 * i - 6 : 6 * i - 3], mechanism.length * step[6 * i - 3 : 6 * i]
+        centre = poses[i].of(Placement(_centre(link))).p
+        R = rotation_vector_to_matrix(turn) @ poses[i].R
+        moved.append(Placement(centre + shift - R @ _centre(link), R))
+    return moved
+
+
+def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
+    """The system with these starts; massless links within joints stand where the joints' coordinates put them."""
+    links, settled_poses = [], list(poses)
+    for i, link in enumerate(mechanism.links):
+        if massless(link) and i:
+            settled_poses[i] = _between(mechanism, link, poses, settled_poses)
+        links.append(replace(link, start=settled_poses[i]))
+    return replace(mechanism, links=links)
+
+
+def _between(
+    mechanism: Mechanism, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]
+) -> Placement:
+    """Pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
+    edge, stage, inboard = link.branch.edge, link.stage, link.inboard
+    assert edge is not None
+    assert stage is not None
+    assert inboard is not None
+    F = settled_poses[inboard.link].of(inboard.place)
+    if not stage.positions:
+        return F
+    site = mechanism.site(edge.frame_b)
+    G = poses[site.link].of(site.place)
+    if edge.kind == PATH:
+        whole = path_positions(edge, G.R, G.p + mechanism.origin)
+    else:
+        near = mechanism.site(edge.frame_a)
+        relative = poses[near.link].of(near.place).inverse().of(G)
+        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
+    value = stage.sign * float(whole[stage.positions[0]])
+    if stage.kind == "revolute":
+        return F.of(Placement(R=rotation_vector_to_matrix(np.array([0.0, 0.0, value]))))
+    return F.of(Placement(np.array([0.0, 0.0, value])))
+
+
+def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:
+    """Largest residual per joint [m, or the sine of an angle], drives not looked at."""
+    found = {}
+    for joint in joints:
+        values, _ = demands(joint.edge.kind, *joint.frames(poses))
+        found[joint.name] = float(np.max(np.abs(values), initial=0.0))
+    return found
+
+
+def _refuse_apart(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> None:
+    for joint in joints:
+        A, B = joint.frames(poses)
+        values, wrenches = demands(joint.edge.kind, A, B)
+        force = np.any(wrenches[:, 3:] != 0.0, axis=1)
+        apart = float(np.max(np.abs(values[force]), initial=0.0))
+        turned = float(np.max(np.abs(values[~force]), initial=0.0))
+        a, b = joint.edge.frame_a, joint.edge.frame_b
+        if apart > WORST_GUESS * mechanism.length:
+            raise InputError(
+                f"[joint.{joint.name}.between]",
+                f"'{a}' and '{b}' start {apart:.3g} m apart, where a {joint.edge.kind} joint lets them be together "
+                f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
+                "correct the poses of the bodies, or the frames",
+            )
+        if turned > WORST_GUESS:
+            raise InputError(
+                f"[joint.{joint.name}.between]",
+                f"axes of '{a}' and '{b}' start {np.degrees(np.arcsin(min(turned, 1.0))):.3g} deg from where a "
+                f"{joint.edge.kind} joint holds them (more than {np.degrees(np.arcsin(WORST_GUESS)):.2g} deg)",
+                "correct the orientations of the bodies, or of the frames",
+            )
+
+
+def _refuse_opposite(joints: list[Constraint], poses: Sequence[Placement]) -> None:
+    """Axes that a joint keeps parallel must point the same way: its coordinate is counted about them."""
+    for joint in joints:
+        A, B = joint.frames(poses)
+        pairs = joint_class(joint.edge.kind).ROTATIONS
+        for k in range(3):
+            others = {other for axis, other in pairs if axis == k} | {axis for axis, other in pairs if other == k}
+            if len(others - {k}) == 2 and A.R[:, k] @ B.R[:, k] < SAME_WAY:
+                raise InputError(
+                    f"[joint.{joint.name}.between]",
+                    f"the {'xyz'[k]} axes of '{joint.edge.frame_a}' and '{joint.edge.frame_b}', which a "
+                    f"{joint.edge.kind} joint keeps parallel, do not point the same way",
+                    "turn one of the frames",
+                )
+
+
+def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> None:
+    """InputError when the mechanism could be assembled, but for where its drives start."""
+    driven = [joint for joint in joints if joint.values]
+    if not driven or close(mechanism, [replace(joint, values={}) for joint in joints], poses) is None:
+        return
+    scene = mechanism.scene
+    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in {joint.name for joint in driven}]
+    raise InputError(
+        f"[drive.{names[0]}.law]",
+        f"the joints fit together, but not where the drives ({', '.join(names)}) are at t = {scene.time.start:.6g} s: "
+        "the mechanism is over-driven, or a drive starts out of reach",
+        "correct the start of a drive, or remove one",
+    )
+
+
+def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> InputError:
+    found = residuals(joints, poses)
+    worst = max(found, key=lambda name: found[name])
+    listed = ", ".join(f"{name} {value:.3g}" for name, value in found.items() if value > EXACT * mechanism.length)
+    return InputError(
+        f"[joint.{worst}.between]",
+        f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}",
+        "correct lengths, frames, poses, or the start of a drive",
+    )

@@ -1,0 +1,113 @@
+"""The tables of the loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import lookup
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.model.driving import checked_law, coordinate_of
+from pipeline.dynamics.model.mechanism import Mechanism
+from pipeline.dynamics.model.merge import find_frame
+from pipeline.dynamics.model.numbering import Numbering
+
+LOADS = "pipeline.dynamics.loads"
+#: what loads add to the ledger, before the turns that they count: work done, energy lost
+LEDGER = 2
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """Tables of the loads, ordered by kind; `laws` are theirs, `turns` counts the angles that they follow."""
+
+    kinds: tuple[str, ...]
+    names: tuple[str, ...]
+    tables: dict[Any, Any]
+    laws: list[Pieces] = field(default_factory=list)
+    turns: int = 0
+
+
+def gravity(scene: Scene) -> np.ndarray:
+    """Sum of the scene's gravity fields [m/s^2], shape (3,)."""
+    if len(scene.forces()) == len(scene.load):
+        return np.zeros(3)
+    field: np.ndarray = lookup(LOADS, "gravity", where="[load]")(scene)
+    return field
+
+
+def order(scene: Scene) -> list[str]:
+    """Names of the loads as the tables hold them: kind after kind."""
+    forces = scene.forces()
+    return sorted(forces, key=lambda name: (forces[name].type, list(forces).index(name)))
+
+
+def tabulate(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pieces]) -> Loaded:
+    """Check the loads of a system, give their frames sites, and fill their tables; `given`: as `numbers.tabulate`."""
+    scene, names = mechanism.scene, order(mechanism.scene)
+    kinds = tuple(sorted({load.type for load in scene.forces().values()}))
+    rows: list[tuple[int, ...]] = []
+    numbers, laws, turns = list[list[float]](), list[Pieces](), 0
+    for name in names:
+        row, coordinate = describe(scene, name)
+        a, b = _sites(mechanism, numbering, name, row)
+        turn = -1
+        if row.counts_turns:
+            turn, turns = turns, turns + 1
+        first = numbering.known + len(laws)
+        if f"load.{name}" in given:
+            laws.append(given[f"load.{name}"])
+        else:
+            laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
+        rows.append((a, b, first, turn, int(row.follows), *_motion(coordinate)))
+        numbers.append([*row.numbers, *[0.0] * (m.LOAD_NUMBERS.size - len(row.numbers))])
+    counts = [sum(scene.load[n].type == kind for n in names) for kind in kinds]
+    starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
+    tables = {
+        m.LOADS: rows,
+        m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
+        m.LOAD_NUMBERS: numbers,
+    }
+    return Loaded(kinds, tuple(names), tables, laws, turns)
+
+
+def describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
+    """What a load acts on and with; InputError for what cannot be."""
+    load: Any = scene.load[name]
+    place = f"[load.{name}]"
+    part = lookup(LOADS, load.type, where=place)
+    coordinate = None
+    if hasattr(load, "joint"):
+        coordinate = coordinate_of(scene, load.joint, load.coordinate, place)[2]
+    try:
+        row: Row = part.row(load, place) if coordinate is None else part.row(load, place, coordinate)
+    except ValueError as error:
+        raise InputError(place, str(error)) from None
+    return row, coordinate
+
+
+def _sites(mechanism: Mechanism, numbering: Numbering, name: str, row: Row) -> tuple[int, int]:
+    place = f"[load.{name}]"
+    frames = mechanism.scene.joint[row.joint].between if row.joint is not None else row.frames
+    found = [find_frame(mechanism.frames, frame, place) for frame in frames]
+    if len(found) == 2 and mechanism.link_of[found[0].body] == mechanism.link_of[found[1].body]:
+        raise InputError(place, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
+    if len(found) == 1 and mechanism.link_of[found[0].body] == 0:
+        raise InputError(place, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
+    sites = [numbering.site(mechanism.site(frame)) for frame in frames]
+    return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])
+
+
+def _motion(coordinate: Coordinate | None) -> tuple[int, ...]:
+    """Columns of the table that say how a coordinate is measured."""
+    if coordinate is None:
+        return (0,) * 7
+    return (int(coordinate.turning), coordinate.side, coordinate.axis, *coordinate.sine, *coordinate.cosine)

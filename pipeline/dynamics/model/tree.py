@@ -1,0 +1,132 @@
+"""Spanning tree of links and joints; what is left over are closures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.drives import PathDrive
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.joints import HELD
+from pipeline.dynamics.model.driving import joint_class, joint_drives
+from pipeline.dynamics.model.merge import Frame, Group, find_frame
+
+#: kind of an edge that is no joint of the scene: a frame's pose in the world, prescribed in part or whole
+PATH = "path"
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A joint between two groups, or the path of a frame in the world (PATH).
+
+    drives: prescribed coordinate of each freedom, or None; empty when none is prescribed.
+    vector: whether a path turns by a rotation vector.
+    """
+
+    name: str
+    kind: str
+    a: int
+    b: int
+    frame_a: str
+    frame_b: str
+    drives: tuple[str | None, ...] = ()
+    vector: bool = False
+
+
+@dataclass(frozen=True)
+class Branch:
+    """A link of the tree: its group, its parent link, and the joint that carries it.
+
+    reverse: the joint's second frame is on the parent.  edge: None for a body that nothing holds.
+    """
+
+    group: int
+    parent: int
+    edge: Edge | None
+    reverse: bool = False
+
+
+def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
+    """Joints between different groups, and paths. Of a clearance joint, what it holds beside its contact."""
+    driven = joint_drives(scene)
+    result = []
+    contacts = scene.contacts()
+    for name, joint in scene.joint.items():
+        a, b = (find_frame(frames, f, f"[joint.{name}.between]") for f in joint.between)
+        if a.body == b.body:
+            raise InputError(f"[joint.{name}.between]", f"joins '{a.body}' to itself", "name frames of two bodies")
+        kind = HELD.get(joint.type) if name in contacts else joint.type
+        if kind is None:
+            continue
+        ga, gb = group_of[a.body], group_of[b.body]
+        if ga == gb:
+            if kind != "fixed":
+                raise InputError(
+                    f"[joint.{name}]", "its two bodies are rigidly joined already", "remove it, or a fixed joint"
+                )
+            continue
+        result.append(Edge(name, kind, ga, gb, *joint.between, driven.get(name, ())))
+    return result + _paths(scene, frames, group_of)
+
+
+def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
+    """Edges from the ground to the frames whose pose is prescribed."""
+    result: list[Edge] = []
+    for name, drive in scene.drive.items():
+        if not isinstance(drive, PathDrive):
+            continue
+        place = f"[drive.{name}.frame]"
+        group = group_of[find_frame(frames, drive.frame, place).body]
+        if group == 0:
+            raise InputError(place, f"'{drive.frame}' belongs to the ground, which does not move", "name another frame")
+        if group in (e.b for e in result):
+            raise InputError(place, f"the body of '{drive.frame}' has a path already", "remove one of the two")
+        laws = dict(drive.components())
+        parts = [f"{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"]
+        drives = tuple(f"{name}.{part}" if part in laws else None for part in parts)
+        vector = drive.angles == "rotation-vector" and any(drives[3:])
+        result.append(Edge(f"drive.{name}", PATH, 0, group, "", drive.frame, drives, vector))
+    return result
+
+
+def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Edge]]:
+    """Links in an order where parents come first (link 0 is the ground), and the closures.
+
+    The tree takes joints with prescribed coordinates first, then those with the fewest free
+    coordinates, then those nearest to the ground: that keeps the unknowns and the chains short.
+    """
+    branches = [Branch(0, -1, None)]
+    link_of = {0: 0}
+    depth = [0]
+    left = list(joints)
+    while len(branches) < len(groups):
+        frontier = [e for e in left if (e.a in link_of) != (e.b in link_of)]
+        if frontier:
+            best = min(
+                frontier, key=lambda e: (not any(e.drives), _freedom(e), depth[link_of[e.a if e.a in link_of else e.b]])
+            )
+            left.remove(best)
+            reverse = best.a not in link_of
+            parent, group = (best.b, best.a) if reverse else (best.a, best.b)
+            branches.append(Branch(group, link_of[parent], best, reverse))
+        else:
+            group = next(g for g in range(len(groups)) if g not in link_of)
+            branches.append(Branch(group, 0, None))
+        link_of[group] = len(branches) - 1
+        depth.append(depth[branches[-1].parent] + 1)
+    for edge in left:
+        if any(edge.drives):
+            drive = next(d for d in edge.drives if d).partition(".")[0]
+            raise InputError(
+                f"[drive.{drive}]",
+                f"'{edge.name}' closes a loop whose other joints are all driven",
+                "remove a drive",
+            )
+    return branches, left
+
+
+def _freedom(edge: Edge) -> int:
+    if edge.kind == PATH:
+        return edge.drives.count(None)
+    return len(joint_class(edge.kind).SPEEDS) - sum(d is not None for d in edge.drives)

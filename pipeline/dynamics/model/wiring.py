@@ -1,0 +1,154 @@
+"""Index tables of the equations: mass-matrix entries, envelopes, closure supports."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import arrays
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.numbering import Numbering
+
+
+def mass_entries(numbering: Numbering) -> dict[Any, Any]:
+    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE.
+
+    A coordinate's momentum (that of all it moves) times the column of a coordinate nearer to the
+    ground is their entry of the mass matrix.
+    """
+    products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
+    for i in range(1, len(numbering.mechanism.links)):
+        own = list(range(numbering.c0[i], numbering.c0[i] + numbering.n_speeds(i)))
+        above = numbering.route(i - 1)
+        for n, c in enumerate(own):
+            products += [(c, d, c, d) for d in own[: n + 1]]
+            products += [(c, col, c, d) for d, col in above]
+        if i in numbering.modes:
+            modal = range(numbering.flex_c0[i], numbering.flex_c0[i] + numbering.modes[i])
+            products += [(c, col, c, d) for c in modal for d, col in numbering.joint_route(i)]
+        products += _port_products(numbering, i)
+    first = list(range(numbering.nv))
+    for _, _, c, d in products:
+        if c < numbering.nv and d < numbering.nv:
+            first[max(c, d)] = min(first[max(c, d)], c, d)
+    for i, n in numbering.modes.items():
+        for j in range(n):
+            first[numbering.flex_c0[i] + j] = min(first[numbering.flex_c0[i] + j], numbering.flex_c0[i])
+    start, rows = 0, []
+    for i, f in enumerate(first):
+        rows.append((f, start))
+        start += i - f + 1
+    pairs, known = [], []
+    for momentum, col, c, d in products:
+        if c < numbering.nv and d < numbering.nv:
+            i, j = max(c, d), min(c, d)
+            pairs.append((momentum, col, rows[i][1] + j - rows[i][0]))
+        elif c < numbering.nv or d < numbering.nv:
+            pair = (max(c, d) - numbering.nv, min(c, d))
+            known.append((momentum, col, *pair))
+    return {m.PAIRS: pairs, m.KNOWN_PAIRS: known, m.ENVELOPE: rows}
+
+
+def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, int]]:
+    """Entries between the modes of a flexible parent through the link i that it carries."""
+    port = numbering.port_of(i - 1)
+    if port < 0:
+        return []
+    link = numbering.sites[i - 1].link
+    first, c0, n = numbering.ports[port][2], numbering.flex_c0[link], numbering.modes[link]
+    return [(first + j, first + k, c0 + j, c0 + k) for j in range(n) for k in range(j + 1)]
+
+
+def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tuple[dict[Any, Any], np.ndarray]:
+    """Tables of the closures, given (joint type, site a, site b) each, and their order there, for a thin envelope."""
+    routes = [closure_route(numbering, a, b) for _, a, b in site_pairs]
+    order = _order([{c for c, _, _ in route} for route in routes])
+    closure: list[tuple[int, ...]] = []
+    rows: list[tuple[int, int, int]] = []
+    support: list[int] = []
+    entries: list[tuple[int, int, int]] = []
+    known: list[tuple[int, int, int, int]] = []
+    supports: list[list[int]] = []
+    row0 = jacobian0 = 0
+    for new, old in enumerate(order):
+        kind, a, b = site_pairs[old]
+        declared = joint_class(kind)
+        mine = [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
+        slots = sorted({c for c, _, _ in routes[old] if c < numbering.nv})
+        moved = _moved(routes[old])
+        entry0 = len(entries)
+        entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < numbering.nv]
+        known += [(new, c - numbering.nv, col, sign) for c, col, sign in moved if c >= numbering.nv]
+        n_entries = len(entries) - entry0
+        closure.append((a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine)))
+        rows += mine
+        support += slots
+        supports.append(slots)
+        row0 += len(mine)
+        jacobian0 += len(mine) * len(slots)
+    tables = {
+        m.CLOSURES: closure,
+        m.CLOSURE_ROWS: rows,
+        m.SUPPORT: support,
+        m.ENTRIES: entries,
+        m.KNOWN_ENTRIES: known,
+        **_couplings(arrays.named(m.CLOSURES, closure), supports),
+    }
+    return tables, np.array(order, dtype=np.int64)
+
+
+def closure_route(numbering: Numbering, a: int, b: int) -> list[tuple[int, int, int]]:
+    """(coordinate, column, sign) of both sides."""
+    return [(c, col, 1) for c, col in numbering.route(b)] + [(c, col, -1) for c, col in numbering.route(a)]
+
+
+def _moved(route: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+    """What is left after motions common to both sides cancel."""
+    plus = {col for _, col, sign in route if sign > 0}
+    minus = {col for _, col, sign in route if sign < 0}
+    return [(c, col, sign) for c, col, sign in route if col not in plus & minus]
+
+
+def _order(supports: list[set[int]]) -> list[int]:
+    """Reverse Cuthill-McKee on "shares a coordinate"."""
+    n = len(supports)
+    if n < 2:
+        return list(range(n))
+    graph = np.array([[bool(a & b) for b in supports] for a in supports], dtype=float)
+    return [int(k) for k in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]
+
+
+def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]:
+    """Pairs of closures with common coordinates, the common slots, and the envelope of J M^-1 J^T."""
+    pairs: list[tuple[int, ...]] = []
+    common: list[tuple[int, int]] = []
+    users: dict[int, list[int]] = {}
+    for b, support in enumerate(supports):
+        for a in sorted({b, *(a for c in support for a in users.get(c, []))}):
+            shared = sorted(set(supports[a]) & set(support))
+            pairs.append((a, b, len(common), len(shared)))
+            common += [(supports[a].index(c), support.index(c)) for c in shared]
+        for c in support:
+            users.setdefault(c, []).append(b)
+    return {
+        m.CLOSURE_PAIRS: pairs,
+        m.COMMON: common,
+        m.CLOSURE_ENVELOPE: closure_envelope(closure, arrays.named(m.CLOSURE_PAIRS, pairs)),
+    }
+
+
+def closure_envelope(closures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
+    """First column and start of each kept row of J M^-1 J^T, shape (rows, 2); pairs: rows of CLOSURE_PAIRS."""
+    first = closures["kept0"].copy()
+    for a, b in zip(pairs["a"], pairs["b"], strict=True):
+        first[b] = min(first[b], closures["kept0"][a])
+    rows, start = [], 0
+    for b, closure in enumerate(closures):
+        for k in range(closure["kept0"], closure["kept0"] + closure["n_kept"]):
+            rows.append((first[b], start))
+            start += k - first[b] + 1
+    return arrays.rows(m.CLOSURE_ENVELOPE, rows)

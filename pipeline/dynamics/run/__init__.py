@@ -1,0 +1,1 @@
+"""From a consistent start to a finished run."""

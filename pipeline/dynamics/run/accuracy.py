@@ -1,0 +1,187 @@
+"""A run whose time integration is as accurate as the scene asks: tolerances are tried, errors estimated.
+
+The error of a run is estimated by the same run at a hundred times tighter tolerance: an adaptive method
+whose tolerance is proportional to its error (tolerance proportionality) then overestimates its distance to the
+exact solution by about one per cent. Errors of the model (modes, mesh, contact law) are not part of it.
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, sec. II.4.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core import quantities
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
+from pipeline.core.scene.load import edited
+from pipeline.core.scene.schema import Scene
+from pipeline.core.scene.wanted import Quantity, parse
+
+#: the estimate compares with a run at this share of the tolerance
+FINER = 1e-2
+#: tolerances that are tried lie between these; below, rounding decides
+TIGHTEST, LOOSEST = 1e-14, 1e-2
+#: a run is accepted when its error is between these shares of what is wanted: enough, and not wasteful
+ENOUGH, WASTEFUL = 1.0, 1.0 / 3.0
+#: what the next try aims at, between the two
+AIM = 0.6
+TRIES = 12
+#: a run that is refused at a looser tolerance than this is tried again at a share of it
+REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
+#: an error that does not fall below this share when the tolerance falls by FINER has another cause than the steps
+STUCK = 0.3
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A run at one tolerance: errors by quantity, as estimated, and the largest as a share of what is wanted."""
+
+    rtol: float
+    run: xr.Dataset
+    errors: Mapping[str, float]
+    share: float
+
+
+@dataclass
+class Search:
+    """Runs made so far by tolerance, and what is wanted of them."""
+
+    scene: Scene
+    once: Callable[[Scene], xr.Dataset]
+    runs: dict[float, xr.Dataset] = field(default_factory=dict)
+
+    def run(self, rtol: float) -> xr.Dataset:
+        """The run at a tolerance, made once."""
+        if rtol not in self.runs:
+            self.runs[rtol] = self.once(edited(self.scene, {"solver.rtol": rtol}))
+        return self.runs[rtol]
+
+    def attempt(self, rtol: float) -> Attempt:
+        """The run at a tolerance and its estimated errors."""
+        run = self.run(rtol)
+        finer = max(rtol * FINER, TIGHTEST)
+        # the tightest of all can only be compared with a looser one, whose error is the larger
+        other = self.run(finer if finer < rtol else rtol / FINER)
+        wanted = self.wanted(other)
+        # all tighter runs are witnesses: with impacts, two neighbours may agree by luck
+        witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
+        errors = {q.name: max(quantities.error(run, r, q) for r in witnesses) for q in wanted}
+        return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in wanted.items()))
+
+    def wanted(self, run: xr.Dataset) -> dict[Quantity, float]:
+        """Wanted accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
+        accuracy = self.scene.accuracy
+        assert accuracy is not None
+        found = {}
+        for name, want in accuracy.quantities.items():
+            quantity = parse(name, self.scene.owners())
+            absolute = want.absolute
+            if absolute is None:
+                absolute = (want.relative or 0.0) * quantities.scale(run, quantity)
+            if not absolute > 0.0:
+                raise InputError(
+                    f"{self.scene.path or self.scene.name} [accuracy] {name}",
+                    "a relative accuracy of a quantity that never changes",
+                    "give an absolute one, with a unit",
+                )
+            found[quantity] = absolute
+        return found
+
+
+def deliver(scene: Scene, once: Callable[[Scene], xr.Dataset], progress: Progress) -> xr.Dataset:
+    """The cheapest run found whose estimated errors are what the scene wants; or the best, and a word on it.
+
+    once: makes the run of a scene.  The dataset's attributes say what was wanted, estimated and met.
+    """
+    search = Search(scene, once)
+    best = _search(search, progress)
+    wanted = {q.name: w for q, w in search.wanted(best.run).items()}
+    met = best.share <= ENOUGH
+    verdict = "met" if met else _missed(search, best, wanted)
+    progress(None, f"accuracy {'met' if met else 'missed: ' + verdict} (relative tolerance {best.rtol:.1e})")
+    return best.run.assign_attrs(
+        accuracy_wanted=json.dumps({name: f"{w:.3g}" for name, w in wanted.items()}, sort_keys=True),
+        accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),
+        accuracy_verdict=verdict,
+        accuracy_rtol=best.rtol,
+        accuracy_runs=len(search.runs),
+        accuracy_meaning="largest error of the time integration, estimated by a run at 100 times tighter tolerance",
+    )
+
+
+def _search(search: Search, progress: Progress) -> Attempt:
+    """Tolerance by tolerance: the error's logarithm is close to linear in the tolerance's."""
+    rtol = _first(search.scene)
+    enough: Attempt | None = None
+    nearest: Attempt | None = None
+    too_loose = math.inf
+    for _ in range(TRIES):
+        try:
+            now = search.attempt(rtol)
+        except SolverError:
+            if rtol <= REFUSED_FOR_GOOD:
+                raise
+            # a tolerance so loose that the run is refused, as its ledger does not close
+            too_loose = min(too_loose, rtol)
+            rtol = _next(rtol, 1.0 / TIGHTER, enough, too_loose)
+            continue
+        progress(None, f"tolerance {rtol:.1e}: error {now.share:.2g} of what is wanted")
+        if nearest is None or now.share < nearest.share:
+            nearest = now
+        if now.share <= ENOUGH:
+            enough = now if enough is None or now.rtol > enough.rtol else enough
+            if now.share >= WASTEFUL or rtol >= LOOSEST:
+                return now
+        else:
+            too_loose = min(too_loose, rtol)
+            if rtol <= TIGHTEST:
+                break
+        rtol = _next(rtol, now.share, enough, too_loose)
+        if enough is not None and too_loose < 1.05 * enough.rtol:
+            break  # the error jumps between two neighbouring tolerances
+    return enough or nearest  # type: ignore[return-value]
+
+
+def _first(scene: Scene) -> float:
+    """A guess that the search corrects; a tenth of the tightest relative wish, or the scene's own tolerance."""
+    assert scene.accuracy is not None
+    shares = [want.relative for want in scene.accuracy.quantities.values() if want.relative is not None]
+    guess = 0.1 * min(shares) if shares else scene.solver.rtol
+    return float(np.clip(guess, 100.0 * TIGHTEST, LOOSEST))
+
+
+def _next(rtol: float, share: float, enough: Attempt | None, too_loose: float) -> float:
+    if enough is not None and too_loose < math.inf:
+        return math.sqrt(enough.rtol * too_loose)
+    change = float(np.clip(AIM / max(share, 1e-300), 1e-3, 1e3))
+    return float(np.clip(rtol * change, TIGHTEST, LOOSEST))
+
+
+def _missed(search: Search, best: Attempt, wanted: Mapping[str, float]) -> str:
+    """By how much, and why no tolerance helps."""
+    name = max(wanted, key=lambda n: best.errors[n] / wanted[n])
+    text = f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / wanted[name]:.2g} times what is wanted"
+    looser = min((r for r in search.runs if r > best.rtol), default=None)
+    if looser is None:
+        return text
+    quantity = parse(name, search.scene.owners())
+    before = quantities.error(search.runs[looser], best.run, quantity)
+    if not best.errors[name] < STUCK * before:
+        until = _trusted_until(search, best, quantity, wanted[name])
+        return f"{text}; tighter tolerances do not help{until}: the motion is chaotic or rounding decides"
+    return f"{text}; this is the tightest tolerance"
+
+
+def _trusted_until(search: Search, best: Attempt, quantity: Quantity, wanted: float) -> str:
+    if not quantities.is_series(quantity):
+        return ""
+    other = search.runs[min(search.runs, key=lambda r: (r == best.rtol, abs(math.log(r / best.rtol))))]
+    time, distance = quantities.deviation(best.run, other, quantity)
+    beyond = np.flatnonzero(distance > wanted)
+    return f" (it holds until t = {time[beyond[0]]:.4g} s)" if beyond.size else ""

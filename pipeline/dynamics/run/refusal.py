@@ -1,0 +1,94 @@
+"""Why a run does not go on, in words that say what to do about it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.integrators import DEFAULT
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine
+
+#: above this share of steps that stability limits, stiffness is named as the cause of a long run
+STIFF_SHARE = 0.3
+#: events per step from which on they are named as the cause
+OFTEN = 0.05
+
+
+def text(engine: Engine) -> str:
+    """When and why the stepper stopped, in words."""
+    control, n = engine.view(m.CONTROL, m.N_CONTROLS), engine.n
+    where = singular.diagnosis(engine)
+    contacts = [name for name, *_ in engine.model.mechanism.contacts]
+    culprit = contacts[n[m.CULPRIT]] if contacts else ""
+    fixed = f"{control[m.FIXED]:.2g} s"
+    too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
+    unsolvable = (
+        f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
+    )
+    unsolvable += _other_integrator(engine)
+    if not engine.model.mechanism.closures:
+        unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
+    reasons = {
+        m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is used up ([solver.evaluations]); "
+        + _why_so_many(engine, n, control),
+        m.STEP_TOO_SMALL: f"the step shrank to {control[m.STEP]:.2g} s: the motion is singular here, "
+        f"or stiffer than the integrator can follow ({where})",
+        m.NO_START: f"the equations are singular here ({where})",
+        m.NOT_A_NUMBER: f"the right-hand side is not a number here: {too_long}a force or a law overflows or "
+        "divides by zero",
+        m.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
+        "take a shorter step, or leave [solver.step] out",
+        m.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time: a smaller rtol tells these "
+        "times apart, a softer contact or more damping parts them",
+        m.STEPPED_OVER: f"the contact of joint {culprit} began unseen within a step: a smaller rtol or a shorter "
+        "step finds it",
+        m.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
+        f"({where}): give it another motion{_other_integrator(engine)}",
+        m.LOST_CLOSURE: unsolvable,
+    }
+    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}"
+
+
+def _other_integrator(engine: Engine) -> str:
+    """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
+    if engine.method.traits.passes_singular:
+        return ""
+    return f"; or it moves on and {engine.model.scene.solver.integrator} does not get over the pose: try {DEFAULT}"
+
+
+def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
+    """What used the evaluations up, and what helps."""
+    name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
+    other = engine.method.traits.hands_over_to
+    steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
+    told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
+    if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
+        choice = f"choose an implicit integrator ({other}), or " if other else ""
+        return f"{told[0]}; {stiffness(n, control)}; {choice}a larger v_static"
+    if control[m.STEEPEST] > 0.0:
+        told.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
+    if done > 0.0:
+        whole = n[m.EVALUATIONS] * control[m.SPAN] / done
+        told.append(f"at this pace the whole run takes {whole:.1g} evaluations")
+    return "; ".join([*told, _remedy(steps, rejected, events, other)])
+
+
+def _remedy(steps: int, rejected: int, events: int, other: str) -> str:
+    """What helps by what there was most of; other: the implicit method that is one of the remedies, or nothing."""
+    implicit = f", {other} where contacts or friction are stiff," if other else ""
+    if events > OFTEN * steps:
+        return (
+            "contacts begin and end all the time: soften or damp them, end the run earlier, or allow more evaluations"
+        )
+    if rejected > steps:
+        return f"most steps are rejected, as where forces set in steeply: a looser rtol{implicit} or more evaluations"
+    return f"a looser rtol{implicit} or more evaluations"
+
+
+def stiffness(n: np.ndarray, control: np.ndarray) -> str:
+    """How many steps stability limited, and the rates that did it."""
+    return (
+        f"{n[m.STIFF_STEPS]} of {n[m.STEPS]} steps were limited by stability: the equations have rates up "
+        f"to {control[m.STEEPEST]:.2g} 1/s, as the slope of friction at small sliding speeds has"
+    )

@@ -1,0 +1,77 @@
+"""How long a run with contacts can be believed point by point: the same run from a start that differs by a hair.
+
+Impacts make neighbouring motions part exponentially, so that the errors of any integration grow too.
+The twin starts as far away as one step at the run's tolerance may err; where its velocities have
+parted from the run's by a visible share, values of the run are one draw out of many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipeline.core.errors import SolverError
+from pipeline.core.quantities import PARTED
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.run.engine import Engine, observe
+from pipeline.dynamics.run.perturbation import offset_jacobian, perturbed
+from pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
+
+#: the two are compared at every so manieth regular output, which bounds the cost
+EVERY = 10
+#: offsets below this cannot be told from rounding of the positions [m]
+SMALLEST = 1e-14
+
+
+@dataclass(frozen=True)
+class Twin:
+    """Distance of the velocities of two runs.
+
+    perturbation [m]; time [s], separation [m/s], shape (n,); horizon [s], the start where the twin fails.
+    """
+
+    perturbation: float
+    time: np.ndarray
+    separation: np.ndarray
+    horizon: float
+
+
+def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
+    """Run the scene again from a start whose balls are offset, and compare the links' velocities."""
+    contacts = len(engine.model.mechanism.contacts)
+    size = max(engine.rtol * engine.model.mechanism.length, SMALLEST)
+    direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
+    moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
+    time = output_times(engine.breaks, engine.model.scene.output.interval)[::EVERY]
+    one = _velocities(engine, trajectory, time)
+    visible = PARTED * float(np.linalg.norm(one, axis=2).max())
+
+    def parted(rows: np.ndarray) -> bool:
+        """Whether the twin is already beyond the horizon, where following it further tells nothing."""
+        k = int(np.searchsorted(time, rows[-1, 0], side="right")) - 1
+        w, n = engine.w.copy(), engine.n.copy()  # the twin's integration goes on with these
+        two = _velocities(engine, replace(trajectory, rows=rows), time[[k]])
+        engine.w[:], engine.n[:] = w, n
+        return bool(np.linalg.norm(one[[k]] - two, axis=2).max() > visible)
+
+    try:
+        other = integrate(engine, moved, _quiet, parted)
+    except SolverError:
+        # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
+        return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
+    time = time[time <= other.time[-1]]
+    separation = np.linalg.norm(one[: len(time)] - _velocities(engine, other, time), axis=2).max(axis=1)
+    beyond = np.flatnonzero(separation > visible)
+    return Twin(size, time, separation, float(time[beyond[0]] if len(beyond) else engine.end))
+
+
+def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.ndarray:
+    """Velocities of all links' frames at times that the trajectory has, shape (time, link, 3)."""
+    rows = trajectory.rows[np.searchsorted(trajectory.time, time)]
+    frames = observe(engine, rows)["link_frame"].reshape(len(rows), -1, m.FRAME.size)
+    return frames[:, :, m.FRAME.velocity : m.FRAME.velocity + 3]
+
+
+def _quiet(share: float | None, text: str) -> None:
+    """The run itself has told its progress."""

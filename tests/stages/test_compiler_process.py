@@ -1,0 +1,186 @@
+"""Generated files are compiled here and by a second process; whatever becomes of that one, all are there."""
+
+from __future__ import annotations
+
+import multiprocessing
+import subprocess
+import sys
+import threading
+from concurrent.futures import Future, ProcessPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.artifacts.store import Store
+from pipeline.core.workflow import cores, schedule
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.progress import Monitor
+from pipeline.core.workflow.task import Task
+from pipeline.dynamics.compile import compiler_process, functions
+from pipeline.dynamics.compile.files import bring, claimed, compiled, take
+from tests.stages.conftest import PATIENCE
+
+SOURCE = """from numba import njit, types
+
+
+@njit(types.int64(types.int64), cache=True)
+def add(x):
+    return x + {k}
+"""
+#: holds the lock of a file, says so, and stays
+HOLDER = """import sys, time
+from pathlib import Path
+from pipeline.dynamics.compile.files import claimed
+with claimed(Path(sys.argv[1]), wait=True):
+    print("held", flush=True)
+    time.sleep(600.0)
+"""
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """Three small files, named apart from those of every other test since modules stay."""
+    found = [tmp_path / f"generated_{tmp_path.name}_{k}.py" for k in range(3)]
+    for k, path in enumerate(found):
+        path.write_text(SOURCE.format(k=k))
+    return found
+
+
+@pytest.fixture(autouse=True)
+def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever machine this is."""
+    monkeypatch.setattr(cores, "cores", lambda: 2)
+    monkeypatch.setattr(cores, "_told", None)
+
+
+def nothing(path: Path) -> None:
+    raise AssertionError(f"{path} was to be compiled elsewhere")
+
+
+def results(files: list[Path]) -> list[int]:
+    return [sys.modules[path.stem].add(10) for path in files]
+
+
+def test_a_second_process_leaves_the_code_on_disk(files: list[Path]) -> None:
+    with compiler_process.second_process(files) as process:
+        assert process is not None
+        assert process.wait(timeout=PATIENCE) == 0
+        assert all(compiled(path) for path in files)
+        bring(files, nothing)
+    assert results(files) == [10, 11, 12]
+
+
+def test_what_a_second_process_is_compiling_is_left_to_it(files: list[Path], root: Path) -> None:
+    """And when it dies over it, or is killed, compiled here after all, last."""
+    holder = subprocess.Popen(
+        [sys.executable, "-c", HOLDER, str(files[0])], cwd=root, stdout=subprocess.PIPE, text=True
+    )
+    with holder:
+        assert holder.stdout is not None
+        assert holder.stdout.readline() == "held\n"
+        assert not take(files[0], nothing)
+        told: list[Path] = []
+
+        def tell(path: Path) -> None:
+            told.append(path)
+            if path == files[0]:
+                threading.Timer(0.2, holder.kill).start()
+
+        bring(files, tell)
+    assert told == [files[1], files[2], files[0]]
+    assert results(files) == [10, 11, 12]
+
+
+@pytest.mark.parametrize("command", ["raise SystemExit(1)", "import os; os.abort()"])
+def test_a_second_process_that_fails_is_not_missed(
+    files: list[Path], monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setattr(compiler_process, "COMMAND", command)
+    told: list[Path] = []
+    with compiler_process.second_process(files) as process:
+        assert process is not None
+        assert process.wait(timeout=PATIENCE) != 0
+        bring(files, told.append)
+    assert told == files
+    assert results(files) == [10, 11, 12]
+
+
+def test_a_machine_that_starts_no_process_does_without(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", str(files[0].parent / "not there"))
+    with compiler_process.second_process(files) as process:
+        assert process is None
+
+
+def test_an_interrupt_ends_the_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiler_process, "COMMAND", "import time; time.sleep(600.0)")
+    with pytest.raises(KeyboardInterrupt), compiler_process.second_process(files) as process:
+        raise KeyboardInterrupt
+    assert process is not None
+    assert process.returncode is not None  # waited for, too: no zombie
+
+
+def test_a_second_process_ends_with_its_parent(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where that was killed and could say nothing: its end of the pipe is closed then."""
+    start = compiler_process.COMMAND.replace(
+        "import work\nwork(sys.argv[2:])", "import _follow_parent\n_follow_parent()"
+    )
+    monkeypatch.setattr(compiler_process, "COMMAND", start)
+    with compiler_process.second_process(files) as process:
+        assert process is not None
+        assert process.stdin is not None
+        process.stdin.close()
+        assert process.wait(timeout=PATIENCE) == 1
+
+
+def test_there_is_one_second_process_for_a_folder(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiler_process, "COMMAND", "import time; time.sleep(600.0)")
+    with compiler_process.second_process(files) as first, compiler_process.second_process(files) as second:
+        assert first is not None
+        assert second is None
+    with compiler_process.second_process(files) as third:
+        assert third is not None
+
+
+def test_one_file_and_one_core_need_no_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    with compiler_process.second_process(files[:1]) as process:
+        assert process is None
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+    assert not compiler_process.wanted()
+
+
+def test_workers_have_no_second_process() -> None:
+    """Each core has a worker already, unless theirs is the only task that can run."""
+    with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+        assert not pool.submit(compiler_process.wanted).result()
+    assert compiler_process.wanted()
+    cores.tell(others_idle=False)
+    assert not compiler_process.wanted()
+    cores.tell(others_idle=True)
+    assert compiler_process.wanted()
+
+
+@pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])
+def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, scenes: list[str], idle: bool) -> None:
+    tasks = [Task("simulate", name, "stages.s4_simulate:run", {"scene": name}, "") for name in scenes]
+    heard: list[bool] = []
+
+    class Pool:
+        def submit(self, *given: object) -> Future[None]:
+            heard.append(bool(given[-1]))
+            return Future()
+
+    common = (Store(tmp_path), Sources(root), None)
+    schedule._submit(schedule._Plan(tasks), {}, Pool(), 4, common, Monitor())  # type: ignore[arg-type]
+    assert heard == [idle] * len(scenes)
+
+
+def test_code_that_cannot_be_kept_is_compiled_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "file" / "kernels"))
+    told: list[str] = []
+    path = functions._file(functions._folder(told.append), "test", SOURCE.format(k=3))
+    assert "cannot be kept" in told[0]
+    with claimed(path, wait=True):
+        assert not take(path, nothing)
+    assert take(path, lambda _: None)
+    assert results([path]) == [13]
