@@ -1,4 +1,4 @@
-"""Scenes with their bundles and compiled engines, and the states at which they are evaluated."""
+"""Scenes with their bundles and compiled engines, their drives' laws, and the states at which they are evaluated."""
 
 from __future__ import annotations
 
@@ -8,21 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from benchmarks.measure import once
+from benchmarks.timing import once
 from pipeline.core.progress import silent
 from pipeline.core.scene.clearance import ClearanceSpherical
-from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.drives import JointDrive
+from pipeline.core.scene.load import edited, load_scene
 from pipeline.core.scene.parts import IdealJoint
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.drives.pieces import Pieces, pieces_of
 from pipeline.dynamics.run.engine import Engine, consistent_start
 from pipeline.dynamics.run.run import engine_of, observed
 from pipeline.dynamics.run.trajectory import Trajectory, integrate
-from stages.graph import Graph
-from stages.run import check, find_scene, workplace
+from stages.run import bundles, find_scene
 
 #: the scenes of the paper, from the least to the fullest
 SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")
+
+#: of what a drive prescribes
+DIMENSION = {"prismatic": "length", "revolute": "angle"}
 
 
 @dataclass(frozen=True)
@@ -55,45 +59,38 @@ class State:
 def mechanism(name: str) -> Mechanism:
     """``scenes/sps4/<name>.toml`` with up-to-date bundles; FlexclearError when these cannot be made."""
     scene = load_scene(find_scene(f"sps4/{name}"))
-    place, tasks = workplace(), Graph(scene).bundle
-    outcome = place.bring(list(tasks.values()), jobs=1)
-    check(outcome)
-    return Mechanism(name, scene, {body: place.store.load(outcome.records[id(task)]) for body, task in tasks.items()})
-
-
-def edit_joint(scene: Scene, name: str, **changes: object) -> Scene:
-    """A copy of a scene with some fields of one joint changed."""
-    return scene.model_copy(update={"joint": scene.joint | {name: scene.joint[name].model_copy(update=changes)}})
+    return Mechanism(name, scene, bundles(scene))
 
 
 def without_friction(scene: Scene) -> Scene:
     """A copy whose clearance joints have no friction."""
-    for name, joint in scene.joint.items():
-        if isinstance(joint, ClearanceSpherical):
-            scene = edit_joint(scene, name, friction=None)
-    return scene
+    smooth = {name: joint.model_copy(update={"friction": None}) for name, joint in _loose(scene).items()}
+    return scene.model_copy(update={"joint": scene.joint | smooth})
 
 
 def without_clearance(scene: Scene) -> Scene:
     """A copy whose clearance joints are ideal ones."""
-    ideal = {
-        name: IdealJoint(type="spherical", between=joint.between)
-        for name, joint in scene.joint.items()
-        if isinstance(joint, ClearanceSpherical)
-    }
+    ideal = {name: IdealJoint(type="spherical", between=joint.between) for name, joint in _loose(scene).items()}
     return scene.model_copy(update={"joint": scene.joint | ideal})
+
+
+def _loose(scene: Scene) -> dict[str, ClearanceSpherical]:
+    return {name: joint for name, joint in scene.joint.items() if isinstance(joint, ClearanceSpherical)}
 
 
 def damped(scene: Scene, ratio: float) -> Scene:
     """A copy whose flexible bodies have a modal damping ratio."""
-    bodies = {name: body.model_copy(update={"damping": ratio}) for name, body in scene.flexible().items()}
-    return scene.model_copy(update={"body": scene.body | bodies})
+    return edited(scene, {f"body.{name}.damping": ratio for name in scene.flexible()})
 
 
-def with_tolerance(scene: Scene, rtol: float, interval: float) -> Scene:
-    """A copy with another tolerance and output interval [s]."""
-    solver = scene.solver.model_copy(update={"rtol": rtol})
-    return scene.model_copy(update={"solver": solver, "output": scene.output.model_copy(update={"interval": interval})})
+def joint_laws(scene: Scene) -> dict[str, Pieces]:
+    """The law of every driven joint's coordinate; ValueError for drives that prescribe something else."""
+    found = {}
+    for name, drive in scene.drive.items():
+        if not isinstance(drive, JointDrive):
+            raise ValueError(f"[drive.{name}] does not prescribe a joint's coordinate")
+        found[drive.joint] = pieces_of(drive.law, DIMENSION[scene.joint[drive.joint].type])
+    return found
 
 
 def trajectory(engine: Engine) -> Trajectory:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 
 import numpy as np
 
-PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn")
+#: of times in the log, per second
+UNITS = {"s": 1.0, "us": 1e6}
 
 
 @dataclass(frozen=True)
@@ -30,6 +28,10 @@ class Times:
         """Half the range of the middle half of the repeats, as a share of the median."""
         low, high = np.percentile(self.seconds, (25, 75))
         return float(0.5 * (high - low) / self.median)
+
+    def told(self, unit: str) -> dict[str, float]:
+        """Median, in the unit that it is called by, and spread, as the log has them."""
+        return {unit: UNITS[unit] * self.median, "spread": self.spread}
 
     def over(self, other: Times) -> float:
         """Median of the ratios to another measurement, pair by pair: a slow moment of the machine slows both."""
@@ -57,27 +59,3 @@ def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[s
 def slope(x: Sequence[float], y: Sequence[float]) -> float:
     """Exponent p of the best fit y = C x^p."""
     return float(np.polyfit(np.log(x), np.log(y), 1)[0])
-
-
-def machine() -> dict[str, object]:
-    """Processor model and versions; no name of the machine."""
-    return {"cpu": _processor(), "versions": {"python": platform.python_version(), **_versions()}}
-
-
-def _processor() -> str:
-    information = Path("/proc/cpuinfo")
-    if information.exists():
-        for line in information.read_text().splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found

@@ -1,18 +1,21 @@
-"""The 4-SPS/PS mechanism of the scenes with its parameters free: a scene for every point of the atlas."""
+"""The cases of the atlas, and a scene for each: the 4-SPS/PS mechanism with its parameters free.
+
+One parameter at a time is moved over its range, and there are random points of all of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from benchmarks.family import Case
 from pipeline.core.scene.load import compose
 from pipeline.core.scene.schema import Scene
+from pipeline.core.workflow.fingerprint import TREE
 
-ROOT = Path(__file__).resolve().parents[2]
 CLEARANCE, STIFFNESS = 0.5e-3, 1.3631e11  # Table 3 [m], eq. (26) with its data [N/m^1.5]
 #: radii of the joint circles, start height [m], and the angles of the joints that are far from singular [deg]
 RADIUS_A, RADIUS_B, HEIGHT = 0.1, 0.2, 0.35
@@ -25,6 +28,24 @@ CYLINDER, ROD, LOWER_END = 0.146, 0.160, 0.280
 STROKE, LIFT = 0.18, 0.06  # duration [s] and change of the driven legs [m]
 #: evaluations after which a case counts as refused: with rigid bodies about a minute; a hundred strokes take half of it
 CAP = 8_000_000
+#: Craig-Bampton counts that cut no pair of equal frequencies: 6 static modes and pairs, torsion, axial
+MODES = (0, 6, 8, 10, 11, 13, 15, 30)
+#: ranges over which single parameters are varied; logarithmic ones by decades
+RANGES: dict[str, tuple[float, ...]] = {
+    "clearance": tuple(np.geomspace(1e-6, 2e-3, 14).tolist()),
+    "stiffness": tuple(np.geomspace(1e-2, 1e4, 13).tolist()),
+    "restitution": tuple(np.linspace(0.0, 1.0, 11).tolist()),
+    "friction": tuple(np.linspace(0.0, 0.5, 11).tolist()),
+    "speed": tuple(np.geomspace(0.1, 20.0, 10).tolist()),
+    "mass": tuple(np.geomspace(1e-3, 1e3, 13).tolist()),
+    "modes": MODES,
+    "damping": (0.0, 0.001, 0.005, 0.01, 0.02, 0.05),
+    "nearness": (0.0, *(1.0 - np.geomspace(1e-1, 1e-6, 6)).tolist()),
+    "joints": (1, 2, 3, 4, 5),
+    "strokes": (1, 10, 100),
+}
+#: the parameter that another one needs to mean anything
+ALONG: dict[str, dict[str, Any]] = {"damping": {"modes": 13}}
 
 
 @dataclass(frozen=True)
@@ -49,9 +70,49 @@ class Parameters:
     strokes: int = 1
 
 
+def cases(seed: int, random: int) -> list[Case]:
+    """All single sweeps, and so many random points; other seeds give others of the same kind."""
+    return [*_sweeps(), *_random(seed, random)]
+
+
+def sweep(case: str) -> str:
+    """The parameter that moves in a case of this name, or `random`."""
+    return case.partition(" ")[0]
+
+
+def _sweeps() -> Iterator[Case]:
+    for name, values in RANGES.items():
+        base = replace(Parameters(), **ALONG.get(name, {}))
+        for value in values:
+            change: dict[str, Any] = {name: value}
+            yield Case(f"{name} {value:.6g}", replace(base, **change))
+
+
+def _random(seed: int, count: int) -> Iterator[Case]:
+    """Every parameter uniform over its range (logarithmic where it spans decades); flexible rods in one of four."""
+    random = np.random.default_rng(seed)
+    for k in range(count):
+        flexible = random.random() < 0.25
+        yield Case(
+            f"random {seed}/{k + 1}",
+            Parameters(
+                clearance=float(np.exp(random.uniform(np.log(1e-6), np.log(2e-3)))),
+                stiffness=float(np.exp(random.uniform(np.log(1e-2), np.log(1e4)))),
+                restitution=float(random.uniform(0.0, 1.0)),
+                friction=float(random.choice([0.0, random.uniform(0.0, 0.5)])),
+                speed=float(np.exp(random.uniform(np.log(0.1), np.log(20.0)))),
+                mass=float(np.exp(random.uniform(np.log(1e-3), np.log(1e3)))),
+                modes=int(random.choice(MODES[1:6])) if flexible else 0,
+                damping=float(random.uniform(0.0, 0.05)) if flexible else 0.0,
+                nearness=float(1.0 - 10.0 ** random.uniform(-6.0, 0.0)),
+                joints=int(random.integers(1, 6)),
+            ),
+        )
+
+
 def scene(p: Parameters, rtol: float | None = None) -> Scene:
     """The scene of a point. Raises InputError when it cannot be described."""
-    table = compose(ROOT / "scenes" / "sps4" / "csj.toml")
+    table = compose(TREE / "scenes" / "sps4" / "csj.toml")
     _place(table, p)
     _scale_mass(table["body"]["platform"], p.mass)
     joint = _contact(table["joint"]["A1"], p)
@@ -67,19 +128,7 @@ def scene(p: Parameters, rtol: float | None = None) -> Scene:
     return made
 
 
-def condition(p: Parameters) -> float:
-    """Condition number of the legs' directions at the start: of the map from the platform's motion to leg rates.
-
-    Length scale 0.1 m; the central chain leaves rotation and lift.
-    """
-    rows = []
-    for a, b in zip(*_joints(p.nearness), strict=True):
-        leg = (a + START - b) / np.linalg.norm(a + START - b)
-        rows.append([*(np.cross(a, leg) / 0.1), leg[2]])
-    return float(np.linalg.cond(np.array(rows)))
-
-
-def _joints(nearness: float) -> tuple[np.ndarray, np.ndarray]:
+def circles(nearness: float) -> tuple[np.ndarray, np.ndarray]:
     """Centres of the platform and the base joints in their planes, shape (4, 3) [m]."""
     angles = (ANGLE_A + nearness * (SINGULAR - ANGLE_A), ANGLE_B + nearness * (SINGULAR - ANGLE_B))
     corners = []
@@ -93,7 +142,7 @@ def _place(table: dict[str, Any], p: Parameters) -> None:
     """Joint positions, and the start poses of the legs that follow from them."""
     if p.nearness == 0.0:
         return
-    for k, (a, b) in enumerate(zip(*_joints(p.nearness), strict=True), start=1):
+    for k, (a, b) in enumerate(zip(*circles(p.nearness), strict=True), start=1):
         table["body"]["platform"]["frames"][f"A{k}"] = {"position": a.tolist()}
         table["body"]["ground"]["frames"][f"B{k}"] = {"position": b.tolist()}
         leg = a + START - b
@@ -123,7 +172,7 @@ def _flexible(rod: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
     lower = np.array(rod["pose"]["position"]) - (LOWER_END - ROD) * z / np.linalg.norm(z)
     return {
         "type": "flexible",
-        "mesh": str(ROOT / "meshes" / "actuated_rod.toml"),
+        "mesh": str(TREE / "meshes" / "actuated_rod.toml"),
         "modes": {"reference": "craig-bampton", "count": p.modes, "interfaces": ["bottom", "top"]},
         "pose": {"position": lower.tolist(), "axes": {"x": z.tolist(), "y": x.tolist()}},
     } | ({"damping": p.damping} if p.damping else {})

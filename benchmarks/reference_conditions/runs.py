@@ -2,22 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 import pipeline
-from benchmarks.reference_conditions import chosen, design, statics
+from benchmarks import family
+from benchmarks.family import Measured
+from benchmarks.family import Record as Row
+from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.cases import BODY
-from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, PLACES, RIGID, TIMES, Case
+from benchmarks.reference_conditions.design import (
+    CONDITIONS,
+    COUNT,
+    COUNTS,
+    FINER,
+    FULL,
+    PLACES,
+    RIGID,
+    TIMES,
+    TOP,
+    Case,
+)
 from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from stages.run import Workplace, check
+from stages.run import Workplace, check, workplace
 
-Row = dict[str, Any]
+#: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
+DIRECTIONS = ("z", "x", "rz")
 #: vibrations of the mechanism that are compared
 VIBRATIONS = 6
+
+
+def cases(members: int) -> list[family.Case]:
+    """The groups of rows that the page has."""
+    return [family.Case(name, members if name == "clearance" else None) for name in GROUPS]
+
+
+def measure(cases: Sequence[family.Case], jobs: int) -> Measured:
+    """The rows of each group."""
+    for case in cases:
+        rows = GROUPS[case.name]
+        yield case, list(rows() if case.of is None else rows(case.of))
 
 
 def bring(cases: list[Case], place: Workplace) -> dict[Case, xr.Dataset]:
@@ -40,27 +67,36 @@ def identity(case: Case) -> Row:
 
 
 def static_rows() -> Iterator[Row]:
-    """Shares of the static compliance, over all whole counts; and the full rod's own."""
+    """The full rod's compliance [m/N, rad/(N m)] of the top with the prismatic joint's place held; shares of it.
+
+    Over all whole counts.
+    """
     for place in PLACES:
-        highest = float(statics.solved(Case(place, FULL))["frequency"].max())
-        yield {"place_mm": place, "condition": FULL, "count": 0, "highest": highest} | statics.full(place)
+        full = design.solved(Case(place, FULL))
+        row = {"highest": float(full["frequency"].max())} | _compliance(full["compliance_full"], place)
+        yield {"place_mm": place, "condition": FULL, "count": 0} | row
         for condition in CONDITIONS:
-            for count in statics.whole_counts(place, condition, max(design.COUNTS)):
-                shares = statics.shares(Case(place, condition, count))
-                yield {"place_mm": place, "condition": condition, "count": count} | shares
+            for count in design.whole_counts(place, condition, max(COUNTS)):
+                share = design.solved(Case(place, condition, count))["compliance_share"]
+                yield {"place_mm": place, "condition": condition, "count": count} | _compliance(share, place)
+
+
+def _compliance(values: xr.DataArray, place: int) -> Row:
+    found = values.sel(frame=TOP, frame_held=PLACES[place])
+    return {direction: float(found.sel(direction=direction)) for direction in DIRECTIONS}
 
 
 def mesh_rows() -> Iterator[Row]:
-    """Frequencies of the Craig-Bampton set on finer meshes, the finest last."""
-    for finer in design.FINER:
-        found = statics.clamped_frequencies(finer, COUNT)
-        yield {"elements": finer * statics.rod(1).sizes["cell"], "frequency": found.tolist()}
+    """Frequencies [Hz] of the Craig-Bampton set at 0 mm on finer meshes, the finest last."""
+    for finer in FINER:
+        found = design.solved(Case(0, "craig-bampton", COUNT, finer=finer))["frequency"]
+        yield {"elements": finer * design.rod(1).sizes["cell"], "frequency": found.values.tolist()}
 
 
 def frequency_rows() -> Iterator[Row]:
     """Lowest frequencies [Hz] of the assembled mechanism, drives held, at each of `TIMES`."""
     for where in PLACES:
-        sets = [Case(where, c, statics.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
+        sets = [Case(where, c, design.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
         for case in sets:
             for time in TIMES:
                 found = pipeline.frequencies(design.scene(case), time)["undamped_frequency"].values
@@ -68,9 +104,9 @@ def frequency_rows() -> Iterator[Row]:
                 yield identity(case) | {"time": time, "frequency": elastic.tolist()}
 
 
-def far_rows(place: Workplace) -> Iterator[Row]:
+def far_rows() -> Iterator[Row]:
     """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
-    runs = bring(chosen.far(), place)
+    runs = bring(design.far(), workplace())
     for case, run in runs.items():
         rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
         effect = max_deviation(run, rigid, BODY)
@@ -82,9 +118,13 @@ def far_rows(place: Workplace) -> Iterator[Row]:
         }
 
 
-def clearance_rows(place: Workplace, members: int) -> Iterator[Row]:
-    """Clearance at A1: means and standard deviations over the members of each set, one run of the rigid rod."""
-    runs = bring(chosen.clearance(members), place)
+def clearance_rows(members: int) -> Iterator[Row]:
+    """Clearance at A1: means and standard deviations over the members of each set, one run of the rigid rod.
+
+    members: of each ensemble; of sets beyond 13 coordinates, half of them.
+    """
+    place = workplace()
+    runs = bring(design.clearance(members), place)
     rigid = bring([Case(where, RIGID) for where in PLACES], place)
     for case, run in runs.items():
         ideal = rigid[Case(case.place, RIGID)]
@@ -123,3 +163,12 @@ def _statistics(series: dict[str, Any]) -> Row:
         found[name] = float(np.mean(values))
         found[f"{name}_std"] = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
     return found
+
+
+GROUPS: dict[str, Callable[..., Iterator[Row]]] = {
+    "statics": static_rows,
+    "mesh": mesh_rows,
+    "frequencies": frequency_rows,
+    "far": far_rows,
+    "clearance": clearance_rows,
+}

@@ -4,24 +4,21 @@ from __future__ import annotations
 
 import resource
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from multiprocessing import connection, get_context
 from typing import Any
 
-from benchmarks.stability.cases import Case
-from benchmarks.stability.outcome import WRONG, Outcome
+from benchmarks.family import WRONG, Case, Record
 
-#: processor time of a case after which it counts as hanging [s]; the dearest takes a fifth of it
-LIMIT = 600
-Work = Callable[[Any, Callable[[], None]], Outcome]
+Work = Callable[[Any, Callable[[], None]], Record]
 
 
-def outcomes(cases: list[Case], jobs: int, work: Work, limit: int = LIMIT) -> Iterator[tuple[Case, Outcome]]:
-    """Every case with its outcome, as they come; `work(parameters, compiled)` must be importable.
+def outcomes(cases: Sequence[Case], jobs: int, work: Work, limit: int) -> Iterator[tuple[Case, Record]]:
+    """Every case with its record, as they come; `work(case.of, compiled)` must be importable.
 
-    The limit begins when `work` calls `compiled`, and is kept by the system: it also ends a process that sits in
-    compiled code.
+    limit: processor time of a case [s]. It begins when `work` calls `compiled`, and is kept by the system: it also ends
+    a process that sits in compiled code.
     """
     waiting = list(reversed(cases))
     crew: dict[connection.Connection, _Worker] = {}
@@ -60,18 +57,19 @@ class _Worker:
 
     def give(self, case: Case) -> None:
         self.case = case
-        self.line.send(case.parameters)
+        self.line.send(case.of)
 
-    def take(self) -> Outcome:
-        """The outcome of the case in hand; a process that died is one, too."""
+    def take(self) -> Record:
+        """The record of the case in hand; that a process died is one, too."""
         with suppress(EOFError, ConnectionResetError):
-            found: Outcome = self.line.recv()
+            found: Record = self.line.recv()
             return found
         self.alive = False
         self.process.join()
         if self.process.exitcode == -signal.SIGXCPU:
-            return Outcome(WRONG, f"did not end within {self.limit} s of processor time", seconds=float(self.limit))
-        return Outcome(WRONG, f"its process died (exit code {self.process.exitcode})")
+            reason = f"did not end within {self.limit} s of processor time"
+            return {"verdict": WRONG, "reason": reason, "seconds": float(self.limit)}
+        return {"verdict": WRONG, "reason": f"its process died (exit code {self.process.exitcode})", "seconds": 0.0}
 
     def dismiss(self) -> None:
         self.line.close()
