@@ -49,6 +49,15 @@ def below(arrows: Arrows, start: str) -> set[str]:
     return found
 
 
+def tabled(root: Path) -> list[str]:
+    """Folders and modules of the table above the drawing, in its order."""
+    return re.findall(r"^\| `([\w/.]+)` \|", section(root).partition("```mermaid")[0], re.MULTILINE)
+
+
+def bare(name: str) -> str:
+    return name.removesuffix("/").removesuffix(".py")
+
+
 def parts(root: Path) -> set[str]:
     tower = root / "pipeline" / "dynamics"
     folders = {path.parent.name + "/" for path in tower.glob("*/__init__.py")}
@@ -56,9 +65,8 @@ def parts(root: Path) -> set[str]:
 
 
 def test_the_drawing_shows_every_part_of_the_tower(root: Path) -> None:
-    rows = re.findall(r"^\| `([\w/.]+)` \|", section(root), re.MULTILINE)
-    assert sorted(rows) == sorted(parts(root))
-    assert {end for arrow in drawn(root) for end in arrow} == {re.sub(r"(/|\.py)$", "", name) for name in rows}
+    assert sorted(tabled(root)) == sorted(parts(root))
+    assert {end for arrow in drawn(root) for end in arrow} == {bare(name) for name in tabled(root)}
 
 
 def test_every_arrow_of_the_drawing_is_an_import(root: Path) -> None:
@@ -72,8 +80,24 @@ def test_every_import_follows_the_arrows_of_the_drawing(root: Path) -> None:
 
 
 def test_the_table_stands_in_the_order_of_the_arrows(root: Path) -> None:
-    rows = [re.sub(r"(/|\.py)$", "", name) for name in re.findall(r"^\| `([\w/.]+)` \|", section(root), re.MULTILINE)]
+    rows = [bare(name) for name in tabled(root)]
     assert [(a, b) for a, b in drawn(root) if rows.index(a) > rows.index(b)] == []
+
+
+def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> None:
+    way = re.search(r"^```text\n(.*?)^```$", section(root), re.DOTALL | re.MULTILINE)
+    assert way is not None
+    names = re.findall(r"\w+(?:/\w+)+(?:\.py)?", way[1])
+    assert len(names) > 10
+    assert [name for name in names if not exists(root, name)] == []
+
+
+def test_the_sizes_are_about_right(root: Path) -> None:
+    """Within a fifth: a table that is older than that says nothing."""
+    rows = re.findall(r"^\| `([\w/]+)` \| \d* \| (\d+) \|$", section(root), re.MULTILINE)
+    known = {name: sum(len(p.read_text().splitlines()) for p in (root / name).rglob("*.py")) for name, _ in rows}
+    assert {f"pipeline/dynamics/{name}" for name in parts(root) if name.endswith("/")} <= {f"{n}/" for n in known}
+    assert {name: n for name, n in rows if not 0.8 < int(n) / known[name] < 1.25} == {}
 
 
 # Names --------------------------------------------------------------------------------------------------------------
@@ -84,7 +108,7 @@ MODULE = re.compile(r"(pipeline|stages|tests|benchmarks)(\.\w+)+")
 #: folders that names below are told from: `model/tree` is `pipeline/dynamics/model/tree.py`
 FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs")
 #: first parts of names that are no sources: written by runs, quantities, units, scenes by name, symbols
-ELSEWHERE = {"results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}
+ELSEWHERE = {".venv", "results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}
 #: files that runs or users make
 MADE = {"run.nc", "cost.json", "timing.nc"}
 

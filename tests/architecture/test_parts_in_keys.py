@@ -38,6 +38,13 @@ def test_a_part_that_is_named_gives_its_module(package: str, table: str, name: s
     assert effects.Named(package, name, "here", table).module == module_of(package, table, name)
 
 
+@pytest.mark.parametrize("package, table, name", families())
+def test_what_a_family_lists_is_there(package: str, table: str, name: str) -> None:
+    """Lists that follow from what scenes declare name modules and objects that exist."""
+    module, _, made = getattr(import_module(package), table)[name].partition(":")
+    assert hasattr(import_module(f"{package}.{module}"), made)
+
+
 #: where a part of a family stands among the parts of the code
 CODE = {
     (effects.JOINTS, "NAMES"): lambda name: Parts((name,), closures=True),

@@ -44,6 +44,7 @@ def test_pauses_change_no_bit(solver: dict[str, Any], monkeypatch: pytest.Monkey
 def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
     made = run(double_pendulum(), solver)
     assert made.counters["evaluations"] > made.counters["steps"] > 0
+    assert (made.counters["jacobians"] > 0) is INTEGRATORS[solver["integrator"]].implicit
     with pytest.raises(SolverError, match="limit of 40 evaluations") as told:
         run(double_pendulum(), {**solver, "evaluations": 40})
     # what used them up, and what to do about it
@@ -125,10 +126,11 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
     )
     start = consistent_start(engine)
     made = stepping.integrate(engine, start, lambda share, text: None)
-    kinetic, potential, _ = observed(engine, made)["energy"].T
-    total = kinetic + potential
-    lost = (total[0] - total[-5:].mean()) / np.ptp(potential)
+    energy = observed(engine, made).energy
+    total = energy["kinetic"] + energy["potential"]
+    lost = (total[0] - total[-5:].mean()) / np.ptp(energy["potential"])
+    # 0.8 % of what swings to and fro, and otherwise 5.4 % at least; the bound lies between, by like factors
     if rho == 1.0:
-        assert abs(lost) < 0.05
+        assert abs(lost) < 0.02
     else:
-        assert lost > 0.05
+        assert lost > 0.02

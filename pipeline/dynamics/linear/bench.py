@@ -15,6 +15,7 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model import initial, selection
+from pipeline.dynamics.model.driving import prescribed
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import observation, singular
@@ -46,6 +47,11 @@ class Bench:
     def model(self) -> Model:
         """What is on the bench."""
         return self.engine.model
+
+    @property
+    def units(self) -> np.ndarray:
+        """What counts as far for each drive: a radian, or the mechanism's size [m]; shape (known,)."""
+        return np.array([1.0 if p.dimension == "angle" else self.model.length for p in prescribed(self.model.scene)])
 
 
 @dataclass(frozen=True)
@@ -128,8 +134,8 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     if not bench.model.closures:
         share = 1.0
     else:
-        way = float(np.max(np.abs(target - origin), initial=0.0))
-        stride = min(1.0, STRIDE * min(bench.model.length, 1.0) / way) if way > 0.0 else 1.0
+        way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
+        stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
     while share < 1.0:
         attempt = min(1.0, share + stride)
         try:
@@ -187,17 +193,10 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
+    L = engine.mass_factor()
     return Balance(
         engine.view(m.BIAS)[: engine.model.nv].copy(),
-        _mass(engine),
+        L @ L.T,
         engine.rows(m.JACOBIAN),
         engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)],
     )
-
-
-def _mass(engine: Engine) -> np.ndarray:
-    """M = L L^T from the factor that the last evaluation left in its envelope."""
-    L, entries = np.zeros((engine.model.nv,) * 2), engine.view(m.MASS)
-    for i, (first, start) in enumerate(engine.model.arrays.table(m.ENVELOPE)):
-        L[i, first : i + 1] = entries[start : start + i + 1 - first]
-    return L @ L.T

@@ -1,4 +1,4 @@
-"""Tables of the flexible bodies, from their bundles."""
+"""Tables of the flexible bodies, from their bundles; how their points move with the modes."""
 
 from __future__ import annotations
 
@@ -78,6 +78,23 @@ def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray
     if frame is None:
         return bundle["shortening_first_moment"].values
     return bundle["frame_shortening"].sel(frame=frame).values
+
+
+def shift(
+    shape: np.ndarray, bow: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    r"""Displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, and its two rates.
+
+    shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
+    q, u, du: modal coordinates, rates and second rates, (time, mode).
+    """
+    place, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
+    if bow is not None:
+        bent, turning = q @ bow, u @ bow
+        place[:, 0] += 0.5 * np.sum(bent * q, axis=1)
+        rate[:, 0] += np.sum(bent * u, axis=1)
+        second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
+    return place, rate, second
 
 
 def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:

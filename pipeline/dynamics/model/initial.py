@@ -2,25 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import FlexibleBody, Ground, RigidBody
+from pipeline.core.scene.parts import Ground, RigidBody
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import chain_positions
-from pipeline.dynamics.model.constraints import outboard_place
+from pipeline.dynamics.model.assembly import chain_positions, outboard_place
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.flexible_bodies import bow, shift
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.model import Model
 
 #: state -> frames of all links, named fields of LINK_FRAMES, and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-#: misses below this share of the speeds asked for are rounding
-RIGID = 1e-9
+#: misses below this share of the speeds asked for are rounding; speeds that contradict each other miss by more than
+#: this share
+RIGID, CONTRADICTS = 1e-9, 1e-6
+#: combinations of speeds that change rates by less than this share of the largest change nothing: redundant closures
+REDUNDANT = 1e-9
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
 
@@ -48,7 +52,8 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
 def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
-    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
     Raises InputError when joints and drives do not allow the velocities.
     """
     wanted = {
@@ -64,37 +69,47 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     y = y.copy()
     y[model.speeds] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told, arms = ~np.isnan(given), _arms(model, wanted)
+    told, centres = ~np.isnan(given), [_centre(model, name) for name in wanted]
+
+    unit, L = model.speed_scales, model.length
+    lengths = np.tile([1.0] * 3 + [L] * 3, len(wanted))[told]
+    opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
-        return np.concatenate([_twists(frames, *arms)[told], opening])
+        moving = [centre.motion(frames, state[: model.nq], state[model.speeds]) for centre in centres]
+        return np.concatenate([np.array(moving).ravel()[told] / lengths, opening / opening_lengths])
 
     base = rates(y)
     columns = []
     for k in range(model.nv):
         moved = y.copy()
-        moved[model.nq + k] = 1.0
+        moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
     matrix = np.array(columns).T.reshape(len(base), model.nv)
-    target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
+    asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
+    target = asked - base
+    # a radian, or the mechanism's size, in the time of the whole run is slow
+    slow = 1.0 / (model.scene.time.end - model.scene.time.start)
+    fastest = slow + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
     speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
+    if miss > RIGID * fastest:
         speeds, miss = _least(matrix, target)
-    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
+    if wanted and miss > CONTRADICTS * fastest:
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g})",
+            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
+            "mechanism's size, or radians, per second)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[model.speeds] = speeds
+    y[model.speeds] = unit * speeds
     return y
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
-    """The least speeds that come nearest to the target, and by how much they miss it."""
-    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
+    """The least speeds that come nearest to the target, and by how much they miss it; all in their natural units."""
+    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=REDUNDANT)
     return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))
 
 
@@ -102,20 +117,42 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
     return [np.nan] * 3 if given is None else list(given)
 
 
-def _arms(model: Model, bodies: Mapping[str, RigidBody | FlexibleBody]) -> tuple[np.ndarray, np.ndarray]:
-    """Number of each body's link, (n,), and its centre of mass in the link's frame, (n, 3)."""
-    links = [model.mechanism.link_of[name] for name in bodies]
-    places = [model.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
-    coms = [np.array(getattr(body, "com", (0.0, 0.0, 0.0))) for body in bodies.values()]
-    arms = [place.p + place.R @ com for place, com in zip(places, coms, strict=True)]
-    return np.array(links, dtype=int), np.array(arms).reshape(len(links), 3)
+@dataclass(frozen=True)
+class _Centre:
+    """Centre of mass of a body: its place in the frame of its link, undeformed.
+
+    shape, bow: its shift with the modal coordinates, as in `flexible_bodies.shift`; these are at `positions` and
+    `speeds` among the free ones.
+    """
+
+    link: int
+    place: np.ndarray
+    shape: np.ndarray
+    bow: np.ndarray | None = None
+    positions: range = range(0)
+    speeds: range = range(0)
+
+    def motion(self, frames: np.ndarray, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Angular velocity of the body and velocity of this point, world axes, shape (6,)."""
+        frame, bent, bending = frames[self.link], q[None, self.positions], u[None, self.speeds]
+        moved, rate, _ = shift(self.shape, self.bow, bent, bending, np.zeros_like(bent))
+        arm = frame["axes"] @ (self.place + moved[0])
+        v = frame["velocity"] + np.cross(frame["omega"], arm) + frame["axes"] @ rate[0]
+        return np.concatenate([frame["omega"], v])
 
 
-def _twists(link_frames: np.ndarray, links: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """Angular velocity and velocity of the centre of mass of each body, flattened."""
-    frames = link_frames[links]
-    turned = np.einsum("nij,nj->ni", frames["axes"], arms)
-    return np.hstack([frames["omega"], frames["velocity"] + np.cross(frames["omega"], turned)]).ravel()
+def _centre(model: Model, name: str) -> _Centre:
+    """The centre of mass of a body."""
+    i, body = model.mechanism.link_of[name], model.scene.body[name]
+    link = model.links[i]
+    if isinstance(body, RigidBody):
+        place = link.places[name]
+        return _Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0)))
+    assert link.bundle is not None
+    first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
+    bent, numbering = bow(model.mechanism, i), model.numbering
+    bent = None if bent is None else bent / link.mass
+    return _Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
 def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

@@ -60,6 +60,12 @@ class Model:
         """Speeds of the free coordinates in the state; the positions stand before, the ledger after them."""
         return slice(self.nq, self.nq + self.nv)
 
+    @property
+    def speed_scales(self) -> np.ndarray:
+        """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
+        groups = self.arrays.table(m.GROUPS)["group"][self.speeds]
+        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][groups])
+
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
     """Place a mechanism's links so that its joints fit, number it and fill its tables.

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
 from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.flexible_bodies import bow
+from pipeline.dynamics.model.flexible_bodies import bow, shift
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
 
@@ -55,17 +55,8 @@ class Modal:
     du: np.ndarray
 
     def shift(self, shape: np.ndarray, bow: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        r"""Displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, its rate and second rate.
-
-        shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
-        """
-        place, rate, second = self.q @ shape.T, self.u @ shape.T, self.du @ shape.T
-        if bow is not None:
-            bent, turning = self.q @ bow, self.u @ bow
-            place[:, 0] += 0.5 * np.sum(bent * self.q, axis=1)
-            rate[:, 0] += np.sum(bent * self.u, axis=1)
-            second[:, 0] += np.sum(bent * self.du, axis=1) + np.sum(turning * self.u, axis=1)
-        return place, rate, second
+        """Displacement of a point in the body frame, its rate and second rate; see `model.flexible_bodies.shift`."""
+        return shift(shape, bow, self.q, self.u, self.du)
 
 
 @dataclass(frozen=True)

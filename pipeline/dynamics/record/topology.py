@@ -11,6 +11,7 @@ from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model import selection
+from pipeline.dynamics.model.mobility import INFINITE
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.run import Run
@@ -44,12 +45,13 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.nv
-    values = _singular_values(engine, trajectory, seen)
+    values = _singular_values(engine, trajectory, seen, singular.natural)
     rank = np.zeros(rows, dtype=np.int32)
     if values.shape[1]:
         rank = np.sum(values > ZERO * values[:, :1], axis=1).astype(np.int32)
-        least = np.maximum(values[:, -1], values[:, 0] / singular.INFINITE)
-        variables["condition"] = (("time",), np.minimum(values[:, 0] / least, singular.INFINITE))
+        told = _singular_values(engine, trajectory, seen, singular.scaled)
+        least = np.maximum(told[:, -1], told[:, 0] / INFINITE)
+        variables["condition"] = (("time",), np.minimum(told[:, 0] / least, INFINITE))
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
     if not values.shape[1]:
@@ -64,13 +66,15 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     return variables, {"pass_joint": ("singular_pass", np.array([p.joint for p in passes], dtype=str))}
 
 
-def _singular_values(engine: Engine, trajectory: Trajectory, seen: Observed) -> np.ndarray:
-    """Of the scaled closure Jacobian of every row, with the rows solved for there; descending, (time, rank)."""
+def _singular_values(
+    engine: Engine, trajectory: Trajectory, seen: Observed, scale: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """Singular values of every row's closure Jacobian, with the rows solved for there; shape (time, rank)."""
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
         J = selection.dense(engine.model, engine.h, seen.jacobian[part])
-        parts.append(singular.scaled(engine.model, engine.h, J))
+        parts.append(scale(engine.model, engine.h, J))
     J = np.concatenate(parts)
     return np.linalg.svd(J, compute_uv=False) if J.size else np.zeros((len(J), 0))
 

@@ -115,6 +115,13 @@ class Engine:
         self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
 
+    def mass_factor(self) -> np.ndarray:
+        """L of the mass matrix M = L L^T that the last evaluation left in its envelope, shape (nv, nv)."""
+        L, entries = np.zeros((self.model.nv,) * 2), self.view(m.MASS)
+        for i, (first, start) in enumerate(self.model.arrays.table(m.ENVELOPE)):
+            L[i, first : i + 1] = entries[start : start + i + 1 - first]
+        return L
+
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
         return selection.dense(self.model, self.h, self.view(stored))
@@ -139,7 +146,9 @@ def prepare(model: Model, progress: Progress) -> Engine:
     space = model.arrays.work_space(method.room)
     entry.connect(space.h)
     kept, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    return Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol)
+    engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol)
+    engine.control[m.LENGTH] = model.length
+    return engine
 
 
 def may_depart(model: Model) -> bool:
