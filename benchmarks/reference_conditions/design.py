@@ -14,7 +14,7 @@ from pipeline.core.scene.load import load_scene, read_toml
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
 from pipeline.structure.fe import mesh
-from pipeline.structure.modes import solve
+from pipeline.structure.modes.solution import solve
 from stages import s4_simulate
 from stages.graph import Graph
 from stages.run import find_scene

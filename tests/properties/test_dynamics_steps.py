@@ -44,6 +44,7 @@ def test_pauses_change_no_bit(solver: dict[str, Any], monkeypatch: pytest.Monkey
 def test_evaluations_are_counted_and_capped(solver: dict[str, Any]) -> None:
     made = run(double_pendulum(), solver)
     assert made.counters["evaluations"] > made.counters["steps"] > 0
+    assert (made.counters["jacobians"] > 0) is INTEGRATORS[solver["integrator"]].implicit
     with pytest.raises(SolverError, match="limit of 40 evaluations") as told:
         run(double_pendulum(), {**solver, "evaluations": 40})
     # what used them up, and what to do about it
@@ -128,7 +129,8 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
     kinetic, potential, _ = observed(engine, made)["energy"].T
     total = kinetic + potential
     lost = (total[0] - total[-5:].mean()) / np.ptp(potential)
+    # 0.8 % of what swings to and fro, and otherwise 5.4 % at least; the bound lies between, by like factors
     if rho == 1.0:
-        assert abs(lost) < 0.05
+        assert abs(lost) < 0.02
     else:
-        assert lost > 0.05
+        assert lost > 0.02
