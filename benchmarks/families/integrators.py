@@ -5,14 +5,14 @@ Errors are those of the largest force of every impact, because the paper prints 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
-from benchmarks.page import table
+from benchmarks.page import Columns, table
 from pipeline import dynamics
 from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.errors import SolverError
@@ -86,7 +86,7 @@ def _forces(run: xr.Dataset) -> np.ndarray:
 
 def show(records: list[Record]) -> str:
     """A row for each; a dash where forces cannot be compared."""
-    columns: dict[str, Callable[[Record], str]] = {
+    columns: Columns = {
         "integrator": lambda r: r["integrator"],
         "steps": steps,
         "evaluations": lambda r: str(r.get("evaluations", f"refused: {r.get('reason')}")),

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import SCENES, Mechanism, mechanism
-from benchmarks.page import spread, table
+from benchmarks.page import Columns, spread, table
 from benchmarks.timing import interleaved, once
 from pipeline import dynamics
 from pipeline.core.progress import silent
@@ -50,7 +50,7 @@ def _stage(here: Mechanism) -> Callable[[], float]:
 
 def show(records: list[Record]) -> str:
     """The table; the rest of the stage is the evaluation of every recorded row, and the dataset."""
-    columns: dict[str, Callable[[Record], str]] = {
+    columns: Columns = {
         "scene": lambda r: r["case"],
         "integration [s]": lambda r: spread(r["integration"], "s", 4),
         "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),
