@@ -10,7 +10,8 @@ are, what is joined to what, every number, stands in four flat arrays that every
 
 Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the place in w where a stretch begins,
 ``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the place of row i of a
-table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.
+table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
+names of their fields (`named`), and rows of the record by what they hold (`record`).
 
 Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
 

@@ -12,7 +12,7 @@ from pipeline.core.algebra import quaternion_to_matrix, rotation_vector_to_matri
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.driving import drive_laws
+from pipeline.dynamics.model.laws import drive_laws
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, scene, simulate
 

@@ -103,5 +103,6 @@ def magnitude(motions: np.ndarray, at: Tangent) -> float:
     return float(np.linalg.norm(np.abs(motions).T @ np.abs(at.bias)))
 
 
-def _stacked(found: list[tuple[np.ndarray, float]], n: int) -> tuple[np.ndarray, np.ndarray]:
-    return np.array([c for c, _ in found]).T.reshape(n, n), np.array([e for _, e in found])
+def _stacked(columns: list[tuple[np.ndarray, float]], n: int) -> tuple[np.ndarray, np.ndarray]:
+    """A matrix and the errors of its columns, each with its error."""
+    return np.array([c for c, _ in columns]).T.reshape(n, n), np.array([e for _, e in columns])

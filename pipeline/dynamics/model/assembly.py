@@ -147,10 +147,10 @@ class Misfit:
 
 
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
-    """The system with links placed so that all joints fit and driven ones stand where their drives say.
+    """The mechanism with links placed so that all joints fit and driven ones stand where their drives say.
 
     Raises InputError for joints whose frames start far apart or face each other the wrong way, and
-    for a mechanism that cannot be assembled, with the residual of every joint.  A system with flexible bodies
+    for a mechanism that cannot be assembled, with the residual of every joint.  One with flexible bodies
     or paths is only checked: deformation and prescribed poses are part of its closing, which the engine does.
     given: laws that replace the scene's.
     """
@@ -268,7 +268,7 @@ def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> li
 
 
 def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
-    """The system with these starts; massless links within joints stand where the joints' coordinates put them."""
+    """The mechanism with these starts; massless links within joints stand where the joints' coordinates put them."""
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):
         if link.massless and i:

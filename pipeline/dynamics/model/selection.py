@@ -86,7 +86,7 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
 
 
 def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
-    """Write into h, a copy of the system's wiring, that the `kept` rows are solved for.
+    """Write into h, a copy of the model's wiring, that the `kept` rows are solved for.
 
     kept: per row of the closure table.  No size and no offset changes except the number of rows solved for.
     """

@@ -78,7 +78,7 @@ class Search:
         """Wanted accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
         accuracy = self.scene.accuracy
         assert accuracy is not None
-        found = {}
+        wanted = {}
         for name, want in accuracy.quantities.items():
             quantity = parse(name, self.scene.owners())
             absolute = want.absolute
@@ -90,8 +90,8 @@ class Search:
                     "a relative accuracy of a quantity that never changes",
                     "give an absolute one, with a unit",
                 )
-            found[quantity] = absolute
-        return found
+            wanted[quantity] = absolute
+        return wanted
 
 
 def deliver(scene: Scene, once: Callable[[Scene], xr.Dataset], progress: Progress) -> xr.Dataset:
