@@ -10,7 +10,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.core.axes import check_axes
+from pipeline.core.axes import check_axes, check_axis
+
+#: square of the sine of the angle to -z below which a direction counts as that
+_OPPOSITE = 1e-18
 
 
 def skew(v: np.ndarray) -> np.ndarray:
@@ -97,6 +100,21 @@ def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float
     R[:, i], R[:, j] = a, b
     R[:, k] = np.cross(a, b) if (j - i) % 3 == 1 else np.cross(b, a)
     return R
+
+
+def axis_to_matrix(axis: Sequence[float]) -> np.ndarray:
+    """Rotation matrix of the least rotation that brings z to a direction; for -z, half a turn about x.
+
+    Raises ValueError as `check_axis` does.
+    """
+    check_axis(axis)
+    a = np.array(axis, dtype=float)
+    x, y, z = (a / np.linalg.norm(a)).tolist()
+    square = x * x + y * y  # of the sine of the angle between the two
+    if z < 0.0 and square < _OPPOSITE:  # which way to turn is then a matter of rounding
+        return axes_to_matrix({"z": [x, y, z], "x": [1.0, 0.0, 0.0]})
+    share = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
+    return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -23,13 +23,19 @@ def check_axes(axes: Mapping[str, Vector] | Sequence[Vector]) -> None:
         off = max(abs(dot(a, b)) for a, b in ((x, y), (y, z), (z, x)))
         long = max(abs(dot(a, a) - 1.0) for a in axes)
         if not (off <= DIRECTION and long <= LENGTH and dot(cross(x, y), z) > 0.0):
-            raise ValueError("three axes are the unit vectors x, y, z of a right-handed frame")
+            raise ValueError("three axes must be the unit vectors x, y, z of a right-handed frame")
         return
     if len(axes) != 2 or not set(axes) <= {"x", "y", "z"}:
-        raise ValueError("axes are two of x, y, z, each with its direction in the parent")
+        raise ValueError("axes must be two of x, y, z, each with its direction in the parent")
     a, b = axes.values()
     if not math.hypot(*cross(a, b)) > PARALLEL * math.hypot(*a) * math.hypot(*b):
-        raise ValueError("the two axes are zero or parallel")
+        raise ValueError("the two axes must point in different directions; they are zero or parallel")
+
+
+def check_axis(axis: Vector) -> None:
+    """Raise ValueError, in words, for a direction of length zero."""
+    if not math.hypot(*axis) > 0.0:
+        raise ValueError(f"an axis must point somewhere; {[float(x) for x in axis]} has the length zero")
 
 
 def dot(a: Vector, b: Vector) -> float:

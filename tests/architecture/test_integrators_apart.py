@@ -7,11 +7,13 @@ from pathlib import Path
 import pytest
 
 from pipeline.core.integrators import INTEGRATORS
+from pipeline.core.registry import lookup
 from pipeline.core.scene.load import load_scene
 from pipeline.dynamics.compile import functions
 from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from pipeline.dynamics.integrate import NAMES
+from pipeline.dynamics.integrate.method import keep_nothing
 from stages import s4_simulate
 
 PACKAGE = "pipeline.dynamics.integrate"
@@ -50,8 +52,36 @@ def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
     assert "step_end_events" in reached(Scheme("rk4", fixed=True, located=False))
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_method_is_what_the_list_says(name: str) -> None:
+    method, traits = lookup(PACKAGE, name, where="test"), INTEGRATORS[name]
+    assert method.traits is traits
+    _, _, error, _, keep = method.make_kernels(lambda *_: None, lambda *_: None)
+    assert (error is not None) is traits.estimates is (method.error_order > 0)
+    # an implicit method remembers its polynomial or its slopes to predict by, a multistep one needs them
+    assert (keep is not keep_nothing) is (traits.multistep or traits.implicit)
+    # stability limits who tells of stiffness and who hands over; to a method that it does not limit
+    if traits.implicit:
+        assert method.stability is None
+        assert not traits.hands_over_to
+    else:
+        assert INTEGRATORS[traits.hands_over_to].implicit
+
+
 def test_scenes_and_family_know_the_same_names() -> None:
     assert set(INTEGRATORS) == set(NAMES)
+
+
+def test_the_table_of_the_page_says_what_the_list_says(root: Path) -> None:
+    page = (root / "docs" / "integrators.md").read_text()
+    table = {row[1]: row[2:] for row in (line.split("|") for line in page.splitlines()) if len(row) == 6}
+    rows = {name.strip(" `"): (what, steps) for name, (what, steps, *_) in table.items() if name.startswith(" `")}
+    assert list(rows) == list(INTEGRATORS)
+    for name, traits in INTEGRATORS.items():
+        what, steps = rows[name]
+        assert f"order {traits.order}" in what
+        assert ("implicit" in what) is traits.implicit
+        assert ("chosen" in steps) is traits.estimates
 
 
 @pytest.mark.parametrize(
