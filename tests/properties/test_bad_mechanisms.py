@@ -156,7 +156,7 @@ def test_a_mechanism_that_cannot_be_assembled_tells_the_residual_of_every_joint(
     "key, value, rule",
     [
         ("inertia", [1.0, 1.0, 3.0], "at most the sum of the others"),
-        ("inertia", [-1.0, 1.0, 1.0], "each is >= 0"),
+        ("inertia", [-1.0, 1.0, 1.0], "each must be >= 0"),
         ("mass", 0.0, "greater than 0"),
     ],
 )

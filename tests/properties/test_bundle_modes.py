@@ -180,10 +180,10 @@ def test_a_missed_mode_is_noticed(held: bool) -> None:
     model = of_mesh(rod()).assemble(rod())
     rows = model.interfaces[0].motion if held else sp.csr_array((0, model.size))
     values = normal.lowest(model, rows, 8, support_of(model), silent).values
-    normal._nothing_missed(model, rows, values, *gap(values))
+    normal._nothing_missed(model, rows, *gap(values))
     fewer = np.delete(values, 2)
     with pytest.raises(SolverError, match="the eigensolver found"):
-        normal._nothing_missed(model, rows, fewer, *gap(fewer))
+        normal._nothing_missed(model, rows, *gap(fewer))
 
 
 def support_of(model: Model) -> Callable[[], Flexibility]:

@@ -212,7 +212,7 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}
-        if variable.flags:
+        if variable.flags and values.dtype.kind in "iu":
             kinds = np.arange(len(variable.flags), dtype=values.dtype)
             result[name].attrs |= {"flag_values": kinds, "flag_meanings": " ".join(variable.flags)}
     for dim in ("axis", "axis2"):
