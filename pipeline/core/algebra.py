@@ -10,6 +10,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+#: square of the sine of the angle to -z below which a direction counts as that
+_OPPOSITE = 1e-18
+
 
 def skew(v: np.ndarray) -> np.ndarray:
     """Matrix of the cross product, ``skew(v) @ w == cross(v, w)``; shape (..., 3, 3)."""
@@ -89,14 +92,14 @@ def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float
     if not isinstance(axes, Mapping):
         R = np.array(axes, dtype=float).T
         if not np.allclose(R.T @ R, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
-            raise ValueError("three axes are the unit vectors x, y, z of a right-handed frame")
+            raise ValueError("three axes must be the unit vectors x, y, z of a right-handed frame")
         u, _, vt = np.linalg.svd(R)
         return u @ vt
     if len(axes) != 2 or not set(axes) <= {"x", "y", "z"}:
-        raise ValueError("axes are two of x, y, z, each with its direction in the parent")
+        raise ValueError("axes must be two of x, y, z, each with its direction in the parent")
     (first, a), (second, b) = ((name, np.array(v, dtype=float)) for name, v in axes.items())
     if not np.linalg.norm(a) > 0 or np.linalg.norm(np.cross(a, b)) <= 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
-        raise ValueError("the two axes are zero or parallel")
+        raise ValueError("the two axes must point in different directions; they are zero or parallel")
     a = a / np.linalg.norm(a)
     b = b - a * (a @ b)
     b = b / np.linalg.norm(b)
@@ -106,6 +109,22 @@ def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float
     R[:, i], R[:, j] = a, b
     R[:, k] = np.cross(a, b) if (j - i) % 3 == 1 else np.cross(b, a)
     return R
+
+
+def axis_to_matrix(axis: Sequence[float]) -> np.ndarray:
+    """Rotation matrix of the least rotation that brings z to a direction; for -z, half a turn about x.
+
+    Raises ValueError, in words, for a direction of length zero.
+    """
+    a = np.array(axis, dtype=float)
+    if not np.linalg.norm(a) > 0.0:
+        raise ValueError(f"an axis must point somewhere; {a.tolist()} has the length zero")
+    x, y, z = (a / np.linalg.norm(a)).tolist()
+    square = x * x + y * y  # of the sine of the angle between the two
+    if z < 0.0 and square < _OPPOSITE:  # which way to turn is then a matter of rounding
+        return axes_to_matrix({"z": [x, y, z], "x": [1.0, 0.0, 0.0]})
+    share = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
+    return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

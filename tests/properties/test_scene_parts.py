@@ -106,9 +106,9 @@ WRONG = {
     '[load.l]\ntype = "spring-damper"\nbetween = ["base.O", "a.far"]\nstiffness = 1.0': ("load.l", "free_length"),
     '[load.l]\ntype = "spring-damper"\nbetween = ["base.O", "a.far"]': ("load.l", "a damping, or both"),
     '[load.l]\ntype = "joint-spring"\njoint = "hinge"\nstiffness = "3 N/m"': ("load.l", "torsional stiffness"),
-    '[load.l]\ntype = "joint-spring"\njoint = "hinge"\nstiffness = -1.0': ("load.l", "not negative"),
+    '[load.l]\ntype = "joint-spring"\njoint = "hinge"\nstiffness = -1.0': ("load.l", "must not be negative"),
     '[load.l]\ntype = "joint-friction"\njoint = "hinge"\ncoulomb = { static = 0.1, dynamic = 0.2, v_static = 0.1, '
-    "v_dynamic = 0.2 }": ("load.l", "dynamic <= static"),
+    "v_dynamic = 0.2 }": ("load.l", "nor exceed static", "dynamic = 0.2, static = 0.1"),
     '[load.l]\ntype = "joint-friction"\njoint = "sleeve"\nviscous = 1.0': ("load.l.coordinate", "2 coordinates"),
     '[load.l]\ntype = "joint-force"\njoint = "hinge"\nforce = "1 N"': ("load.l.force", "force", "torque"),
     '[load.l]\ntype = "joint-force"\njoint = "weld"\nforce = 1.0': ("load.l.joint", "no coordinate"),
@@ -200,7 +200,7 @@ def test_what_a_run_depends_on_is_the_content_of_the_table_not_its_place(tmp_pat
         ("time,angel\n0,0\n1000,1\n", ("no column 'angle'", "time, angel")),
         ("time,angle\n0,0\n1000,x\n", ("row 3", "'x'", "not two numbers")),
         ("time,angle\n0,0\n", ("at least 2 points",)),
-        ("time,angle\n0,0\n500,1\n500,2\n", ("times increase", "point 3")),
+        ("time,angle\n0,0\n500,1\n500,2\n", ("times must increase", "point 3")),
         ("", ("no column 'time'",)),
     ],
 )

@@ -12,6 +12,8 @@ import xarray as xr
 
 #: a share of the static compliance below this is worth a warning
 ENOUGH = 0.9
+#: references whose shapes answer static loads at the interfaces exactly
+STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
 WIDTH = 9
 
 
@@ -69,10 +71,25 @@ def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the bo
         amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(low["direction"].values, low.values, strict=True))
         found.append(
             f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
-            f"({amounts} of the full model's); joints there find the body too stiff. Static shapes mend that, "
-            f'as modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
+            f"({amounts} of the full model's); joints there find the body too stiff. {_remedy(bundle, used)}"
         )
     return found
+
+
+def _remedy(bundle: xr.Dataset, used: Sequence[str]) -> str:
+    """What gives the body the missing compliance: static shapes, those of the frames used, or more modes."""
+    if bundle.attrs["reference"] not in STATIC:
+        return (
+            f'Static shapes mend that, as modes = {{ reference = "craig-bampton", interfaces = {_listed(used)}, ... }}'
+        )
+    had = str(bundle.attrs.get("interfaces", "")).split()
+    without = [name for name in used if name not in had]
+    if without:
+        return (
+            f"Its static shapes are not made for {_listed(without)}: name all the frames used, "
+            f"as modes = {{ interfaces = {_listed(used)}, ... }}"
+        )
+    return f"Its static shapes are there: keep more normal modes than now (count = {bundle.attrs['count']})"
 
 
 def _percent(share: float) -> str:

@@ -58,7 +58,8 @@ class ModifiedCoulomb(Part):
     def _ordered(self) -> ModifiedCoulomb:
         if not self.v_static < self.v_dynamic:
             raise ValueError(
-                f"v_static = {self.v_static} m/s is below v_dynamic = {self.v_dynamic} m/s in a Stribeck curve"
+                "v_static must be below v_dynamic, as friction falls from static to dynamic between them; "
+                f"v_static = {self.v_static:g} m/s, v_dynamic = {self.v_dynamic:g} m/s"
             )
         _not_above(self.dynamic, self.static)
         return self
@@ -75,7 +76,10 @@ class Ambrosio(Part):
     @model_validator(mode="after")
     def _ordered(self) -> Ambrosio:
         if not self.v0 < self.v1:
-            raise ValueError(f"v0 = {self.v0} m/s, below which there is no friction, is below v1 = {self.v1} m/s")
+            raise ValueError(
+                "v0 must be below v1, as friction rises from nothing at v0 to `dynamic` at v1; "
+                f"v0 = {self.v0:g} m/s, v1 = {self.v1:g} m/s"
+            )
         return self
 
 
@@ -113,7 +117,10 @@ Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre, Field(discriminator="la
 
 def _not_above(dynamic: float, static: float) -> None:
     if dynamic > static:
-        raise ValueError(f"dynamic = {dynamic} exceeds static = {static}: friction does not grow when sliding begins")
+        raise ValueError(
+            "dynamic must not exceed static, as friction does not grow when sliding begins; "
+            f"dynamic = {dynamic:g} exceeds static = {static:g}"
+        )
 
 
 class _Clearance(Part):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
-from pipeline.core.algebra import axes_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
+from pipeline.core.algebra import axes_to_matrix, axis_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
 from pipeline.core.units import a, components, quantity
 
 
@@ -95,13 +95,16 @@ def _inertia(value: Any) -> list[list[float]]:
     entries = np.array(components(chain.from_iterable(given), "inertia"))
     rows = np.diag(entries) if lengths == [1, 1, 1] else entries.reshape(3, 3)
     if np.abs(rows - rows.T).max() > _ROUNDING * np.abs(rows).max():
-        raise ValueError("an inertia matrix is symmetric")
+        raise ValueError(
+            "an inertia matrix must be symmetric; entries opposite to each other differ by up to "
+            f"{np.abs(rows - rows.T).max():.3g} kg m^2"
+        )
     rows = 0.5 * (rows + rows.T)
     moments = np.linalg.eigvalsh(rows)
     if moments[0] < -_ROUNDING * moments[2] or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise ValueError(
             f"principal moments {moments.tolist()} kg m^2 belong to no body: "
-            "each is >= 0 and at most the sum of the others"
+            "each must be >= 0 and at most the sum of the others"
         )
     return rows.tolist()
 
@@ -125,7 +128,7 @@ def part_name(name: str) -> str:
 
 def _frame(value: Any) -> Any:
     if isinstance(value, str) and not re.fullmatch(rf"{_NAME}\.{_NAME}", value):
-        raise ValueError("a frame is named with its body, as in 'body.FRAME'")
+        raise ValueError("a frame must be named with its body, as in 'body.FRAME'")
     return value
 
 
@@ -146,27 +149,40 @@ class Part(BaseModel):
     )
 
 
+def given_once(part: Part, ways: tuple[str, ...]) -> None:
+    """ValueError when an orientation is given in more than one of these ways."""
+    given = [name for name in ways if getattr(part, name) is not None]
+    if len(given) > 1:
+        raise ValueError(f"an orientation is given once, not by {' and '.join(given)}")
+
+
 class Pose(Part):
     """Position and orientation of a frame in its parent; at most one way to say the orientation.
 
     axes: two of the frame's axes as directions in the parent, e.g. ``{ z = [0, 1, 2], x = [1, 0, 0] }``;
     the first is exact, the second is made perpendicular to it. Or all three, as a list [x, y, z].
+    axis: direction of z alone, where x and y do not matter; the frame is turned from its parent by the least
+    rotation that brings z there (for the parent's -z, by half a turn about x).
     """
 
     position: Position = (0.0, 0.0, 0.0)
     quaternion: tuple[float, float, float, float] | None = None
     rotation_vector: RotationVector | None = None
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    axis: Direction | None = None
 
     @model_validator(mode="after")
     def _one_orientation(self) -> Pose:
-        given = [n for n in ("quaternion", "rotation_vector", "axes") if getattr(self, n) is not None]
-        if len(given) > 1:
-            raise ValueError(f"an orientation is given once, not by {' and '.join(given)}")
+        given_once(self, ("quaternion", "rotation_vector", "axes", "axis"))
         if self.quaternion is not None and not 0.999 < float(np.linalg.norm(self.quaternion)) < 1.001:
-            raise ValueError(f"the quaternion {list(self.quaternion)} (w, x, y, z) has not the norm 1")
+            raise ValueError(
+                f"a quaternion (w, x, y, z) must have the norm 1; {list(self.quaternion)} has "
+                f"{np.linalg.norm(self.quaternion):.6g}"
+            )
         if self.axes is not None:
             axes_to_matrix(self.axes)
+        if self.axis is not None:
+            axis_to_matrix(self.axis)
         return self
 
     def as_quaternion(self) -> np.ndarray:
@@ -177,4 +193,6 @@ class Pose(Part):
             return rotation_vector_to_quaternion(np.array(self.rotation_vector))
         if self.axes is not None:
             return matrix_to_quaternion(axes_to_matrix(self.axes))
+        if self.axis is not None:
+            return matrix_to_quaternion(axis_to_matrix(self.axis))
         return np.array([1.0, 0.0, 0.0, 0.0])

@@ -54,15 +54,19 @@ class Step(Part):
     @classmethod
     def _not_empty(cls, value: tuple[float | str, ...]) -> tuple[float | str, ...]:
         if not value:
-            raise ValueError("a step law has at least one step")
+            raise ValueError("a step law needs at least one step")
         return value
 
     @model_validator(mode="after")
     def _same_length(self) -> Step:
         if not len(self.start) == len(self.end) == len(self.change):
-            raise ValueError("start, end and change have one entry per step each")
-        if any(not a < b for a, b in zip(self.start, self.end, strict=True)):
-            raise ValueError("each step ends after it starts")
+            raise ValueError(
+                "start, end and change must have one entry per step each; "
+                f"they have {len(self.start)}, {len(self.end)} and {len(self.change)}"
+            )
+        for a, b in zip(self.start, self.end, strict=True):
+            if not a < b:
+                raise ValueError(f"each step must end after it starts; start = {a:g} s, end = {b:g} s")
         return self
 
 
@@ -97,7 +101,10 @@ class Harmonic(Part):
     def _same_length(self) -> Harmonic:
         phases = self.frequency if self.phase is None else self.phase
         if not len(self.amplitude) == len(self.frequency) == len(phases):
-            raise ValueError("amplitude, frequency and phase have one entry per harmonic each")
+            raise ValueError(
+                "amplitude, frequency and phase must have one entry per harmonic each; "
+                f"they have {len(self.amplitude)}, {len(self.frequency)} and {len(phases)}"
+            )
         return self
 
 
@@ -117,7 +124,9 @@ class Spline(Part):
     @model_validator(mode="after")
     def _drawable(self) -> Spline:
         if len(self.time) != len(self.value):
-            raise ValueError(f"there are {len(self.time)} times, but {len(self.value)} values")
+            raise ValueError(
+                f"each time must have one value; there are {len(self.time)} times, but {len(self.value)} values"
+            )
         _check_points(self.time, self.degree, self.ends)
         return self
 
@@ -165,7 +174,10 @@ class Table(Part):
     def _drawable(self) -> Table:
         _check_points([t for t, _ in self.points], self.degree, self.ends)
         if self.ends == "periodic" and self.points[0][1] != self.points[-1][1]:
-            raise ValueError("a periodic table ends with the value that it starts with")
+            raise ValueError(
+                "a periodic table must end with the value that it starts with; "
+                f"it starts with {self.points[0][1]:g} and ends with {self.points[-1][1]:g}"
+            )
         return self
 
 
@@ -193,7 +205,7 @@ class Piecewise(Part):
     def _ordered(self) -> Piecewise:
         starts = [s.start for s in self.sections]
         if any(not a < b for a, b in pairwise(starts)):
-            raise ValueError(f"the sections start one after the other, not at {starts}")
+            raise ValueError(f"the sections must start one after the other, not at {starts} s")
         return self
 
 
@@ -281,4 +293,4 @@ def _check_points(time: tuple[float, ...] | list[float], degree: int, ends: str)
         )
     for k, (a, b) in enumerate(pairwise(time), start=2):
         if not a < b:
-            raise ValueError(f"times increase from point to point, but point {k} at {b} s follows one at {a} s")
+            raise ValueError(f"times must increase from point to point; point {k} at {b} s follows one at {a} s")

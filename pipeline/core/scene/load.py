@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.mistakes import input_errors
+from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
@@ -125,15 +126,9 @@ def read_toml(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise InputError(str(path), f"cannot be read: {error.strerror}", "name a TOML file") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(str(path), f"is not TOML: {error}", _toml_hint(str(error))) from None
+        raise not_toml(path, path.read_text(encoding="utf-8-sig"), str(error)) from None
     except RecursionError:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
-
-
-def _toml_hint(message: str) -> str | None:
-    if "at the end of a table declaration" in message or "after a key" in message:
-        return "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
-    return None
 
 
 def _neighbours(path: Path) -> str | None:

@@ -55,9 +55,9 @@ class SpringDamper(Part):
     @model_validator(mode="after")
     def _acts(self) -> SpringDamper:
         if self.stiffness == 0.0 and self.damping == 0.0:
-            raise ValueError("a spring-damper has a stiffness, a damping, or both")
+            raise ValueError("a spring-damper needs a stiffness, a damping, or both; it has neither")
         if self.stiffness > 0.0 and self.free_length is None:
-            raise ValueError("a spring has a free_length, at which it pulls and pushes nothing")
+            raise ValueError("a spring needs a free_length, at which it pulls and pushes nothing; none is given")
         return self
 
 

@@ -20,7 +20,18 @@ EXPECTED = {
     "missing": "is missing",
     "extra_forbidden": "unknown key",
     "union_tag_not_found": "is missing",
+    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "expected a whole number"),
 }
+#: findings that a value is of another kind than one alternative of several: another alternative may fit better
+OTHER_KIND = ("literal_error", "model_type", "dict_type", "tuple_type", "list_type", "string_type", "float_type")
+OTHER_KIND += ("int_type", "int_parsing", "int_from_float")
+#: keys by which a part says which of several it is
+CHOOSING = ("type", "law")
+#: bounds of numbers, whose messages hold the bound
+BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+
+#: how pydantic calls, in a place, the alternative of a number or text that a validator reads
+VALIDATORS = ("function-", "constrained-", "literal[")
 
 #: models that are chosen otherwise than by their type -> how pydantic calls them in a place
 TAGS = {
@@ -37,8 +48,23 @@ TAGS = {
 
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
     """Everything that pydantic found in a file that should be a `model`."""
-    unique = {str(found): found for found in (_input_error(path, e, model) for e in error.errors())}
+    places: dict[str, list[tuple[str, InputError]]] = {}
+    for e in error.errors():
+        found = _input_error(path, e, model)
+        places.setdefault(found.place, []).append((e["type"], found))
+    unique = {str(found): found for there in places.values() for found in _nearest(there)}
     return InputErrors(list(unique.values()))
+
+
+def _nearest(there: list[tuple[str, InputError]]) -> list[InputError]:
+    """What to tell of one place: where there are alternatives, only what is wrong with those of the value's kind."""
+    fitting = [found for kind, found in there if kind not in OTHER_KIND]
+    others = {found.problem: found for kind, found in there if kind in OTHER_KIND}
+    if fitting or len(others) < 2:
+        return fitting or list(others.values())
+    problems = [problem.partition(" (got ") for problem in others]
+    rules = list(dict.fromkeys(rule.removeprefix("must be ").removeprefix("expected ") for rule, _, _ in problems))
+    return [InputError(there[0][1].place, f"expected {' or '.join(rules)}{''.join(problems[0][1:])}")]
 
 
 def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputError:
@@ -48,14 +74,20 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     if kind == "extra_forbidden":
         remedy = suggestion(str(keys[-1]), [key for key in known if key != keys[-1]])
     elif kind == "union_tag_not_found":
-        keys, remedy = [*keys, "type"], f"one of: {', '.join(types)}"
+        keys, remedy = [*keys, _choosing(context)], f"one of: {', '.join(types)}"
     elif kind == "union_tag_invalid":
-        keys, value = [*keys, "type"], context["tag"]
-        message, remedy = "there is no such type", suggestion(str(value), types)
+        keys, value = [*keys, _choosing(context)], context["tag"]
+        message, remedy = f"there is no such {keys[-1]}", suggestion(str(value), types)
     place = ".".join(str(key) for key in keys if key != "[key]")
     told = isinstance(value, (str, int, float)) and kind not in ("missing", "union_tag_not_found")
-    shown = f" (got {value!r})" if told and repr(value) not in message else ""
+    shown = f" (got {value!r})" if told and (kind in BOUNDS or repr(value) not in message) else ""
     return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}", remedy)
+
+
+def _choosing(context: dict[str, Any]) -> str:
+    """The key by which pydantic looks for the right model; chosen by several keys, a part is told by its type."""
+    key = str(context.get("discriminator", "")).strip("'")
+    return key if key in CHOOSING else "type"
 
 
 def _reworded(error: Any) -> str:
@@ -80,7 +112,7 @@ def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], lis
             beside, here = _keys(here), inner
         elif any(_chosen_by(a, key) for a in here):
             here = [a for a in here if _chosen_by(a, key)]
-        elif any(_is_model(a) for a in here):
+        elif any(_is_model(a) for a in here) and not str(key).startswith(VALIDATORS):
             keys.append(key)
             beside, here = _keys(here), []
     return keys, beside, [kind for a in here for kind in _types(a)]
@@ -119,8 +151,9 @@ def _keys(alternatives: list[Any]) -> list[str]:
 
 def _types(alternative: Any) -> tuple[str, ...]:
     """Names by which a part says that it is this one."""
-    info = alternative.model_fields.get("type") if _is_model(alternative) else None
-    return get_args(info.annotation) if info is not None and get_origin(info.annotation) is Literal else ()
+    fields = alternative.model_fields if _is_model(alternative) else {}
+    found = (fields[key].annotation for key in CHOOSING if key in fields)
+    return tuple(name for annotation in found if get_origin(annotation) is Literal for name in get_args(annotation))
 
 
 def _chosen_by(alternative: Any, tag: Any) -> bool:

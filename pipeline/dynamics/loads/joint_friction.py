@@ -37,14 +37,20 @@ class JointFriction:
         """Viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], their speeds."""
         viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
         if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
-            raise ValueError(f"viscous = {viscous:.6g} is not negative; without coulomb it is not zero either")
+            raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
         dry = (0.0, 0.0, 1.0, 2.0)
         if load.coulomb is not None:
             speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
             forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
             dry = (*forces, quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
             if not 0.0 <= dry[1] <= dry[0]:
-                raise ValueError(f"coulomb: 0 <= dynamic <= static, but dynamic = {dry[1]:.6g}, static = {dry[0]:.6g}")
+                raise ValueError(
+                    "coulomb: dynamic must not be negative, nor exceed static; "
+                    f"dynamic = {dry[1]:.6g}, static = {dry[0]:.6g}"
+                )
             if not 0.0 < dry[2] < dry[3]:
-                raise ValueError(f"coulomb: 0 < v_static < v_dynamic, but they are {dry[2]:.6g} and {dry[3]:.6g}")
+                raise ValueError(
+                    "coulomb: v_static must be positive and below v_dynamic; "
+                    f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
+                )
         return Row(joint=load.joint, numbers=(viscous, *dry))

@@ -36,7 +36,8 @@ class JointSpring:
         stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
         if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:
             raise ValueError(
-                f"stiffness {stiffness:.6g} and damping {damping:.6g} are not negative, and one of them is not zero"
+                "stiffness and damping must not be negative, and not both be zero; "
+                f"stiffness = {stiffness:.6g}, damping = {damping:.6g}"
             )
         numbers = (stiffness, damping, quantity(load.rest, coordinate.dimension))
         return Row(joint=load.joint, numbers=numbers, counts_turns=coordinate.turning)

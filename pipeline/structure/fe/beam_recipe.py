@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from pipeline.core.algebra import axes_to_matrix
-from pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position
+from pipeline.core.algebra import axes_to_matrix, axis_to_matrix
+from pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
 from pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
 from pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
@@ -91,18 +91,23 @@ class NodeFrame(Part):
 
     axes: as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod.
     A pin across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``.
+    axis: as of a pose, the direction of z alone: ``axis = [0, 0, 1]``.
     """
 
     x: Length
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    axis: Direction | None = None
 
     @model_validator(mode="after")
     def _orthogonal_axes(self) -> NodeFrame:
+        given_once(self, ("axes", "axis"))
         self.orientation()
         return self
 
     def orientation(self) -> np.ndarray:
         """Columns: x, y, z of the frame in rod axes."""
+        if self.axis is not None:
+            return axis_to_matrix(self.axis)
         return FRAME_ROTATION if self.axes is None else axes_to_matrix(self.axes)
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import Field, model_validator
 
 from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import Density, Direction, Number, Part, Pose, Pressure
+from pipeline.core.scene.fields import Density, Direction, Number, Part, Pose, Pressure, given_once
 
 Positive = Field(gt=0.0)
 
@@ -27,18 +27,20 @@ class Isotropic(Part):
 
 
 class TurnedFrame(Part):
-    """A named frame with axes of its own, as of a pose; default: those of the mesh."""
+    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's."""
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    axis: Direction | None = None
 
     @model_validator(mode="after")
     def _orthogonal_axes(self) -> TurnedFrame:
+        given_once(self, ("axes", "axis"))
         self.orientation()
         return self
 
     def orientation(self) -> Pose:
         """The orientation as a pose at the origin."""
-        return Pose(axes=self.axes)
+        return Pose(axes=self.axes, axis=self.axis)
 
 
 def check_interfaces(interfaces: tuple[str, ...], frames: Mapping[str, object]) -> None:
