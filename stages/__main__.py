@@ -97,6 +97,7 @@ def _run(options: argparse.Namespace) -> None:
         print("\n\n".join(filter(None, (run.deficits(graph, place, outcome) for graph in graphs))))
     if options.out is not None:
         run.copy_run(graphs[0], place, options.out)
+    run.conclude(graphs, place, outcome)
 
 
 def _why(options: argparse.Namespace) -> None:
