@@ -17,9 +17,9 @@ from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
-from pipeline.dynamics.run import ledger
+from pipeline.dynamics.run import ledger, validity
 from pipeline.dynamics.run.coordinates import joint_coordinates
-from pipeline.dynamics.run.run import Run
+from pipeline.dynamics.run.run import Run, deepest
 from pipeline.dynamics.run.trajectory import Trajectory
 
 #: event kinds by their flag values; 0 and 1 as ever
@@ -60,7 +60,7 @@ def dataset(run: Run) -> xr.Dataset:
     variables.update(ledger.series(model, seen))
     topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
     made = xr.Dataset(variables | topological, coords=coordinates | named)
-    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run), **_told(model, trajectory))
+    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run), **_told(run))
     if "event_kind" in result:
         result["event_kind"].attrs |= {
             "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
@@ -83,19 +83,21 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
-def _told(model: Model, trajectory: Trajectory) -> dict[str, str]:
+def _told(run: Run) -> dict[str, str]:
     """Laws of the contacts, and in words what is to be doubted."""
-    told = "\n".join(warnings(model, trajectory))
+    model, told = run.engine.model, "\n".join(warnings(run))
     if not model.mechanism.contacts:
         return {"warnings": told} if told else {}
-    from pipeline.dynamics.contact import validity
+    from pipeline.dynamics.contact.validity import laws
 
-    return {"contacts": validity.laws(model.mechanism.contacts, model.laws), "warnings": told}
+    return {"contacts": laws(model.mechanism.contacts, model.laws), "warnings": told}
 
 
-def warnings(model: Model, trajectory: Trajectory) -> list[str]:
+def warnings(run: Run) -> list[str]:
     """Sentences about what a run is to be doubted for."""
-    return [*_contact_warnings(model, trajectory), *_step_warnings(model, trajectory)]
+    model, trajectory = run.engine.model, run.trajectory
+    bodies = validity.warnings(model, trajectory.time, run.observed)
+    return [*_contact_warnings(run), *bodies, *_step_warnings(model, trajectory)]
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
@@ -110,17 +112,18 @@ def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
     ]
 
 
-def _contact_warnings(model: Model, trajectory: Trajectory) -> list[str]:
+def _contact_warnings(run: Run) -> list[str]:
     """Sentences about contacts that left the range for which their laws were made."""
+    model, found = run.engine.model, list[str]()
     if not model.mechanism.contacts:
-        return []
-    from pipeline.dynamics.contact import validity
+        return found
+    from pipeline.dynamics.contact.validity import warnings as told
 
-    e, found = trajectory.events, []
-    for c, ((name, joint, _, _), law) in enumerate(zip(model.mechanism.contacts, model.laws, strict=True)):
-        mine = e[e[:, m.EVENT.contact] == c]
-        depth, force = np.fmax.reduce(mine[:, [m.EVENT.peak_depth, m.EVENT.peak_force]], axis=0, initial=0.0)
-        found += validity.warnings(name, joint, law, float(depth), float(force))
+    depths, forces = deepest(model, run.trajectory, run.observed)
+    for (name, joint, _, _), law, depth, force in zip(
+        model.mechanism.contacts, model.laws, depths, forces, strict=True
+    ):
+        found += told(name, joint, law, float(depth), float(force))
     return found
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.run import singular
+from pipeline.dynamics.run import singular, validity
 from pipeline.dynamics.run.engine import Engine
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
@@ -48,7 +48,8 @@ def text(engine: Engine) -> str:
         f"({where}): give it another motion{_other_integrator(engine)}",
         m.LOST_CLOSURE: unsolvable,
     }
-    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}"
+    doubted = "".join(f"; {sentence}" for sentence in validity.doubts(engine))
+    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}{doubted}"
 
 
 def _other_integrator(engine: Engine) -> str:

@@ -15,7 +15,7 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
+from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run.beside import beside
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.run.ledger import require_closed
@@ -70,8 +70,32 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     start, residual = consistent_start(engine)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
+    _require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
     return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched)
+
+
+def deepest(model: Model, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Largest penetration [m] and normal force [N] of every contact, of its events and of the observed rows."""
+    touch, e = seen["touch"].reshape(len(seen["touch"]), -1, m.TOUCH.size), trajectory.events
+    depths = np.fmax.reduce(-touch[..., m.TOUCH.gap], axis=0, initial=0.0)
+    forces = np.fmax.reduce(touch[..., m.TOUCH.normal_force], axis=0, initial=0.0)
+    for c in range(touch.shape[1]):
+        mine = e[e[:, m.EVENT.contact] == c]
+        peaks = np.fmax.reduce(mine[:, [m.EVENT.peak_depth, m.EVENT.peak_force]], axis=0, initial=0.0)
+        depths[c], forces[c] = max(depths[c], peaks[0]), max(forces[c], peaks[1])
+    return depths, forces
+
+
+def _require_shallow(model: Model, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> None:
+    """SolverError for a contact so deep that its surfaces mean nothing."""
+    if not model.mechanism.contacts:
+        return
+    from pipeline.dynamics.contact.validity import refuse_deep
+
+    depths, _ = deepest(model, trajectory, seen)
+    for (name, joint, _, _), depth in zip(model.mechanism.contacts, depths, strict=True):
+        refuse_deep(name, joint, float(depth))
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.run import refusal, singular
+from pipeline.dynamics.run import refusal, singular, validity
 from pipeline.dynamics.run.engine import Engine, Progress, overlapping
 from pipeline.dynamics.run.handover import Handover, StiffError, hand_over, take_over
 from pipeline.dynamics.run.singular_start import depart
@@ -69,7 +69,10 @@ class Trajectory:
 
 @dataclass
 class _Run:
-    """The arrays of one integration; the record may be replaced by a larger one."""
+    """The arrays of one integration; the record may be replaced by a larger one.
+
+    doubted: flexible bodies of which has been said that they left the range of their modes.
+    """
 
     w: np.ndarray
     n: np.ndarray
@@ -77,6 +80,7 @@ class _Run:
     rows: np.ndarray
     events: np.ndarray
     selections: list[tuple[float, np.ndarray]]
+    doubted: set[str] = field(default_factory=set)
 
 
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
@@ -216,8 +220,19 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
         elif _crawls(engine, run):
             left = hand_over(engine, run.rows, run.events, run.selections)
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", left)
-        elif stop(run.rows[: n[m.N_RECORDED]]):
-            return True
+        else:
+            _warn(engine, run, progress)
+            if stop(run.rows[: n[m.N_RECORDED]]):
+                return True
+
+
+def _warn(engine: Engine, run: _Run, progress: Progress) -> None:
+    """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
+    for sentence in validity.doubts(engine):
+        body = sentence.partition(":")[0]
+        if body not in run.doubted:
+            run.doubted.add(body)
+            progress(None, f"warning: {sentence}")
 
 
 def _crawls(engine: Engine, run: _Run) -> bool:
