@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, diags_array, eye_array
 from pipeline.core.algebra import rotation_vector_to_matrix, skew
 from pipeline.core.errors import InputError
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model import given_start
 from pipeline.dynamics.model.chain import path_positions
 from pipeline.dynamics.model.constraints import NONE, Constraint, constraints, demands, massless, prescribed
 from pipeline.dynamics.model.driving import joint_class
@@ -48,7 +49,8 @@ class Misfit:
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
     """The system with links placed so that all joints fit and driven ones stand where their drives say.
 
-    Raises InputError for joints whose frames start far apart or face each other the wrong way, and
+    Raises InputError for joints whose frames start far apart or face each other the wrong way, for poses given that
+    contradict a drive, and
     for a mechanism that cannot be assembled, with the residual of every joint.  A system with flexible bodies
     or paths is only checked: deformation and prescribed poses are part of its closing, which the engine does.
     given: laws that replace the scene's.
@@ -56,7 +58,10 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     joints, poses = constraints(mechanism, given), [link.start for link in mechanism.links]
     _refuse_apart(mechanism, joints, poses)
     _refuse_opposite(joints, poses)
-    mechanism = replace(mechanism, start_residual=max(residuals(joints, poses).values(), default=0.0))
+    missed = given_start.misses(mechanism, joints, poses, given)
+    given_start.refuse_far(mechanism, missed)
+    residual = max([*residuals(joints, poses).values(), *(miss.size for miss in missed)], default=0.0)
+    mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
     paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in mechanism.links)
     if paths or any(link.flexible for link in mechanism.links):
         return settled(mechanism, poses)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import Ground
+from pipeline.core.scene.parts import FlexibleBody, Ground, RigidBody
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.chain import path_positions
 from pipeline.dynamics.model.constraints import outboard_place
@@ -23,6 +23,10 @@ Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 #: misses below this share of the speeds asked for are rounding
 RIGID = 1e-9
+#: given velocities that are missed by less than this, by 1 + the largest, were given as well as they were written
+WRITTEN = 1e-6
+#: given velocities that are missed by more than this share of the largest one are a mistake, not a rough start
+WRONG = 0.05
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
 
@@ -66,18 +70,14 @@ def _world(model: Model, frame: str) -> Placement:
     return model.mechanism.links[site.link].start.of(site.place)
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
+def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
     Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
+    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
     Raises InputError when joints and drives do not allow the velocities.
     """
-    scene, numbering = model.scene, model.numbering
-    wanted = {
-        n: b
-        for n, b in scene.body.items()
-        if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
-    }
+    numbering, wanted = model.numbering, with_velocities(model)
     elastic = np.zeros(numbering.nv, dtype=bool)
     for link, first in numbering.flex_c0.items():
         elastic[first : first + numbering.modes[link]] = True
@@ -86,8 +86,8 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     y = y.copy()
     nq, nv = numbering.nq, numbering.nv
     y[nq : nq + nv] = 0.0
-    given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told, arms = ~np.isnan(given), _arms(model, wanted)
+    given, arms = _given(wanted), _arms(model, wanted)
+    told = ~np.isnan(given)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
@@ -104,15 +104,47 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     speeds, miss = _least(matrix * ~elastic, target)
     if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
         speeds, miss = _least(matrix, target)
-    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
+    largest = float(np.max(np.abs(given[told]), initial=0.0))
+    if wanted and miss > max(WRITTEN * (1.0 + largest), share * largest):
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g})",
+            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g}, where "
+            f"up to {100.0 * share:g} % of the largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
         )
     y[nq : nq + nv] = speeds
     return y
+
+
+def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
+    """The bodies that the scene gives velocities, by name."""
+    return {
+        name: body
+        for name, body in model.scene.body.items()
+        if not isinstance(body, Ground) and (body.velocity is not None or body.angular_velocity is not None)
+    }
+
+
+def changed_velocities(model: Model, link_frames: np.ndarray) -> list[str]:
+    """Sentences about bodies that do not start with the velocities that the scene gives, with amounts."""
+    wanted, found = with_velocities(model), []
+    given = _given(wanted).reshape(-1, 6)
+    apart = np.abs(_twists(link_frames, *_arms(model, wanted)).reshape(-1, 6) - given)
+    limit = WRITTEN * (1.0 + float(np.nanmax(np.abs(given), initial=0.0)))
+    for name, row in zip(wanted, apart, strict=True):
+        turning, moving = np.fmax.reduce(row.reshape(2, 3), axis=1, initial=0.0)
+        if max(turning, moving) > limit:
+            found.append(
+                f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
+                f"{moving:.3g} m/s and {turning:.3g} rad/s"
+            )
+    return found
+
+
+def _given(wanted: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
+    """Angular velocity and velocity given for each body, flattened; nan where none is."""
+    return np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:

@@ -97,7 +97,7 @@ def warnings(run: Run) -> list[str]:
     """Sentences about what a run is to be doubted for."""
     model, trajectory = run.engine.model, run.trajectory
     bodies = validity.warnings(model, trajectory.time, run.observed)
-    return [*_contact_warnings(run), *bodies, *_step_warnings(model, trajectory)]
+    return [*run.mended, *_contact_warnings(run), *bodies, *_step_warnings(model, trajectory)]
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
@@ -145,6 +145,8 @@ def _counts(run: Run) -> dict[str, str | int]:
     redundant = run.engine.mobility.redundant
     found: dict[str, str | int] = {"redundant_closure_rows": redundant}
     found["method"] = run.engine.model.scene.solver.integrator
+    if run.mended:
+        found["start_mended"] = "\n".join(run.mended)
     if run.switched:
         found["switched"] = run.switched
     if redundant:

@@ -16,6 +16,8 @@ from pipeline.dynamics.effects import scheme_of
 from pipeline.dynamics.equations import observation as observing
 from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import initial, selection
+from pipeline.dynamics.model.given_start import moved
+from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
@@ -141,13 +143,24 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
         frames = engine.view(m.LINK_FRAMES.place, m.FRAME.size * links).reshape(links, m.FRAME.size)
         return frames, engine.view(m.RESIDUAL_RATE, rows).copy()
 
-    y = initial.given_velocities(model, motion, y)
+    # a singular pose has no rates to project on
+    y = initial.given_velocities(model, motion, y, 0.0 if engine.mobility.singular_start else initial.WRONG)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.parts.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, model.mechanism.start_residual
+
+
+def mends(engine: Engine, y: np.ndarray) -> list[str]:
+    """Sentences about what a consistent start y has changed of the poses and velocities that the scene gives."""
+    _look(engine, y)
+    model, links = engine.model, engine.model.arrays.size(m.N_LINKS)
+    frames = engine.view(m.LINK_FRAMES.place, m.FRAME.size * links).reshape(links, m.FRAME.size)
+    axes = frames[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3)
+    now = [Placement(p, R) for p, R in zip(frames[:, m.FRAME.origin : m.FRAME.origin + 3], axes, strict=True)]
+    return [*moved(model.mechanism, now), *initial.changed_velocities(model, frames)]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:

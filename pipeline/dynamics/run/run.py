@@ -17,7 +17,7 @@ from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run.beside import beside
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
+from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, mends, observe, prepare
 from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.switching import follow, implicit
 from pipeline.dynamics.run.trajectory import Trajectory
@@ -33,6 +33,7 @@ class Run:
     scene: as the user gave it; the engine may hold another, made for it.
     start_residual: loops' residual as the scene gives its start [m].
     twin: the run's twin, of scenes with contacts.
+    mended: what was changed of the start that the scene gives, in words.
     switched: from when on and why an implicit integrator took the place of the scene's; empty when none did.
     """
 
@@ -43,6 +44,7 @@ class Run:
     start_residual: float
     twin: Twin | None
     switched: str = ""
+    mended: tuple[str, ...] = ()
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
@@ -68,11 +70,14 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands."""
     engine, other = engines(scene, bundles, progress)
     start, residual = consistent_start(engine)
+    mended = tuple(mends(engine, start))
+    for sentence in mended:
+        progress(None, sentence)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
     _require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched)
+    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched, mended)
 
 
 def deepest(model: Model, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
