@@ -104,7 +104,7 @@ def _inertia(value: Any) -> list[list[float]]:
     if moments[0] < -_ROUNDING * moments[2] or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise ValueError(
             f"principal moments {moments.tolist()} kg m^2 belong to no body: "
-            "each must be >= 0 and at most the sum of the others"
+            "each is >= 0 and at most the sum of the others"
         )
     return rows.tolist()
 
