@@ -96,6 +96,7 @@ def _advance(kinds: Kinds, scheme: Scheme) -> str:
         f"from {module_of(PACKAGES['integrator'], scheme.integrator)} import METHOD",
         *_event_lines(kinds.contacts, scheme),
         *_projection_lines(kinds.closures),
+        *_pose_lines(kinds.closures),
         _ADVANCE,
     )
 
@@ -116,6 +117,10 @@ def _projection_lines(present: bool) -> list[str]:
     if present:
         return ["project = calls.project"]
     return ["from pipeline.dynamics.equations.projection import none as project"]
+
+
+def _pose_lines(closures: bool) -> list[str]:
+    return [f"from pipeline.dynamics.integrate.singular_step import {'POSES' if closures else 'NO_POSES'} as poses"]
 
 
 def _imports(family: str, names: tuple[str, ...], functions: tuple[str, ...], table: str = "NAMES") -> list[str]:
@@ -253,7 +258,7 @@ def observe(h, f, w, n, rows, pieces, tolerance, out):
     observer(h, f, w, n, rows, pieces, tolerance, out)
 """
 # one function for both tasks: each would be an object of its own to fetch
-_ADVANCE = """step = stepper.compose(calls.evaluate, project, calls.retract, METHOD, stepping.compose, events)
+_ADVANCE = """step = stepper.compose(calls.evaluate, project, calls.retract, METHOD, stepping.compose, events, poses)
 
 
 @njit(

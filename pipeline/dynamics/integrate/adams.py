@@ -82,4 +82,4 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
     return begin, attempt, None, hermite.make_extend(LAST), keep
 
 
-METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, memory=memory)
+METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, memory=memory)

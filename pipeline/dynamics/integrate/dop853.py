@@ -78,4 +78,4 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
 
 
 # 6.1: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
-METHOD = Method(EXTENDED + 1, STAGES, 8, ERROR_ORDER, compose, interpolate, stability=6.1, gap=0.467)
+METHOD = Method(EXTENDED + 1, STAGES, 8, ERROR_ORDER, compose, interpolate, stability=6.1)

@@ -99,4 +99,4 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
 
 
 # 3.25: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
-METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, gap=0.55, stability=3.25)
+METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, stability=3.25)

@@ -1,5 +1,5 @@
-"""Steps of the length that the scene gives, shortened only to end on events, drive breaks and the run's end, and to
-be laid over singular poses."""
+"""Steps of the length that the scene gives, shortened only to end on events, drive breaks, the run's end, and before
+singular poses."""
 
 from __future__ import annotations
 
@@ -7,8 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import singular_step as straddle
-from pipeline.dynamics.integrate.singular_step import steer
 from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
 from pipeline.dynamics.kernels import kernel
 
@@ -16,8 +14,7 @@ from pipeline.dynamics.kernels import kernel
 def compose(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, judge, after_rejection, next_step, lay and foresee of the stepper."""
-    gap = method.gap
+    """The kernels first_step, judge, after_rejection and next_step of the stepper."""
     start_watch, _ = contacts
 
     @kernel
@@ -60,10 +57,5 @@ def compose(
         """All steps are alike."""
         return w[h[m.CONTROL] + m.FIXED]
 
-    @kernel
-    def lay(h, w, t):
-        """Length of the step to try from t: as given, unless a singular pose is ahead."""
-        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, 1.0)
-
     good = judge if method.stability is None else judge_with_scales
-    return first_step, good, after_rejection, next_step, lay, straddle.compose(evaluate)
+    return first_step, good, after_rejection, next_step

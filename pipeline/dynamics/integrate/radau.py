@@ -273,4 +273,4 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
     return begin, attempt, error, extend, keep
 
 
-METHOD = Method(ROWS, LAST, hermite.ROWS, ERROR_ORDER, compose, hermite.interpolate, steady=1.2, gap=0.4, memory=memory)
+METHOD = Method(ROWS, LAST, hermite.ROWS, ERROR_ORDER, compose, hermite.interpolate, steady=1.2, memory=memory)

@@ -25,4 +25,4 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
 
 
 # 2.785: its stability polynomial 1 + z + z^2/2 + z^3/6 + z^4/24 is 1 there
-METHOD = Method(STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate, gap=0.25, stability=2.785)
+METHOD = Method(STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate, stability=2.785)

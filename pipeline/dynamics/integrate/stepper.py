@@ -8,6 +8,7 @@ evaluations is used, so that the caller can report progress and be interrupted. 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,14 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.projection import largest
 from pipeline.dynamics.integrate.rows import hold_modes, snapshot
 from pipeline.dynamics.integrate.scales import keep_scales
-from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
+from pipeline.dynamics.integrate.singular_step import Poses
 from pipeline.dynamics.integrate.stiffness import detect
 from pipeline.dynamics.kernels import kernel
 
 #: what settle returns for an event after which integration starts afresh; another positive number only records it
 RESTART = 1
-#: share of the mechanism's size to which closures are closed before a singular pose
-TIGHTLY = 1e-15
+#: share of the planned step below which a step has been cut short
+CUT = 0.9
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
@@ -67,6 +68,14 @@ def finite(h, w, a):
 
 
 @kernel
+def plan(h, w, step, following):
+    """The step to try next; one that was cut short says little about how long it may be."""
+    planned = h[m.CONTROL] + m.STEP
+    least = w[planned] if step < CUT * w[planned] else 0.0
+    w[planned] = max(following, least)
+
+
+@kernel
 def watch_nothing(h, w):
     """No contact to watch."""
 
@@ -94,20 +103,22 @@ def compose(
     method: Any,
     stepping: Callable,
     contact_events: tuple[Callable, Callable, Callable],
+    poses: Poses,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
     stepping: `compose` of `adaptive` or `fixed`.
     contact_events: start_watch, make_settle and closed of `events` or `step_ends`, or those that do nothing.
     """
-    begin, attempt, error, extend, keep = method.compose(evaluate, retract)
-    interpolate, last, ends = method.interpolate, method.last, method.ends
+    begin, attempt_method, error, extend_method, keep = method.compose(evaluate, retract)
+    attempt, extend, interpolate = poses.along(method, attempt_method, extend_method)
+    last, ends = method.last, method.ends
     start_watch, make_settle, closed = contact_events
-    settle = make_settle(evaluate, attempt, extend, project, method)
+    settle = make_settle(evaluate, attempt, extend, project, replace(method, interpolate=interpolate))
     feel = detect(method)
-    first_step, judge, after_rejection, next_step, lay, foresee = stepping(
-        evaluate, (start_watch, closed), begin, error, method
-    )
+    first_step, judge, after_rejection, next_step = stepping(evaluate, (start_watch, closed), begin, error, method)
+    note, stand, steer, ready, done = poses.note, poses.stand, poses.steer, poses.ready, poses.done
+    foresee, arrive = poses.foreseeing(evaluate), poses.arriving(evaluate, project, attempt, method)
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
@@ -160,8 +171,7 @@ def compose(
             return False
         w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
         w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS]))
-        share = TIGHTLY if near(h, w, t_new) else w[c + m.RTOL]
-        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, share * w[c + m.LENGTH])
+        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, w[c + m.RTOL] * w[c + m.LENGTH])
         note(h, w)
         if used > 0:
             n[m.EVALUATIONS] += used
@@ -172,13 +182,16 @@ def compose(
     @kernel
     def try_step(h, f, w, n, step, t_new):
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
+        if ready(h, w):
+            arrive(h, f, w, n, step, t_new)
+            return 0.0
         if not attempt(h, f, w, n, step):
             return FAILED
         norm = judge(h, f, w, n, step)
         if norm != norm:
             n[m.EVALUATION] = m.NOT_FINITE
             return FAILED
-        if norm > allowed(h, w):
+        if norm > 1.0:
             return min(norm, FAILED)
         if not finish(h, f, w, n, t_new):
             return FAILED
@@ -197,51 +210,84 @@ def compose(
         keep_scales(h, w)
 
     @kernel
+    def set_off(h, f, w, n):
+        """What `first_step` does for the contacts, before a step along a polynomial; True, for it can be made."""
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], h[m.SLOPES])
+        n[m.EVALUATIONS] += 1
+        start_watch(h, w)
+        n[m.EVALUATION], n[m.FRESH] = m.OK, 0
+        return True
+
+    @kernel
+    def start(h, f, w, n):
+        """Begin at the start of a segment or after an event; False when that cannot be."""
+        if ready(h, w):
+            return set_off(h, f, w, n)
+        if not first_step(h, f, w, n):
+            return False
+        note(h, w)
+        stand(h, w, w[h[m.CONTROL] + m.TIME])
+        return True
+
+    @kernel
+    def length(h, w, n, t):
+        """Length of the step to try from t; 0, with the reason in n[STATUS], when none can be."""
+        c = h[m.CONTROL]
+        step = w[c + m.COLLOCATED] if ready(h, w) else steer(h, w, t)
+        if step == 0.0:
+            n[m.STATUS] = m.SINGULAR_AHEAD
+            return 0.0
+        if t + 1.0001 * step >= w[c + m.END]:
+            step = w[c + m.END] - t
+        if step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
+            return step
+        if n[m.EVALUATION] == m.NOT_FINITE:
+            n[m.STATUS] = m.NOT_A_NUMBER
+        else:
+            n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
+        return 0.0
+
+    @kernel
     def advance(h, f, w, n, outputs, rows, events):
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
         c = h[m.CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
             t = w[c + m.TIME]
-            if n[m.FRESH]:
-                if not first_step(h, f, w, n):
-                    return
-                note(h, w)
-                forget(h, w, t)
-            step = lay(h, w, t)
-            final = t + 1.0001 * step >= w[c + m.END]
-            if final:
-                step = w[c + m.END] - t
-            if not step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
-                if n[m.EVALUATION] == m.NOT_FINITE:
-                    n[m.STATUS] = m.NOT_A_NUMBER
-                else:
-                    n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
+            if n[m.FRESH] and not start(h, f, w, n):
                 return
+            step = length(h, w, n, t)
+            if step == 0.0:
+                return
+            final = t + 1.0001 * step >= w[c + m.END]
             t_new = w[c + m.END] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
-            if norm > allowed(h, w):
+            if norm > 1.0:
                 n[m.REJECTED] += 1
                 if not after_rejection(h, w, n, step, norm):
                     return
                 continue
-            following = next_step(h, w, n, step, norm)
+            along = ready(h, w)
+            following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, ready, t_new, step = settle(h, f, w, n, step, t_new, events)
+            happened, dense, t_new, step = settle(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
             n[m.STEPS] += 1
-            straddling = w[c + m.STRADDLING] > 0.0
-            if straddling:
+            if along:
                 snapshot(h, w, n, rows, t, h[m.Y])
-            record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
+            record_outputs(h, f, w, n, step, dense, outputs, rows, t_new)
             keep(h, f, w, n, step)
             accept(h, w, t_new)
             plan(h, w, step, following)
-            foresee(h, f, w, n, t_new)
-            if happened > 0 or straddling:
+            if along:
+                done(h, w, t_new)
+                n[m.FRESH] = 1
+            else:
+                foresee(h, f, w, n, t_new)
+            if happened > 0 or along:
                 hold_modes(h, w, n)
                 snapshot(h, w, n, rows, t_new, h[m.Y])
-            if happened > 0:
+            if happened > 0 and not along:
                 n[m.FRESH] = 1 if happened == RESTART else 0
 
     return advance

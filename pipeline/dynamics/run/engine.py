@@ -56,6 +56,12 @@ class Engine:
                 times.append(t)
         return np.array([*times, self.end])
 
+    @property
+    def floors(self) -> np.ndarray:
+        """Unit of every state variable: one radian, the mechanism's size, both per second, and so on; (n,)."""
+        arrays = self.model.arrays
+        return np.asarray(arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"]])
+
     def select_pieces(self, inside: float) -> None:
         """Put the pieces of the laws in force that hold at `inside`, which is no break."""
         first = self.n[m.ACTIVE]
@@ -88,6 +94,12 @@ class Engine:
         self.view(m.Y, len(y))[:] = y
         self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
+
+    def independence(self) -> np.ndarray:
+        """How far each kept closure row is from depending on those before it, at the last evaluated state."""
+        envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
+        diagonal = envelope["start"] - envelope["first"] + np.arange(len(envelope))
+        return np.abs(self.w[self.model.arrays.offset(m.SCHUR) + diagonal])
 
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
@@ -214,17 +226,21 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> dict[st
     On a break the laws hold as before it, or as after it.
     Fields and widths: `pipeline.dynamics.equations.observation`; shape (rows, width) each.
     """
-    model = engine.model
-    arrays, segments = model.arrays, engine.breaks
+    model, segments = engine.model, engine.breaks
     sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
     per_segment = {x: pieces_at(model, x) for x in set(middles.tolist())}
-    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64).reshape(
-        len(rows), arrays.size(m.N_LAWS)
-    )
+    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64)
+    return observe_with(engine, rows, pieces, max(RECORD_SHARE * engine.rtol, ROUNDING))
+
+
+def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> dict[str, np.ndarray]:
+    """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
+    arrays = engine.model.arrays
     widths = observing.widths(arrays.size)
     out = np.zeros((len(rows), sum(widths.values())))
-    tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * model.mechanism.length
-    engine.entry.observe(engine.h, arrays.f, engine.w, engine.n, np.ascontiguousarray(rows), pieces, tolerance, out)
+    given = np.ascontiguousarray(pieces, dtype=np.int64).reshape(len(rows), arrays.size(m.N_LAWS))
+    tolerance = share * engine.model.mechanism.length
+    engine.entry.observe(engine.h, arrays.f, engine.w, engine.n, np.ascontiguousarray(rows), given, tolerance, out)
     ends = np.cumsum(list(widths.values()))
     return {name: out[:, end - widths[name] : end] for name, end in zip(widths, ends, strict=True)}

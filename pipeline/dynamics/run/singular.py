@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.projection import BLIND
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.model import Model
@@ -53,13 +54,15 @@ def improve(engine: Engine, t: float) -> bool:
     pivots, before = engine.view(m.PIVOT, m.PIVOT_SIZE), engine.kept.copy()
     present = float(pivots[m.LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
-    better = ratio > BETTER * present and not np.array_equal(before, engine.kept)
+    better = ratio > max(BETTER * present, BLIND) and not np.array_equal(before, engine.kept)
     if not better:
         engine.keep(before)
         engine.view(m.ROW_SCALE, rows)[:] = row_scale
     engine.view(m.Y, size)[:], engine.view(m.SLOPES, size)[:] = y, slope
     pivots[m.LAST_PIVOT] = ratio if better else present
     pivots[m.WANTED_PIVOT] = WORN * ratio if better else WORN * present
+    if better:
+        engine.view(m.INDEPENDENCE, 3 * rows)[:] = 0.0  # that of other rows
     return better
 
 
@@ -67,6 +70,14 @@ def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`, so that all entries are pure numbers."""
     along = built_rows(model, h) == 0
     return J * np.where(along, 1.0 / SCALE, 1.0)[:, None] * coordinate_scales(model.numbering)
+
+
+def dimensionless(engine: Engine, J: np.ndarray) -> np.ndarray:
+    """Closure Jacobian (kept rows, nv) with lengths in units of the mechanism's size: the same in any unit of length."""
+    numbering = engine.model.numbering
+    along = built_rows(engine.model, engine.h) == 0
+    units = np.where(along, 1.0 / engine.model.mechanism.length, 1.0)
+    return np.asarray(J * units[:, None] * engine.floors[numbering.nq : numbering.nq + numbering.nv])
 
 
 def built_rows(model: Model, h: np.ndarray) -> np.ndarray:

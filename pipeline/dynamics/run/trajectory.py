@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from pipeline.dynamics.run import refusal, singular
+from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, Progress, overlapping
 from pipeline.dynamics.run.handover import Handover, StiffError, hand_over, take_over
+from pipeline.dynamics.run.singular_pass import Pass, lay_over
 from pipeline.dynamics.run.singular_start import depart
 
 #: evaluations between two looks at the clock and the keyboard
@@ -20,6 +23,8 @@ SLICE = 20_000
 EVENT_ROWS = 4096
 #: why the stepper stops that another choice of closure rows may mend
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
+#: why it stops that a polynomial over a singular pose may mend
+STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
 
@@ -39,6 +44,7 @@ class Trajectory:
     selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
+    collocations: polynomial motions that the run followed, over singular poses and out of them; passes: what was passed.
     """
 
     rows: np.ndarray
@@ -48,6 +54,8 @@ class Trajectory:
     drift: float = 0.0
     rate_drift: float = 0.0
     steepest: float = 0.0
+    collocations: tuple[Collocation, ...] = ()
+    passes: tuple[Pass, ...] = ()
 
     @property
     def time(self) -> np.ndarray:
@@ -77,6 +85,8 @@ class _Run:
     rows: np.ndarray
     events: np.ndarray
     selections: list[tuple[float, np.ndarray]]
+    collocations: list[Collocation] = field(default_factory=list)
+    passes: list[Pass] = field(default_factory=list)
 
 
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
@@ -136,6 +146,8 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
     control[:] = 0.0
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.mechanism.length
+    control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
+    engine.view(m.INDEPENDENCE, 3 * model.arrays.size(m.N_CLOSURE_ROWS))[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, model.method.parameter(scene.solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[n[m.MODE] :] = 0
@@ -206,18 +218,39 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
         if status == m.FULL:
             run.rows = np.concatenate([run.rows, np.zeros_like(run.rows)])
             run.events = np.concatenate([run.events, np.full_like(run.events, np.nan)])
+        elif status == m.SINGULAR_AHEAD:
+            _pass_over(engine, run)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if singular.improve(engine, float(t)):
                 run.selections.append((float(t), engine.kept.copy()))
-            elif status != m.WORN_ROWS:
+            elif status != m.WORN_ROWS and not _rescued(engine, run):
                 raise SolverError(refusal.text(engine))
         elif status != m.PAUSED:
-            raise SolverError(refusal.text(engine))
+            if not _rescued(engine, run):
+                raise SolverError(refusal.text(engine))
         elif _crawls(engine, run):
             left = hand_over(engine, run.rows, run.events, run.selections)
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", left)
         elif stop(run.rows[: n[m.N_RECORDED]]):
             return True
+
+
+def _pass_over(engine: Engine, run: _Run) -> bool:
+    """Leave a polynomial over a singular pose to the stepper; whether there is one."""
+    made, passes = lay_over(engine)
+    if made is not None:
+        run.collocations.append(made)
+        run.passes += passes
+    return made is not None
+
+
+def _rescued(engine: Engine, run: _Run) -> bool:
+    """Whether a stepper that cannot go on has got a polynomial: the singular pose ahead may be what stopped it."""
+    control, status = engine.view(m.CONTROL, m.N_CONTROLS), run.n[m.STATUS]
+    ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
+    if status not in STOPPED or not engine.model.kinds.closures or not ahead or control[m.MOST_REACH] == 0.0:
+        return False
+    return _pass_over(engine, run)
 
 
 def _crawls(engine: Engine, run: _Run) -> bool:
@@ -247,4 +280,5 @@ def _collect(run: _Run, control: np.ndarray) -> Trajectory:
     # what happens inside a step is noted when the step is done: one contact after the other
     in_order = events[np.argsort(events[:, m.EVENT.time], kind="stable")]
     drift, rate_drift, steepest = (float(control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
-    return Trajectory(rows[keep], in_order, counters, tuple(run.selections), drift, rate_drift, steepest)
+    laid = tuple(run.collocations), tuple(run.passes)
+    return Trajectory(rows[keep], in_order, counters, tuple(run.selections), drift, rate_drift, steepest, *laid)

@@ -1,0 +1,232 @@
+"""The motion over, out of or into a singular pose: a polynomial whose slopes are those of the equations at closed states.
+
+In the pose the equations have no unique solution, and beside it what a method errs is blown up, so that no method's
+stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
+well, with the slopes of the equations at points each of which is closed first (collocation, by Picard's iteration);
+points too near to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
+its branch. That there is one shows: the iteration converges, closing changes nothing, the loops are closed between the
+points as well, and one point less gives the same end. It depends on no method and on no tolerance.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (collocation).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.run.engine import Engine, observe_with
+
+#: points of the polynomial; the end is one of them, the start is not
+POINTS = m.COLLOCATION_ROWS - 1
+NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
+#: points where a closure row has less than this share of the independence that it has at the best one are left out
+LEAST = 0.05
+#: so many must be left
+FEWEST = 6
+#: states are closed to this share of the mechanism's size before their slopes are taken
+CLOSELY = 1e-14
+#: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
+ROUNDS, HELPS, ROUNDING, NOISE = 25, 0.3, 1e-13, 1e-10
+#: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size
+EXACT = 1e-10
+
+
+@dataclass(frozen=True)
+class Collocation:
+    """A polynomial motion. start, span [s]; series: Chebyshev coefficients of the state, (COLLOCATION_ROWS, n).
+
+    independence: of the closure rows at its end.  evaluations: what it took.
+    """
+
+    start: float
+    span: float
+    series: np.ndarray
+    independence: np.ndarray
+    evaluations: int
+
+    @property
+    def end(self) -> float:
+        """Time up to which it holds [s]."""
+        return self.start + self.span
+
+    def states(self, times: np.ndarray) -> np.ndarray:
+        """States at times [s], shape (len(times), n)."""
+        return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, self.series).T)
+
+    def rates(self, times: np.ndarray) -> np.ndarray:
+        """Their rates."""
+        slope = chebyshev.chebder(self.series) * (2.0 / self.span)
+        return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, slope).T)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A state, closed, at a point: its slope, and the independence of the closure rows; sound: whether it has these."""
+
+    y: np.ndarray
+    slope: np.ndarray
+    independence: np.ndarray
+    sound: bool
+
+
+class Sampler:
+    """Evaluates closed states of an engine with the laws and contacts that are in force; leaves the engine as it was."""
+
+    def __init__(self, engine: Engine) -> None:
+        n, arrays = engine.n, engine.model.arrays
+        contacts, laws = arrays.size(m.N_CONTACTS), arrays.size(m.N_LAWS)
+        self.engine, self.evaluations = engine, 0
+        self.size = arrays.size(m.NY)
+        self._pieces = n[n[m.ACTIVE] : n[m.ACTIVE] + laws].copy()
+        modes, latched = n[n[m.MODE] : n[m.MODE] + contacts], engine.view(m.LATCHED, contacts)
+        self._contacts = np.concatenate([modes.astype(float), latched])
+        self._kept = engine.w.copy(), n.copy()
+
+    def restore(self) -> None:
+        """Put the engine's memory back."""
+        self.engine.w[:], self.engine.n[:] = self._kept
+
+    def closed(self, t: float, y: np.ndarray) -> tuple[np.ndarray, bool]:
+        """The state nearest to y with its loops closed, and whether there is one."""
+        row = np.concatenate([[t], self._contacts, y])[None, :]
+        seen = observe_with(self.engine, row, self._pieces[None, :], CLOSELY)
+        self.evaluations += 2
+        return seen["state"][0].copy(), seen["status"][0, 0] == m.OK
+
+    def sample(self, t: float, y: np.ndarray) -> Sample:
+        """What there is at a state after closing it."""
+        there, sound = self.closed(t, y)
+        sound &= self.attempt(t, there)
+        return Sample(there, self.slope(), self.engine.independence(), sound)
+
+    def attempt(self, t: float, y: np.ndarray) -> bool:
+        """Evaluate a state as it is."""
+        self.evaluations += 1
+        return self.engine.attempt(y, t)
+
+    def slope(self) -> np.ndarray:
+        """Slope of the state evaluated last."""
+        return self.engine.view(m.SLOPES, self.size).copy()
+
+
+def collocate(sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.ndarray | None) -> Collocation | None:
+    """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
+
+    slope: at the start; None in a singular pose, where there is none.
+    """
+    began = sampler.evaluations
+    states, samples = _march(sampler, t, y, span, slope)
+    used = _far_from_singular(samples)
+    if used.sum() < FEWEST:
+        return None
+    nodes, states = NODES[used], states[used]
+    size = _sizes(sampler.engine, y, [s.slope for s, far in zip(samples, used, strict=True) if far])
+    slopes = np.array([s.slope for s, far in zip(samples, used, strict=True) if far])
+    weights, last = _integrals(nodes, nodes), np.inf
+    states = y + span * weights @ slopes
+    for _ in range(ROUNDS):
+        found = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
+        if not all(s.sound for s in found):
+            return None
+        slopes = np.array([s.slope for s in found])
+        left = float(np.max(np.abs([s.y for s in found] - states) / size))
+        before, states = states, y + span * weights @ slopes
+        change = float(np.max(np.abs(states - before) / size))
+        if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
+            break
+        if not change <= 10.0 * last:
+            return None
+        last = change
+    else:
+        return None
+    series = _series(nodes, slopes, y, span)
+    made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
+    if max(left, _sensitivity(nodes, slopes, span, size)) > EXACT or _open(sampler, made, nodes) > EXACT:
+        return None
+    return made
+
+
+def _march(
+    sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.ndarray | None
+) -> tuple[np.ndarray, list[Sample]]:
+    """States at the nodes and what there is, each predicted by the polynomial through the slopes before it."""
+    flat = np.zeros(len(y))
+    if slope is None:
+        sampler.attempt(t, y)
+        flat[: sampler.engine.model.numbering.nq] = sampler.slope()[: sampler.engine.model.numbering.nq]
+    nodes, slopes = ([0.0], [slope]) if slope is not None else ([], [])
+    states, samples = [], []
+    for x in NODES:
+        ahead = _integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes) if nodes else x * flat
+        states.append(y + span * ahead)
+        samples.append(sampler.sample(t + x * span, states[-1]))
+        if samples[-1].sound and _share(samples[-1], samples) >= LEAST:
+            nodes.append(x)
+            slopes.append(samples[-1].slope)
+    return np.array(states), samples
+
+
+def _share(sample: Sample, samples: list[Sample]) -> float:
+    """Least share that a row has of the most independence that it has at any sample."""
+    if not len(sample.independence):
+        return 1.0
+    best = np.max([s.independence for s in samples if s.sound], axis=0)
+    return float(np.min(sample.independence / best))
+
+
+def _far_from_singular(samples: list[Sample]) -> np.ndarray:
+    """Which samples may be used."""
+    if not any(s.sound for s in samples):
+        return np.zeros(len(samples), dtype=bool)
+    return np.array([s.sound and _share(s, samples) >= LEAST for s in samples])
+
+
+def _sizes(engine: Engine, y: np.ndarray, slopes: list[np.ndarray]) -> np.ndarray:
+    """What errors of positions and speeds are compared with; the rest of the state follows from them."""
+    nq, nv = engine.model.numbering.nq, engine.model.numbering.nv
+    fastest = float(np.max(np.abs(np.array(slopes)[:, :nq]) / engine.floors[:nq], initial=0.0))
+    size = np.where(np.arange(len(y)) < nq, 1.0, fastest) * engine.floors
+    size[nq + nv :] = np.inf
+    return size
+
+
+def _integrals(nodes: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Weights (ends, nodes) of values at the nodes in the integral of their polynomial from 0 to each end."""
+    degree = len(nodes) - 1
+    basis = [chebyshev.chebint(row, lbnd=-1.0) for row in np.eye(degree + 1)]
+    integrals = 0.5 * np.array([chebyshev.chebval(2.0 * ends - 1.0, c) for c in basis]).T
+    return np.asarray(np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, degree).T, integrals.T).T)
+
+
+def _series(nodes: np.ndarray, slopes: np.ndarray, y: np.ndarray, span: float) -> np.ndarray:
+    """Chebyshev coefficients of the state, filled up to COLLOCATION_ROWS."""
+    derivative = np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, len(nodes) - 1), slopes)
+    series = np.zeros((m.COLLOCATION_ROWS, len(y)))
+    series[: len(nodes) + 1] = 0.5 * span * chebyshev.chebint(derivative, lbnd=-1.0)
+    series[0] += y
+    return series
+
+
+def _sensitivity(nodes: np.ndarray, slopes: np.ndarray, span: float, size: np.ndarray) -> float:
+    """Change of the end when one of the points in the middle is left out."""
+    middle, end = len(nodes) // 2, np.ones(1)
+    fewer = _integrals(np.delete(nodes, middle), end) @ np.delete(slopes, middle, axis=0)
+    return float(np.max(np.abs(_integrals(nodes, end) @ slopes - fewer) * span / size))
+
+
+def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
+    """Largest violation of a closure between the points, in shares of the mechanism's size or as sines."""
+    model = sampler.engine.model
+    rows = model.arrays.size(m.N_CLOSURE_ROWS)
+    along = model.arrays.table(m.CLOSURE_ROWS, sampler.engine.h)["kind"] == 0
+    scale, worst = np.where(along, model.mechanism.length, 1.0), 0.0
+    ends = np.concatenate([[0.0], nodes])
+    times = made.start + made.span * 0.5 * (ends[1:] + ends[:-1])
+    for t, y in zip(times, made.states(times), strict=True):
+        sampler.attempt(float(t), y)
+        worst = max(worst, float(np.max(np.abs(sampler.engine.view(m.RESIDUAL, rows)) / scale, initial=0.0)))
+    return worst

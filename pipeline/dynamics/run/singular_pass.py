@@ -1,0 +1,187 @@
+"""Over a singular pose: where a polynomial motion is laid, what passes on it, and what is said where it ends there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.errors import SolverError
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
+from pipeline.dynamics.model import selection
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.collocation import Collocation, Sampler, collocate
+from pipeline.dynamics.run.engine import Engine
+
+#: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
+#: then half of that, and so on
+REACH, HALVINGS = 0.3, 10
+#: what is left of a segment after the polynomial, in shares of its length, that belongs to it
+REMAINDER = 1e-3
+#: looks at a polynomial for the poses that it passes; singular values below this share of the largest vanish there
+LOOKS, VANISHED = 64, 1e-6
+#: two looks that find a pose at times which differ by less than this share of the polynomial have found the same one
+SAME = 1e-6
+#: a loop whose speeds in the pose are below this share of those beside it is at rest
+AT_REST = 1e-5
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A singular pose on the way. lost: ranks lost; joint: whose closure is dependent there."""
+
+    time: float
+    condition: float
+    lost: int
+    joint: str
+
+
+def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
+    """Leave a polynomial ready for the stepper, over the singular pose ahead of it or out of one; and what it passes.
+
+    Where there is none yet, the stepper's memory says how near to the pose it shall go before it asks again, or that it
+    shall go on by itself.  SolverError when the mechanism comes to rest in the pose.
+    """
+    control = engine.view(m.CONTROL, m.N_CONTROLS)
+    t, y = float(control[m.TIME]), engine.view(m.Y, engine.model.arrays.size(m.NY)).copy()
+    foreseen = control[m.LEFT] >= TOO_LITTLE and t < control[m.PASS_TIME] < NEVER
+    sampler, slope = Sampler(engine), None
+    if foreseen:
+        y, slope = _closed(sampler, t, y)
+    made, reach = _over(sampler, t, y, slope) if slope is not None else (_out(sampler, t, y), 0.0)
+    passes = passes_of(sampler, made) if made is not None else ()
+    sampler.restore()
+    engine.n[m.EVALUATIONS] += sampler.evaluations
+    control[m.REACH] = control[m.MOST_REACH] = reach
+    if made is None:
+        return None, ()
+    engine.view(m.Y, len(y))[:] = y
+    engine.view(m.COLLOCATION, made.series.size)[:] = made.series.ravel()
+    control[m.COLLOCATED] = made.span
+    return made, passes
+
+
+def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """The state closed, and its slope; as it is, and None, where the pose is too near for both."""
+    closed, sound = sampler.closed(t, y)
+    if not sound or not sampler.attempt(t, closed):
+        return y, None
+    return closed, sampler.slope()
+
+
+def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple[Collocation | None, float]:
+    """A polynomial over the pose that is foreseen and as far beyond it as the stepper's reach.
+
+    Else None, and from how far before the pose it may be tried again: 0 where rounding leaves nothing to try.
+    """
+    control = sampler.engine.view(m.CONTROL, m.N_CONTROLS)
+    ahead, reach, share = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
+    nearest = 2.0 * TOO_LITTLE / share * ahead
+    while reach >= max(ahead, nearest):
+        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope)
+        if made is not None:
+            return made, reach
+        reach *= 0.5
+    return None, reach if reach >= nearest else 0.0
+
+
+def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
+    """A polynomial out of a pose, or over one that has come too near to be foreseen, by the motion's own scale."""
+    fastest = _fastest(sampler, t, y)
+    for k in range(HALVINGS if fastest > 0.0 else 0):
+        made = collocate(sampler, t, y, _within(sampler, t, REACH / fastest * 0.5**k), None)
+        if made is not None:
+            return made
+    return None
+
+
+def _within(sampler: Sampler, t: float, span: float) -> float:
+    """The span, or what is left of the segment."""
+    left = float(sampler.engine.view(m.CONTROL, m.N_CONTROLS)[m.END]) - t
+    return left if (1.0 + REMAINDER) * span >= left else span
+
+
+def _fastest(sampler: Sampler, t: float, y: np.ndarray) -> float:
+    """Largest rate of a position, in units of its floor [1/s]."""
+    nq = sampler.engine.model.numbering.nq
+    sampler.attempt(t, y)
+    return float(np.max(np.abs(sampler.slope()[:nq] / sampler.engine.floors[:nq]), initial=0.0))
+
+
+# What passes --------------------------------------------------------------------------------------------------------
+
+
+def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
+    """The singular poses on a polynomial; SolverError where the mechanism comes to rest in one."""
+    from scipy.optimize import minimize_scalar  # slow to import, and most runs pass nothing
+
+    times = np.linspace(made.start, made.end, LOOKS + 1)
+    values = np.array([_independence(sampler, made, t) for t in times])
+    best = np.max(values, axis=0)
+
+    def least(t: float) -> float:
+        return float(np.min(_independence(sampler, made, t) / best))
+
+    low, found = np.min(values / best, axis=1), list[Pass]()
+    bounded = np.concatenate([[np.inf], low, [np.inf]])
+    for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
+        bracket = (times[max(k - 1, 0)], times[min(k + 1, LOOKS)])
+        t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": 1e-9 * made.span}).x)
+        one = _pass(sampler, made, min((t, *bracket), key=least))
+        if one is not None and not (found and one.time - found[-1].time < SAME * made.span):
+            found.append(one)
+    return tuple(found)
+
+
+def _independence(sampler: Sampler, made: Collocation, t: float) -> np.ndarray:
+    return sampler.engine.independence() if sampler.attempt(t, made.states(np.array([t]))[0]) else _none(sampler.engine)
+
+
+def _none(engine: Engine) -> np.ndarray:
+    return np.zeros(int(engine.h[m.N_KEPT_ROWS]))
+
+
+def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass | None:
+    """The singular pose at a time, if it is one; SolverError for one in which the mechanism comes to rest."""
+    engine = sampler.engine
+    y = made.states(np.array([t]))[0]
+    sampler.attempt(t, y)
+    J = singular.dimensionless(engine, engine.rows(m.JACOBIAN))
+    U, values, _ = np.linalg.svd(J)
+    lost = int(np.sum(values < VANISHED * values[0]))
+    if not lost or _other_rows_do(engine, t, y):
+        return None
+    reported = np.linalg.svd(singular.scaled(engine.model, engine.h, engine.rows(m.JACOBIAN)), compute_uv=False)
+    one = Pass(t, singular.condition(reported), lost, singular.worst_joint(engine, U[:, -1]))
+    _refuse_rest(engine, made, one, U[:, -lost:])
+    return one
+
+
+def _other_rows_do(engine: Engine, t: float, y: np.ndarray) -> bool:
+    """Whether it is only the rows solved for that depend on each other, not all that there are."""
+    if not engine.mobility.redundant:
+        return False
+    kept, scale = engine.kept.copy(), engine.view(m.ROW_SCALE, 2 * len(engine.kept)).copy()
+    engine.keep(np.ones(len(kept), dtype=bool))
+    engine.attempt(y, t)
+    values = np.linalg.svd(singular.dimensionless(engine, engine.rows(m.JACOBIAN)), compute_uv=False)
+    engine.keep(kept)
+    engine.view(m.ROW_SCALE, len(scale))[:] = scale
+    engine.attempt(y, t)
+    return bool(values[engine.mobility.rank - 1] > VANISHED * values[0])
+
+
+def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray) -> None:
+    """SolverError where the coordinates of the dependent closures stand still in the pose."""
+    numbering = engine.model.numbering
+    moving = selection.coordinates_of_rows(engine.model, engine.h, np.max(np.abs(left), axis=1) > 0.1)
+    speeds = slice(numbering.nq, numbering.nq + numbering.nv)
+    times = np.append(np.linspace(made.start, made.end, LOOKS + 1), one.time)
+    rates = np.max(np.abs(made.states(times)[:, speeds] / engine.floors[speeds])[:, moving], axis=1, initial=0.0)
+    if rates[-1] <= AT_REST * np.max(rates):
+        raise SolverError(
+            f"at t = {one.time:.6g} s: the mechanism comes to rest in a singular pose (joint {one.joint}, condition "
+            f"number {one.condition:.3g}), where it can go on in several ways and no motion chooses one: let it pass "
+            "the pose at speed, or stop elsewhere"
+        )
