@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.scene.solver import Solver
-from pipeline.dynamics.record.ledger import usual
+from pipeline.dynamics.run.ledger import usual
 from tests.analytic.mechanism_runs import Overrides, impacts, run
 from tests.reference import contact_solutions as exact
 

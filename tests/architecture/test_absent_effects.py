@@ -96,7 +96,7 @@ EFFECTS = {
     "normal law": ("import force as form_force", "pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
-    "closures": ("assembly.closures", "pipeline.dynamics.equations.closures"),
+    "closures": ("equations.closures", "pipeline.dynamics.equations.closures"),
     "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
     "loads": ("import composing", "pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),

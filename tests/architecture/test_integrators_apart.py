@@ -24,7 +24,7 @@ PRIVATE = {
     "dopri5": {"dopri5", "stages"},
     "rk4": {"rk4", "stages", "hermite"},
     "adams-bashforth-moulton": {"adams", "rk4", "stages", "hermite"},
-    "generalized-alpha": {"generalized_alpha", "alpha_newton", "alpha_system", "newton", "lu", "hermite", "displace"},
+    "generalized-alpha": {"generalized_alpha", "alpha_newton", "alpha_system", "newton", "lu", "hermite"},
     "radau": {"radau", "radau_systems", "newton", "lu", "hermite"},
 }
 STEPPING = {"adaptive", "fixed"}

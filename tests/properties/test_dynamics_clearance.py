@@ -83,7 +83,7 @@ class Touch:
     def __init__(self, laws: Laws, seed: int, depth: float, slip: float, together: bool = False) -> None:
         random = np.random.default_rng(seed)
         packed = tables_of(laws).arrays
-        w, n = packed.work_space()
+        h, w, n = packed.work_space(lambda nq, nv, ny: m.Room(1, 1, 0))
         n[n[m.MODE]] = 1
         turned = rotation_vector_to_matrix(random.normal(size=3))
         self.axis = random.normal(size=3)
@@ -101,20 +101,20 @@ class Touch:
         sites = packed.table(m.CONTACTS)[0][["outer", "inner"]]
         self.links = {name: int(packed.table(m.SITES)["link"][s]) for name, s in zip(self.centre, sites, strict=True)}
         for name, site in zip(self.centre, sites, strict=True):
-            o = packed.offset(m.SITE_FRAMES.place) + m.FRAME.size * site
+            o = h[m.SITE_FRAMES.place] + m.FRAME.size * site
             w[o : o + 3] = self.centre[name]
             w[o + m.FRAME.axes : o + m.FRAME.axes + 9] = turned.ravel()
             w[o + m.FRAME.omega : o + m.FRAME.omega + 3] = self.omega[name]
             w[o + m.FRAME.velocity : o + m.FRAME.velocity + 3] = self.velocity[name]
-        n[m.STATE] = packed.offset(m.Y)
-        self.bend(packed, w, laws, turned, random)
-        w[packed.offset(m.LATCHED)] = random.uniform(0.01, 1.0)
-        kernel(laws)(packed.h, packed.f, w, n)
-        wrench = packed.offset(m.WRENCH.place) + 6 * np.array(list(self.links.values()))
+        n[m.STATE] = h[m.Y]
+        self.bend(packed, w[h[m.Y] :], laws, turned, random)
+        w[h[m.LATCHED]] = random.uniform(0.01, 1.0)
+        kernel(laws)(h, packed.f, w, n)
+        wrench = h[m.WRENCH.place] + 6 * np.array(list(self.links.values()))
         # the table holds inertial minus applied wrenches (moment about the origin; force)
         self.wrench = {name: -w[o : o + 6] for name, o in zip(self.links, wrench, strict=True)}
-        self.touch = w[packed.offset(m.TOUCH.place) :][: m.TOUCH.size]
-        losses = packed.offset(m.LEDGER_RATE) + m.CONTACT_SLOTS
+        self.touch = w[h[m.TOUCH.place] :][: m.TOUCH.size]
+        losses = h[m.LEDGER_RATE] + m.CONTACT_SLOTS
         self.losses = w[losses : losses + 2]
         self.bending = 0.0  # power that bends the bristles at this normal force
         if self.place >= 0:
@@ -122,13 +122,13 @@ class Touch:
             self.bending = 1e5 * self.touch[m.TOUCH.normal_force] * float(self.bent @ rate)
             self.out_of_plane = float(rate @ self.axis)
 
-    def bend(self, packed: Any, w: np.ndarray, laws: Laws, turned: np.ndarray, random: Any) -> None:
+    def bend(self, packed: Any, state: np.ndarray, laws: Laws, turned: np.ndarray, random: Any) -> None:
         """Bristles somewhere below their largest deflection, in the tangent plane, axes of the socket."""
         self.bent, self.place = np.zeros(3), int(packed.table(m.CONTACTS)["bristle"][0])
         if self.place >= 0:
             across = np.cross(self.axis, random.normal(size=3))
             self.bent = random.uniform(0.0, 1.5e-6) * across / np.linalg.norm(across)
-            w[packed.offset(m.Y) + self.place :][:3] = turned.T @ self.bent
+            state[self.place :][:3] = turned.T @ self.bent
 
     @property
     def power(self) -> float:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.closures import keep_scales
 from pipeline.dynamics.equations.projection import BLIND, largest
-from pipeline.dynamics.integrate.scales import keep_scales
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import accumulate, at, dot
 

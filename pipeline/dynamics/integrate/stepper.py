@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.closures import keep_scales
 from pipeline.dynamics.equations.projection import largest
 from pipeline.dynamics.integrate.rows import hold_modes, snapshot
-from pipeline.dynamics.integrate.scales import keep_scales
 from pipeline.dynamics.integrate.singular_step import Poses
 from pipeline.dynamics.integrate.stiffness import detect
 from pipeline.dynamics.kernels import kernel

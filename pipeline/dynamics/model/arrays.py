@@ -13,12 +13,11 @@ from pipeline.dynamics import memory as m
 
 @dataclass(frozen=True)
 class Arrays:
-    """Wiring h and numbers f of a mechanism, and the lengths of w and n."""
+    """Wiring h and numbers f of a mechanism; `columns`: number of its twist columns."""
 
     h: np.ndarray
     f: np.ndarray
-    work_size: int
-    integers: int
+    columns: int
 
     def size(self, place: int) -> int:
         """A size in the header."""
@@ -37,14 +36,21 @@ class Arrays:
         end = self.offset(tables[k + 1].place) if k + 1 < len(tables) else len(array)
         return array[start:end].view(m.row_type(table))
 
-    def work_space(self) -> tuple[np.ndarray, np.ndarray]:
-        """A zeroed work space w with the ground in place, and the integers n."""
-        w, n = np.zeros(self.work_size), np.zeros(self.integers, dtype=np.int64)
-        axes = self.offset(m.LINK_FRAMES.place) + m.FRAME.axes
+    def work_space(self, room: Callable[[int, int, int], m.Room]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A copy of h that knows where w keeps what, w zeroed with the ground in place, and the integers n.
+
+        room: room(NQ, NV, NY) that the integration method needs.
+        """
+        h, end = self.h.copy(), 0
+        for place, length in _work_lengths(h, room, self.columns).items():
+            h[place] = end
+            end += length
+        laws, contacts = self.size(m.N_LAWS), self.size(m.N_CONTACTS)
+        w, n = np.zeros(end), np.zeros(m.INTEGERS + laws + contacts, dtype=np.int64)
+        axes = h[m.LINK_FRAMES.place] + m.FRAME.axes
         w[axes : axes + 9] = np.eye(3).ravel()
-        n[m.ACTIVE] = m.INTEGERS
-        n[m.MODE] = m.INTEGERS + self.size(m.N_LAWS)
-        return w, n
+        n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + laws
+        return h, w, n
 
 
 def rows(table: Any, entries: Any) -> np.ndarray:
@@ -58,13 +64,10 @@ def named(table: Any, entries: Any) -> np.ndarray:
     return m.named(table, rows(table, entries).ravel())
 
 
-def pack(
-    sizes: Mapping[int, int], tables: Mapping[Any, Any], room: Callable[[int, int, int], m.Room], columns: int
-) -> Arrays:
+def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> Arrays:
     """Pack tables, each a sequence of rows.
 
-    sizes: those of the header that do not follow from the tables.  columns: number of twist columns.
-    room: room(NQ, NV, NY) of the integration method.
+    sizes: those of the header that do not follow from the tables.
     """
     h = np.zeros(m.HEADER, dtype=np.int64)
     counts: dict[Any, int] = {}
@@ -77,12 +80,7 @@ def pack(
             arrays[array].append(found.ravel())
     for place, size in (_sizes(counts, tables) | dict(sizes)).items():
         h[place] = size
-    start = 0
-    for place, length in _work_lengths(h, room, columns).items():
-        h[place] = start
-        start += length
-    integers = m.INTEGERS + int(h[m.N_LAWS] + h[m.N_CONTACTS])
-    return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), start, integers)
+    return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), columns)
 
 
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:

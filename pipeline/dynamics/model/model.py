@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import contacts as contact_numbers
 from pipeline.dynamics.model import flexible_bodies as flexible
 from pipeline.dynamics.model import laws as lawful
@@ -30,7 +28,6 @@ from pipeline.dynamics.model.numbering import Numbering, number
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
 
-INTEGRATORS = "pipeline.dynamics.integrate"
 NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 
@@ -58,7 +55,6 @@ class Model:
     numbering: Numbering
     kinds: Kinds
     arrays: Arrays
-    method: Method
     closure_order: np.ndarray
     laws: tuple[Resolved, ...]
 
@@ -88,7 +84,6 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
     loads = loading.LEDGER if mechanism.scene.forces() else 0
     groups, floors = _error_groups(numbering, loads, turns)
     sites = [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)]
-    method = lookup(INTEGRATORS, mechanism.scene.solver.integrator, where="[solver.integrator]")
     kinds = _kinds(mechanism, normals, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
     arrays = pack(
         {
@@ -114,10 +109,9 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
             m.GROUPS: groups,
             m.FLOORS: floors,
         },
-        method.room,
         numbering.columns,
     )
-    return Model(mechanism, numbering, kinds, arrays, method, order, normals)
+    return Model(mechanism, numbering, kinds, arrays, order, normals)
 
 
 def _kinds(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Kinds:

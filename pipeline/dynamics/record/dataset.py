@@ -14,11 +14,11 @@ from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record import ledger
-from pipeline.dynamics.record.coordinates import joint_coordinates
 from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
 from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
+from pipeline.dynamics.run import ledger
+from pipeline.dynamics.run.coordinates import joint_coordinates
 from pipeline.dynamics.run.run import Run
 from pipeline.dynamics.run.trajectory import Trajectory
 

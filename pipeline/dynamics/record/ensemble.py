@@ -18,9 +18,9 @@ from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.record.dataset import attributes
-from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start
+from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.perturbation import offset_jacobian, perturbed
 from pipeline.dynamics.run.run import engines, observed
 from pipeline.dynamics.run.switching import follow

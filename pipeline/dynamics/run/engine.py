@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile import functions as fuse
 from pipeline.dynamics.equations import observation as observing
-from pipeline.dynamics.integrate.method import scheme_of
+from pipeline.dynamics.integrate.method import Method, scheme_of
 from pipeline.dynamics.model import initial, selection
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
+INTEGRATORS = "pipeline.dynamics.integrate"
 Progress = Callable[[float | None, str], None]
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
@@ -34,6 +37,7 @@ class Engine:
 
     model: Model
     entry: fuse.Entry
+    method: Method
     h: np.ndarray
     kept: np.ndarray
     mobility: Mobility
@@ -80,8 +84,12 @@ class Engine:
 
     def view(self, place: int, length: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
-        o = self.model.arrays.offset(place)
+        o = self.h[place]
         return self.w[o : o + length]
+
+    def table(self, table: Any, count: int) -> np.ndarray:
+        """Rows of a table of the work space with named fields, not copied, shape (count,)."""
+        return m.named(table, self.view(table.place, table.size * count))
 
     def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
         """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
@@ -122,11 +130,12 @@ def prepare(model: Model, progress: Progress) -> Engine:
     if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
     scheme = scheme_of(scene.solver)
-    w, n = model.arrays.work_space()
     entry = fuse.entry(model.kinds, scheme, lambda text: progress(None, text))
-    h, kept = model.arrays.h.copy(), np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
+    method = lookup(INTEGRATORS, scene.solver.integrator, where="[solver.integrator]")
+    h, w, n = model.arrays.work_space(method.room)
+    kept = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     entry.connect(h)
-    return Engine(model, entry, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    return Engine(model, entry, method, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
@@ -182,7 +191,7 @@ def may_depart(model: Model) -> bool:
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y with the angles that loads follow as they are at the start; InputError for a spring without direction."""
     _look(engine, y)
-    loads = engine.view(m.LOAD.place, m.LOAD.size * engine.model.arrays.size(m.N_LOADS)).reshape(-1, m.LOAD.size)
+    loads = engine.table(m.LOAD, engine.model.arrays.size(m.N_LOADS))
     return initial.start_loads(engine.model, y, loads.copy())
 
 
@@ -204,7 +213,7 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     if not contacts:
         return {}
     engine.evaluate(y, engine.start)
-    gaps = engine.view(m.TOUCH.place, m.TOUCH.size * len(contacts)).reshape(-1, m.TOUCH.size)[:, m.TOUCH.gap]
+    gaps = engine.table(m.TOUCH, len(contacts))["gap"]
     return {c: -float(gaps[c]) for c, (_, joint, _, _) in enumerate(contacts) if gaps[c] < -1e-9 * joint.clearance}
 
 

@@ -28,7 +28,7 @@ from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.model.driving import coordinate_of
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
-from pipeline.dynamics.record.coordinates import joint_coordinates, label
+from pipeline.dynamics.run.coordinates import joint_coordinates, label
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.run.trajectory import integrate as step
 

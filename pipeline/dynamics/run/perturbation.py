@@ -26,16 +26,9 @@ def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
 
 def _offset_rates(engine: Engine, y: np.ndarray) -> np.ndarray:
     engine.evaluate(y, engine.start)
-    sites = engine.view(m.SITE_FRAMES.place, m.FRAME.size * engine.model.arrays.size(m.N_SITES)).reshape(
-        -1, m.FRAME.size
-    )
+    velocity = engine.table(m.SITE_FRAMES, engine.model.arrays.size(m.N_SITES))["velocity"]
     table = engine.model.arrays.table(m.CONTACTS)
-    return np.concatenate(
-        [
-            sites[b, m.FRAME.velocity : m.FRAME.velocity + 3] - sites[a, m.FRAME.velocity : m.FRAME.velocity + 3]
-            for a, b in zip(table["outer"], table["inner"], strict=True)
-        ]
-    )
+    return np.concatenate([velocity[b] - velocity[a] for a, b in zip(table["outer"], table["inner"], strict=True)])
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:

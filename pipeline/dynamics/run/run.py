@@ -16,9 +16,9 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.record.ledger import require_closed
 from pipeline.dynamics.run.beside import beside
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
+from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.switching import follow, implicit
 from pipeline.dynamics.run.trajectory import Trajectory
 

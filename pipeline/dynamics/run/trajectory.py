@@ -148,7 +148,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.mechanism.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
     engine.view(m.INDEPENDENCE, 3 * model.arrays.size(m.N_CLOSURE_ROWS))[:] = 0.0
-    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, model.method.parameter(scene.solver)
+    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, engine.method.parameter(scene.solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[n[m.MODE] :] = 0
     n[m.CAP] = scene.solver.evaluations
@@ -188,8 +188,8 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
         return
     n, count = engine.n, len(contacts)
     modes, latched = n[n[m.MODE] : n[m.MODE] + count], engine.view(m.LATCHED, count)
-    watched = engine.view(m.WATCH.place, m.WATCH.size * count).reshape(count, -1)
-    watched[:] = 0.0
+    watched = engine.table(m.WATCH, count)
+    engine.view(m.WATCH.place, m.WATCH.size * count)[:] = 0.0
     for c in overlapping(engine, y):
         speed = contacts[c][1].initial_approach_speed
         if speed is None:
@@ -198,7 +198,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
         event = events[n[m.N_EVENTS]]
         event[[m.EVENT.time, m.EVENT.contact, m.EVENT.kind]] = engine.start, c, m.CLOSING
         event[[m.EVENT.speed, m.EVENT.peak_force, m.EVENT.peak_depth]] = speed, 0.0, 0.0
-        watched[c, [m.WATCH.event_row, m.WATCH.trend0]] = n[m.N_EVENTS], m.STEEPLY
+        watched["event_row"][c], watched["trend0"][c] = n[m.N_EVENTS], m.STEEPLY
         n[m.N_EVENTS] += 1
     row[1 : 1 + count], row[1 + count : 1 + 2 * count] = modes, latched
 
@@ -256,7 +256,7 @@ def _rescued(engine: Engine, run: _Run) -> bool:
 def _crawls(engine: Engine, run: _Run) -> bool:
     """Whether stability limits the steps so much that the run would take far too long."""
     n, control = run.n, engine.view(m.CONTROL, m.N_CONTROLS)
-    if engine.model.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
+    if engine.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
         return False
     done = max((control[m.TIME] - engine.start) / control[m.SPAN], 1e-12)
     too_many = min(HOPELESS, n[m.CAP])
