@@ -20,6 +20,7 @@ from pipeline.core.scene.parts import (
     RigidBody,
 )
 from pipeline.core.scene.solver import ExplicitPair, Solver
+from pipeline.core.scene.start import Start
 from pipeline.core.units import quantity
 
 #: rows of a run that a machine can be asked to hold
@@ -125,6 +126,7 @@ class Scene(Part):
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
     time: TimeSpan
+    start: Start | None = None
     solver: Solver = ExplicitPair()
     output: Output = Output()
     ensemble: Ensemble | None = None

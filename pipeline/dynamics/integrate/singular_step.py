@@ -25,7 +25,7 @@ from pipeline.dynamics.kernels import kernel
 NEVER = 1e300
 #: steps ahead within which the zero of a row's independence is looked for more closely; so it is, however short the
 #: steps, once a row has only this share left of the most that it had
-STEPS_AHEAD, LOW = 4.0, 0.2
+STEPS_AHEAD, LOW = 4.0, 0.05
 #: the polynomial begins, and ends, where a row has this share left of the most that it had or, where that is more, of
 #: half of its own length: near enough for one polynomial, so far that rounding is blown up little
 FROM, HALF = 0.3, 0.5

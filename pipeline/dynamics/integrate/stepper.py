@@ -269,24 +269,24 @@ def compose(
             along = ready(h, w)
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, dense, t_new, step = settle(h, f, w, n, step, t_new, events)
+            happened, dense, t_end, step = settle(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
             n[m.STEPS] += 1
             if along:
                 snapshot(h, w, n, rows, t, h[m.Y])
-            record_outputs(h, f, w, n, step, dense, outputs, rows, t_new)
+            record_outputs(h, f, w, n, step, dense, outputs, rows, t_end)
             keep(h, f, w, n, step)
-            accept(h, w, t_new)
+            accept(h, w, t_end)
             plan(h, w, step, following)
             if along:
-                done(h, w, t_new)
+                done(h, w, t_end)
                 n[m.FRESH] = 1
-            else:
-                foresee(h, f, w, n, t_new)
+            elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
+                foresee(h, f, w, n, t_end)
             if happened > 0 or along:
                 hold_modes(h, w, n)
-                snapshot(h, w, n, rows, t_new, h[m.Y])
+                snapshot(h, w, n, rows, t_end, h[m.Y])
             if happened > 0 and not along:
                 n[m.FRESH] = 1 if happened == RESTART else 0
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,25 +67,28 @@ def _world(model: Model, frame: str) -> Placement:
     return model.mechanism.links[site.link].start.of(site.place)
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
-    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+@dataclass(frozen=True)
+class Velocities:
+    """Linear equations matrix @ speeds = target of the start's speeds, (n, nv), and (n,).
 
-    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
-    Raises InputError when joints and drives do not allow the velocities.
+    told: how many rows, the first ones, ask for the given velocities of `bodies`; the others keep the loops closed.
     """
-    scene, numbering = model.scene, model.numbering
+
+    matrix: np.ndarray
+    target: np.ndarray
+    told: int
+    bodies: tuple[str, ...]
+
+
+def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
+    """What is asked of the speeds at the start."""
     wanted = {
         n: b
-        for n, b in scene.body.items()
+        for n, b in model.scene.body.items()
         if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
     }
-    elastic = np.zeros(numbering.nv, dtype=bool)
-    for link, first in numbering.flex_c0.items():
-        elastic[first : first + numbering.modes[link]] = True
-    if not wanted and not elastic.any():
-        return y
     y = y.copy()
-    nq, nv = numbering.nq, numbering.nv
+    nq, nv = model.numbering.nq, model.numbering.nv
     y[nq : nq + nv] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
     told, arms = ~np.isnan(given), _arms(model, wanted)
@@ -101,17 +105,34 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
         columns.append(rates(moved) - base)
     matrix = np.array(columns).T.reshape(len(base), nv)
     target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
-    speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
-        speeds, miss = _least(matrix, target)
-    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
-        names = ", ".join(wanted)
+    return Velocities(matrix, target, int(told.sum()), tuple(wanted))
+
+
+def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
+    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+
+    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
+    Raises InputError when joints and drives do not allow the velocities.
+    """
+    numbering = model.numbering
+    elastic = np.zeros(numbering.nv, dtype=bool)
+    for link, first in numbering.flex_c0.items():
+        elastic[first : first + numbering.modes[link]] = True
+    asked = velocity_equations(model, motion, y)
+    if not asked.bodies and not elastic.any():
+        return y
+    y = y.copy()
+    speeds, miss = _least(asked.matrix * ~elastic, asked.target)
+    if miss > RIGID * (1.0 + float(np.max(np.abs(asked.target), initial=0.0))):
+        speeds, miss = _least(asked.matrix, asked.target)
+    if asked.bodies and miss > 1e-6 * (1.0 + float(np.max(np.abs(asked.target[: asked.told])))):
         raise InputError(
-            f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g})",
+            f"[body.{asked.bodies[0]}.velocity]",
+            f"joints and drives do not allow the velocities given for {', '.join(asked.bodies)} (they miss by "
+            f"{miss:.3g})",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[nq : nq + nv] = speeds
+    y[numbering.nq : numbering.nq + numbering.nv] = speeds
     return y
 
 

@@ -5,45 +5,40 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.run.engine import Engine, observe
+from pipeline.dynamics.run.collocation import CLOSELY, Collocation
+from pipeline.dynamics.run.engine import Engine, observe_with, pieces_at
 
-#: first distance in time, as share of the run, and its factor from try to try
-NEAREST, WIDER = 1e-8, 4.0
-#: pivot ratio of the closures at which the equations hold six digits
-CLEAR = 1e-6
+#: pivot ratio of the closures at which the equations hold eight digits of accelerations
+CLEAR = 1e-5
+#: first distance in time, as share of the polynomial, its factor from try to try, and how many there are
+NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
 #: where it is looked, in units of the distance, and the weights there of the limit between: exact for cubics
 SIDES, WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([[-1.0, 4.0, 4.0, -1.0]]) / 6.0
-#: tries, the last of which is some share of 1e-2 of the run away
-TRIES = 11
 
 
-def beside(engine: Engine, row: np.ndarray) -> dict[str, np.ndarray] | None:
-    """Observed fields of a recorded row whose pose is singular, shape (1, width) each; None when there are none.
+def blurred(engine: Engine, row: np.ndarray) -> bool:
+    """Whether a recorded row is so near to a singular pose that its accelerations and forces are rounding."""
+    seen = engine.attempt(row[1 + 2 * len(engine.model.mechanism.contacts) :], float(row[0]))
+    return not seen or float(engine.view(m.PIVOT, m.PIVOT_SIZE)[m.LAST_PIVOT]) < CLEAR
+
+
+def beside(engine: Engine, row: np.ndarray, motion: Collocation) -> dict[str, np.ndarray] | None:
+    """Observed fields of such a row, shape (1, width) each; None when there are none.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
-    of both sides, at a distance and at twice that, is but its fourth power from their value.  The states there follow
-    from the row's velocities and the closures.  Before the run's start all laws are as just after it.
+    of both sides, at a distance and at twice that, is but its fourth power from their value.  The states there are those
+    of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold between them.
     """
-    t, first = float(row[0]), 1 + 2 * len(engine.model.mechanism.contacts)
-    y, nq = row[first:], engine.model.numbering.nq
-    engine.attempt(y, t)
-    rate = engine.view(m.SLOPES, len(y))[:nq].copy()
-    distance = NEAREST * (engine.end - engine.start)
+    first = 1 + 2 * len(engine.model.mechanism.contacts)
+    pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))
+    distance = NEAREST * motion.span
     for _ in range(TRIES):
-        sides = distance * SIDES
-        rows = np.tile(row, (len(sides), 1))
-        rows[:, 0] += sides
-        rows[:, first : first + nq] += np.outer(sides, rate)
-        inside = (t == engine.start or engine.start < rows[:, 0].min()) and rows[:, 0].max() < engine.end
-        if inside and _clear(engine, rows, first):
-            seen = observe(engine, rows)
+        rows = np.tile(row, (len(SIDES), 1))
+        rows[:, 0] += distance * SIDES
+        rows[:, first:] = motion.states(rows[:, 0])
+        if not any(blurred(engine, side) for side in rows):
+            seen = observe_with(engine, rows, pieces, CLOSELY)
             if not np.any(seen["status"]):
                 return {name: WEIGHTS @ values for name, values in seen.items()}
         distance *= WIDER
     return None
-
-
-def _clear(engine: Engine, rows: np.ndarray, first: int) -> bool:
-    """Whether the closures are well apart from singular in all rows."""
-    pivots = engine.view(m.PIVOT, m.PIVOT_SIZE)
-    return all(engine.attempt(row[first:], float(row[0])) and pivots[m.LAST_PIVOT] > CLEAR for row in rows)

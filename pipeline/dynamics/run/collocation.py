@@ -31,8 +31,9 @@ FEWEST = 6
 CLOSELY = 1e-14
 #: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
 ROUNDS, HELPS, ROUNDING, NOISE = 25, 0.3, 1e-13, 1e-10
-#: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size
-EXACT = 1e-10
+#: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size; and how much its
+#: end may change without one of the points, which is at least ten times what it is off
+EXACT, SENSITIVE = 1e-10, 1e-9
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,7 @@ def collocate(sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.
     nodes, states = NODES[used], states[used]
     size = _sizes(sampler.engine, y, [s.slope for s, far in zip(samples, used, strict=True) if far])
     slopes = np.array([s.slope for s, far in zip(samples, used, strict=True) if far])
-    weights, last = _integrals(nodes, nodes), np.inf
+    weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
     for _ in range(ROUNDS):
         found = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
@@ -138,14 +139,15 @@ def collocate(sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.
         change = float(np.max(np.abs(states - before) / size))
         if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
             break
-        if not change <= 10.0 * last:
+        unresolved = _sensitivity(nodes, slopes, span, size)
+        if not change <= 10.0 * last or (unresolved > SENSITIVE and unresolved > HELPS * rough):
             return None
-        last = change
+        last, rough = change, unresolved
     else:
         return None
     series = _series(nodes, slopes, y, span)
     made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
-    if max(left, _sensitivity(nodes, slopes, span, size)) > EXACT or _open(sampler, made, nodes) > EXACT:
+    if left > EXACT or _sensitivity(nodes, slopes, span, size) > SENSITIVE or _open(sampler, made, nodes) > EXACT:
         return None
     return made
 

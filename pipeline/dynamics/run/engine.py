@@ -107,7 +107,7 @@ class Engine:
         """How far each kept closure row is from depending on those before it, at the last evaluated state."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
         diagonal = envelope["start"] - envelope["first"] + np.arange(len(envelope))
-        return np.abs(self.w[self.model.arrays.offset(m.SCHUR) + diagonal])
+        return np.abs(self.w[self.h[m.SCHUR] + diagonal])
 
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""

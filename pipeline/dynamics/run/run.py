@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -12,11 +12,11 @@ import xarray as xr
 
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.run.beside import beside
+from pipeline.dynamics.run.beside import beside, blurred
+from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.switching import follow, implicit
@@ -94,16 +94,25 @@ def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
 
 
 def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """Every row with the closure rows that were solved for when it was made."""
+    """Every row with the closure rows that were solved for when it was made; near singular poses as beside them."""
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
         seen = observe(engine, trajectory.rows[part])
-        blurred = seen["status"][:, 0] == m.SINGULAR
-        if engine.mobility.singular_start and part.start == 0:
-            blurred[0] = True  # rows of the closures that vanish there had no size before to be compared with
-        for k in np.flatnonzero(blurred):
-            for name, value in (beside(engine, trajectory.rows[part][k]) or {}).items():
+        for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
+            for name, value in (beside(engine, trajectory.rows[part][k], motion) or {}).items():
                 seen[name][k] = value[0]
         parts.append(seen)
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+
+
+def _near_singular(
+    engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
+) -> Iterator[tuple[int, Collocation]]:
+    """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
+    for motion in motions:
+        engine.select_pieces(0.5 * (motion.start + motion.end))
+        begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
+        for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
+            if blurred(engine, rows[k]):
+                yield k, motion

@@ -236,7 +236,14 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
 
 
 def _pass_over(engine: Engine, run: _Run) -> bool:
-    """Leave a polynomial over a singular pose to the stepper; whether there is one."""
+    """Get the stepper on where closure rows come to depend on each other; whether there is a way.
+
+    Other rows, if these alone do; else a polynomial over the singular pose.
+    """
+    t = float(engine.view(m.CONTROL, m.N_CONTROLS)[m.TIME])
+    if engine.mobility.redundant and singular.improve(engine, t, singular.CLEARLY):
+        run.selections.append((t, engine.kept.copy()))
+        return True
     made, passes = lay_over(engine)
     if made is not None:
         run.collocations.append(made)
