@@ -9,10 +9,11 @@ import numpy as np
 import xarray as xr
 from scipy.interpolate import CubicHermiteSpline
 
-from benchmarks.engines import Mechanism, silent, with_tolerance
+from benchmarks.engines import Mechanism, with_tolerance
 from benchmarks.exudyn_runs import SAMPLING, Samples
 from benchmarks.measure import once
 from pipeline import dynamics
+from pipeline.core.progress import silent
 from pipeline.dynamics.run.engine import consistent_start
 from pipeline.dynamics.run.run import observed
 from pipeline.dynamics.run.trajectory import integrate

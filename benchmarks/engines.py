@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.measure import once
+from pipeline.core.progress import silent
 from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.parts import IdealJoint
@@ -49,10 +50,6 @@ class State:
     modes: np.ndarray
     latched: np.ndarray
     y: np.ndarray
-
-
-def silent(fraction: float | None, text: str) -> None:
-    """Reports would be part of what is measured."""
 
 
 def mechanism(name: str) -> Mechanism:

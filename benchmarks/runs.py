@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from benchmarks.engines import SCENES, Mechanism, mechanism, silent
+from benchmarks.engines import SCENES, Mechanism, mechanism
 from benchmarks.measure import interleaved, once
 from benchmarks.tables import percent, table
 from pipeline import dynamics
+from pipeline.core.progress import silent
 from pipeline.dynamics.run.engine import consistent_start
 from pipeline.dynamics.run.trajectory import integrate
 

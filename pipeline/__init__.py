@@ -42,10 +42,7 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
 
     Raises FlexclearError: InputError, SolverError or ResourceError.
     """
-    # The stages stand above this package and may import it, not the other way round; the name is
-    # resolved only here, at the door.
-    stages: Any = import_module("stages.run")
-    return stages.run(load_scene(scene) if isinstance(scene, (str, Path)) else scene)
+    return _stages("run").run(_loaded(scene))
 
 
 def cost(scene: Scene | str | Path) -> xr.Dataset:
@@ -53,11 +50,7 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
 
     The quantities are those of the scene's `[accuracy]`, else the usual ones.  Raises FlexclearError.
     """
-    study: Any = import_module("stages.cost")
-    run_: Any = import_module("stages.run")
-    dataset: xr.Dataset = study.bring(load_scene(scene) if isinstance(scene, (str, Path)) else scene, run_.workplace())[
-        0
-    ]
+    dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").workplace())
     return dataset
 
 
@@ -101,6 +94,14 @@ def _linear(
     moving: bool,
     vibrations: bool,
 ) -> xr.Dataset:
-    stages: Any = import_module("stages.run")
-    scene = load_scene(scene) if isinstance(scene, (str, Path)) else scene
-    return stages.linear(scene, time, drives, moving=moving, vibrations=vibrations)
+    return _stages("run").linear(_loaded(scene), time, drives, moving=moving, vibrations=vibrations)
+
+
+def _loaded(scene: Scene | str | Path) -> Scene:
+    return load_scene(scene) if isinstance(scene, (str, Path)) else scene
+
+
+def _stages(name: str) -> Any:
+    """A module of the stages. They stand above this package and may import it, not the other way round: this is the
+    one door upwards, and it opens at a call, when everything is loaded."""
+    return import_module(f"stages.{name}")

@@ -1,17 +1,30 @@
-"""Sources of the methods and data that a scene uses, gathered from the modules that it reaches."""
+"""``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches."""
 
 from __future__ import annotations
 
+import argparse
 import ast
 import re
 from collections.abc import Iterator
 
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.task import in_order
+from stages import run
 from stages.graph import Graph
 
 #: a paragraph that starts like this names where a method is from
 SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scene", metavar="SCENE")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print them."""
+    (graph,) = run.graphs([options.scene])
+    print(text(graph, run.workplace().sources), end="")
 
 
 def text(graph: Graph, sources: Sources) -> str:

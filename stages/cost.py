@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.core.scene.load import edited
 from pipeline.core.workflow.task import Task
-from stages import cost_design, kernels, s4_simulate
+from stages import cost_design, cost_peers, kernels, run, s4_simulate
 from stages.cost_peers import Track
 from stages.graph import Graph
 from stages.run import Workplace, check
@@ -28,6 +29,34 @@ FIGURES = {
     "causes": "Causes of the error",
     "statistics": "Error of ensemble means against cost",
 }
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
+    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
+    parser.add_argument(
+        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
+    )
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring the studies up to date and print their tables."""
+    if options.page is not None:
+        run.check_target(options.page, "--page")
+    peers = {} if options.peer is None else cost_peers.read(options.peer)
+    place, studies = run.workplace(), {}
+    for graph in run.graphs(options.scenes):
+        studies[graph.scene.name] = _, folder = bring(
+            graph.scene, place, peers.get(graph.scene.name, ()), options.integrators
+        )
+        print(*((folder / name).read_text() for name in PRINTED if (folder / name).is_file()), sep="\n")
+        print(f"figures and data: {folder}\n")
+    if options.page is not None:
+        said = f" --peer {options.peer.as_posix()}" if options.peer else ""
+        said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        write_page(studies, options.page, said)
 
 
 def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()) -> Task:

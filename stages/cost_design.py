@@ -8,22 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.core.errors import InputError
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited, read_toml
 from pipeline.core.scene.schema import Scene
+from stages.timing import paper_solver
 
-#: tolerances of the methods that choose their steps, and steps [s] of those that do not
-TOLERANCES: Mapping[str, tuple[int, int]] = {"dop853": (-3, -13), "dopri5": (-3, -13), "radau": (-3, -9)}
-STEPS: Mapping[str, tuple[float, ...]] = {
-    "rk4": (1e-4, 3e-5, 1e-5, 3e-6),
-    "adams-bashforth-moulton": (1e-4, 3e-5, 1e-5, 3e-6),
-    "generalized-alpha": (1e-4, 3e-5, 1e-5, 3e-6),
-}
 REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
-#: another family of methods, and SciPy's own steps
+#: another family of methods
 CONFIRMATION: Mapping[str, Any] = {"integrator": "radau", "rtol": 1e-12}
-#: Wang & Wang (2019), sec. 5: predictor-corrector, 1e-5 s, contacts noticed at the ends of steps
-PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5, "events": "at step ends"}
 #: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
 MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
 LIMITS = (0.25, 0.5, 1.0, 2.0)
@@ -51,7 +44,7 @@ def runs(scene: Scene, highest: float | None, integrators: Collection[str] = ())
     are compared, all when empty; reference, confirmation and the paper's choice are always there.
     Raises InputError for a method that is not compared.
     """
-    known = [*TOLERANCES, *STEPS]
+    known = [name for name, traits in INTEGRATORS.items() if traits.tolerances or traits.steps]
     for name in integrators:
         if name not in known:
             raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
@@ -79,16 +72,14 @@ def _integration(scene: Scene) -> Iterator[Design]:
 
     yield design("reference", REFERENCE)
     yield design("confirmation", CONFIRMATION)
-    for method, (loosest, tightest) in TOLERANCES.items():
-        for power in range(loosest, tightest - 1, -1):
-            rtol = 10.0**power
+    for method, traits in INTEGRATORS.items():
+        for rtol in traits.tolerances:
             solver = {"integrator": method, "rtol": rtol}
             yield design("tolerance", solver, adaptive_integrator=method, rtol=rtol)
-    for method, steps in STEPS.items():
-        for step in steps:
+    for method, traits in INTEGRATORS.items():
+        for step in traits.steps:
             yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)
-    located = {k: v for k, v in PAPER.items() if k != "events"}
-    yield design("paper", PAPER if scene.contacts() else located)
+    yield design("paper", paper_solver(scene))
 
 
 def _sampling(scene: Scene) -> Iterator[Design]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.progress import Progress, silent
 from stages.kernels import warm
 from stages.s4_simulate import bundles, rebuild
 
@@ -12,7 +13,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 #: a run is timed so often, and the median counts, but no more once this much time has been spent on it: what a
 #: longer run takes is an average by itself
@@ -33,6 +33,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline import dynamics
     from pipeline.core import quantities
     from pipeline.core.errors import SolverError
+    from pipeline.core.scene.wanted import parse
 
     scene = rebuild(params["simulate"])
     reduced = bundles(inputs)
@@ -41,11 +42,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     try:
         while not seconds or (len(seconds) < REPEATS and sum(seconds) < LONG):
             begun = time.process_time()
-            done = dynamics.simulate(scene, reduced, progress if not seconds else _silent)
+            # reports would be part of what is measured
+            done = dynamics.simulate(scene, reduced, progress if not seconds else silent)
             seconds.append(time.process_time() - begun)
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
-    chosen = [quantities.parse(name, scene.owners()) for name in params["quantities"]]
+    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     kept = quantities.keep(done, chosen)
     kept["cpu_repeat"] = (("repeat",), seconds, {"units": "s", "long_name": "processor time of a warm run"})
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": _memory()}
@@ -66,6 +68,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     from pipeline import dynamics
     from pipeline.core import quantities
     from pipeline.core.errors import SolverError
+    from pipeline.core.scene.wanted import parse
 
     scene, reduced = rebuild(params["simulate"]), bundles(inputs)
     warm(scene, reduced, progress)
@@ -76,15 +79,11 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     seconds = (time.process_time() - begun) / done.sizes["member"]
     kept = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
-    chosen = [quantities.parse(name, scene.owners()) for name in params["quantities"]]
+    chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
     kept = kept.assign_coords(quantity=list(errors))
     kept["standard_error"] = (("quantity",), list(errors.values()))
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
-
-
-def _silent(fraction: float | None, text: str) -> None:
-    """Reports would be part of what is measured."""
 
 
 def _memory() -> int:

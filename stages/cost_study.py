@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
-#: contact events are located to this share of the clearance (pipeline.dynamics.integrate.events)
+#: contact events are located to this share of the clearance (pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
 
 
@@ -20,7 +20,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, and `peers`, as of
     `stages.cost_peers`.
     """
-    from pipeline.core.quantities import Quantity
+    from pipeline.core.scene.wanted import Quantity
     from pipeline.post.cost import causes, price, statistics, work_precision
     from pipeline.post.cost.study import Point, assemble
     from pipeline.post.plotting.table import files

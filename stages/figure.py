@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 FIGURES = "pipeline.post.figures"
 

@@ -1,8 +1,33 @@
-"""The table that ``flexclear frequencies`` prints."""
+"""``flexclear frequencies``: equilibrium of a scene in a pose, and the natural frequencies there."""
 
 from __future__ import annotations
 
-import xarray as xr
+import argparse
+from typing import TYPE_CHECKING
+
+from pipeline.core.errors import InputError
+from pipeline.core.units import quantity
+from stages import run
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
+    parser.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
+    parser.add_argument("--moving", action="store_true", help="the drives keep their speed: steady motion")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print the table."""
+    (graph,) = run.graphs([options.scene])
+    try:
+        time = None if options.at is None else quantity(options.at, "time")
+    except ValueError as error:
+        raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
+    print(text(run.linear(graph.scene, time, moving=options.moving)), end="")
 
 
 def text(linear: xr.Dataset) -> str:

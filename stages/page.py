@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``index.html`` and ``paper.md``, out of the results folder.
 
-    params: the folder, the run of each scene below it, and the digest of everything that is shown,
-    so that the page is written again when any of it changes.
+    params: the folder, the run of each scene below it, the scene whose film and pictures are shown, and the digest of
+    everything that is shown, so that the page is written again when any of it changes.
     """
     from pipeline.post import report
 
     results = Path(params["results"])
     attributes = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})
-    content = report.collect(results, attributes)
+    content = report.collect(results, attributes, params["rendered"])
     return {"index.html": report.page(content), "paper.md": report.paper_markdown(content).encode()}

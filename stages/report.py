@@ -1,25 +1,36 @@
-"""The report: every figure and table of the paper with all that they need, and the page that shows them."""
+"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them."""
 
 from __future__ import annotations
 
+import argparse
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from pipeline.core.artifacts.store import Record
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import TREE
 from pipeline.core.workflow.task import Task
 from stages import kernels, s4_simulate, s6_render, timing
-from stages.families import TREE, constants
 from stages.figure import FIGURES
 from stages.graph import Graph
-from stages.run import Workplace, check
+from stages.run import Workplace, check, workplace
 
 #: the scene whose film and pictures the page shows: the paper's full model
 HEADLINE = "sps4/far_csj_cb"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """It takes nothing."""
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring it up to date and say where it is."""
+    print(make(workplace()))
 
 
 @dataclass(frozen=True)
@@ -95,7 +106,7 @@ def figure_tasks(place: Workplace, scenes: Scenes) -> list[Task]:
 
 def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
     """What each figure and table needs, see `stages.figure.index`."""
-    names = list(constants(FIGURES)["NAMES"])
+    names = list(import_module(FIGURES).NAMES)
     task = Task(
         stage="figures",
         scene="report",
@@ -122,6 +133,7 @@ def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Grap
         params={
             "results": str(place.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
+            "rendered": HEADLINE,
             "digests": sorted(record.digest for record in records.values()),
         },
         folder="report",

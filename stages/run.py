@@ -1,7 +1,8 @@
-"""Bringing scenes up to date: what the command and the Python functions have in common."""
+"""``flexclear run``, and what all commands and the Python functions have in common: bringing scenes up to date."""
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -12,17 +13,41 @@ from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
 from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
 from pipeline.core.workflow.task import Task
-from stages.families import TREE
-from stages.graph import Graph
+from stages.graph import STAGES, Graph
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.scene.schema import Scene
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    parser.add_argument(
+        "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset of the run here (one scene)")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring scenes up to date; say what their bundles lack where those were asked for."""
+    if options.out is not None and len(options.scenes) > 1:
+        raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
+    if options.out is not None:
+        check_target(options.out)
+    wanted = graphs(options.scenes)
+    place = workplace()
+    outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
+    check(outcome)
+    if options.to == "bundle":
+        print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in wanted))))
+    if options.out is not None:
+        copy_run(wanted[0], place, options.out)
 
 
 @dataclass(frozen=True)

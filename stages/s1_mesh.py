@@ -5,17 +5,18 @@ from __future__ import annotations
 import hashlib
 import tempfile
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.core.errors import InputError
+from pipeline.core.registry import module_of
 from pipeline.core.scene.load import read_toml
-from stages.families import constants, module
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 KINDS = "pipeline.structure.kinds"
 #: keys of a recipe's shape that name files
@@ -36,13 +37,13 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
 
 def modules(recipe: Path) -> tuple[str, ...]:
     """Module of the kind of body that a recipe describes."""
-    return (module(KINDS, kind_of(recipe), where=str(recipe)),)
+    return (module_of(KINDS, kind_of(recipe), where=str(recipe)),)
 
 
 def kind_of(recipe: Path) -> str:
     """Name of the kind of body that a recipe describes."""
     shape = read_toml(recipe).get("shape")
-    kinds = constants(KINDS)["SHAPES"]
+    kinds = import_module(KINDS).SHAPES
     return str(kinds.get(str(shape.get("type")), "beam")) if isinstance(shape, Mapping) else "beam"
 
 

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.registry import module_of
 from stages import s1_mesh
-from stages.families import module
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.parts import FlexibleBody
-    from pipeline.core.workflow.execute import Progress
 
 CONDITIONS = "pipeline.structure.modes.reference"
 
@@ -26,7 +26,7 @@ def params(body: FlexibleBody) -> dict[str, Any]:
 def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
     """Modules of the reference conditions and of the kind of body; InputError when there is none of that name."""
     names = [body.modes.reference, *([body.modes.of] if body.modes.of else [])]
-    return (*(module(CONDITIONS, name, where=where) for name in names), *s1_mesh.modules(Path(body.mesh)))
+    return (*(module_of(CONDITIONS, name, where=where) for name in names), *s1_mesh.modules(Path(body.mesh)))
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

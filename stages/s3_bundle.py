@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.registry import lookup
-from stages.families import module
+from pipeline.core.registry import lookup, module_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 STRESS = "pipeline.structure.stress"
 SHORTENING = "pipeline.structure.modes.geometric_stiffness"
@@ -29,7 +28,7 @@ def params(scene: Scene, body: str) -> dict[str, Any]:
 def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
     """Module that recovers stresses of this kind of body; InputError when there is none."""
     asked = params(scene, body)
-    stress = (module(STRESS, kind, where=WHERE),) if "stress" in asked else ()
+    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in asked else ()
     return (*stress, *((SHORTENING,) if "stiffening" in asked else ()))
 
 

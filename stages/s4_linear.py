@@ -10,8 +10,8 @@ from stages import s4_simulate
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 #: what the vibrations do not depend on
 LEFT_OUT = ("output", "ensemble")

@@ -6,48 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from stages.families import constants, module
-
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
-
-DYNAMICS = "pipeline.dynamics"
-#: methods that may be given up for an implicit one on the way (pipeline.dynamics.run)
-EXPLICIT, IMPLICIT = ("dop853", "dopri5"), "radau"
-#: what the generated files compose (pipeline.dynamics.compile.sources): for every scene, and
-#: for scenes with flexible bodies and with contacts
-KERNELS = (
-    "compile.calls",
-    "equations.closures",
-    "equations.choice",
-    "equations.right_hand_side",
-    "equations.prescribed_motion",
-    "equations.kinematics",
-    "bodies.rigid",
-    "equations.retraction",
-    "equations.observation",
-    "equations.projection",
-    "integrate.stepper",
-)
-FLEXIBLE_KERNELS = ("bodies.flexible", "bodies.ports")
-STIFFENING_KERNELS = ("bodies.shortening",)
-CONTACT_KERNELS = (
-    "contact.forces",
-    "contact.form.elastic",
-    "contact.form.hysteretic",
-    "contact.form.linear_damper",
-    "contact.validity",
-    "integrate.events",
-)
-#: of scenes with contacts that are noticed at step ends, and of fixed or chosen steps
-UNLOCATED_KERNELS = ("integrate.step_ends",)
-FIXED_KERNELS, ADAPTIVE_KERNELS = ("integrate.fixed",), ("integrate.adaptive",)
-LOAD_KERNELS = ("loads.composing",)
-#: joint types that the chain of a joint with several axes, or of a path, is made of
-CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
@@ -61,48 +24,13 @@ def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
-    """Modules of the parts that the scene names, so that editing a law leaves scenes without it alone.
+    """Modules that a run reaches by its parts' names, so that editing a law leaves scenes without it alone.
 
     Raises InputError when a name is not listed in its family.
     """
-    from pipeline.core.scene.laws import law_types
+    from pipeline.dynamics.compile import sources
 
-    joints = f"{DYNAMICS}.joints"
-    found = {module(f"{DYNAMICS}.integrate", scene.solver.integrator, where="[solver]")}
-    if scene.solver.integrator in EXPLICIT and scene.solver.step is None:
-        found.add(module(f"{DYNAMICS}.integrate", IMPLICIT, where="[solver]"))
-    found.add(module(joints, "free", where="joint"))  # of bodies that hang on no joint
-    laws = {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
-    kernels: tuple[str, ...] = KERNELS + (ADAPTIVE_KERNELS if scene.solver.step is None else FIXED_KERNELS)
-    kernels += (FLEXIBLE_KERNELS if scene.flexible() else ()) + (CONTACT_KERNELS if scene.contacts() else ())
-    kernels += UNLOCATED_KERNELS if scene.contacts() and scene.solver.events != "located" else ()
-    kernels += (LOAD_KERNELS if scene.forces() else ()) + (("drives.oscillation",) if "harmonic" in laws else ())
-    if any(body.stiffening is not None for body in scene.flexible().values()):
-        kernels += STIFFENING_KERNELS
-    found |= {f"{DYNAMICS}.{kernel}" for kernel in kernels}
-    for name, joint in scene.joint.items():
-        table = "CONTACTS" if name in scene.contacts() else "NAMES"
-        found.add(module(joints, joint.type, where=f"[joint.{name}]", table=table))
-        if joint.type in constants(joints)["HELD"]:
-            found.add(module(joints, constants(joints)["HELD"][joint.type], where=f"[joint.{name}]"))
-    several = ("universal", "cylindrical", "planar", *constants(joints)["HELD"])
-    if any(j.type in several for j in scene.joint.values()) or any(
-        not hasattr(d, "joint") for d in scene.drive.values()
-    ):
-        found |= {module(joints, name, where="joint") for name in CHAIN}
-    for name, contact in scene.contacts().items():
-        where = f"[joint.{name}.normal]"
-        found.add(module(f"{DYNAMICS}.contact", contact.type, where=where))
-        found.add(module(f"{DYNAMICS}.contact.normal", contact.normal.law, where=where))
-        if contact.friction is not None:
-            where = f"[joint.{name}.friction]"
-            found.add(module(f"{DYNAMICS}.contact.friction", contact.friction.law, where=where))
-    found |= {module(f"{DYNAMICS}.drives", law, where="law") for law in laws}
-    if scene.output.stress is not None:
-        found.add(module(f"{DYNAMICS}.record", "stress", where="[output]"))
-    for name, load in scene.load.items():
-        found.add(module(f"{DYNAMICS}.loads", load.type, where=f"[load.{name}]"))
-    return tuple(sorted(found))
+    return sources.modules(scene)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from stages.s4_simulate import bundles
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.workflow.execute import Progress
+    from pipeline.core.progress import Progress
 
 
 def gl_state() -> str:

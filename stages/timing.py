@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.progress import Progress, silent
 from stages.s4_simulate import rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.scene.schema import Scene
-    from pipeline.core.workflow.execute import Progress
 
 #: each scene is run so often, as the median of three is not moved by one disturbed run; but a second run that takes
 #: the same to within this share shows that nothing disturbs
@@ -21,9 +21,8 @@ REPEATS, CLOSE = 3, 0.02
 EQUAL_ERROR, SHARE = 1e-6, 0.05
 #: this share of a run, unmeasured, fetches its code
 WARM = 0.01
-#: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]
-STEP = 1e-5
-METHOD = "adams-bashforth-moulton"
+#: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]; which one, they do not say
+PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -56,7 +55,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for way in ways:
         data[f"{way}_cpu_seconds"] = (("scene", "repeat"), seconds[way], {"units": "s"})
         data[f"{way}_evaluations"] = (("scene",), evaluations[way], {"units": "1"})
-    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": SHARE, "step": STEP}
+    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": SHARE, "step": PAPER["step"]}
     attributes["refused"] = "; ".join(refused)
     return {"nc": xr.Dataset(data, coords={"scene": names}, attrs=attributes)}
 
@@ -89,18 +88,20 @@ def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:
     return edited(scene, {"accuracy": None, "ensemble": None, **edit})
 
 
+def paper_solver(scene: Scene) -> dict[str, Any]:
+    """The paper's method as the table of a scene's solver; contacts are noticed at the ends of steps."""
+    return {**PAPER, **({"events": "at step ends"} if scene.contacts() else {})}
+
+
 def paper_scene(scene: Scene) -> Scene:
-    """A scene with the paper's method; contacts are noticed at the ends of steps."""
-    solver = {"integrator": METHOD, "step": STEP} | ({"events": "at step ends"} if scene.contacts() else {})
-    return _edited(scene, {"solver": solver})
+    """A scene with the paper's method."""
+    return _edited(scene, {"solver": paper_solver(scene)})
 
 
 def _simulation(bundles: Mapping[str, xr.Dataset]) -> Callable[[Scene], xr.Dataset]:
     from pipeline import dynamics
 
-    def silent(fraction: float | None, text: str) -> None:
-        """Reports would be part of what is measured."""
-
+    # reports would be part of what is measured
     return lambda scene: dynamics.simulate(scene, bundles, silent)
 
 

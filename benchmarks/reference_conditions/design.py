@@ -1,14 +1,12 @@
-"""What is compared: mode sets, places of the prismatic joint, and the runs that this takes."""
+"""What is compared: mode sets and places of the prismatic joint, and the run that a case takes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pipeline
-from pipeline.core.errors import InputError
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
 from stages import s4_simulate
@@ -102,53 +100,3 @@ def _told_apart(made: Task, case: Case) -> Task:
     """The task and its inputs under the case's name: progress is told by name, and many cases share a scene."""
     above = {name: _told_apart(task, case) for name, task in made.inputs.items()}
     return replace(made, scene=f"{made.scene}, {case.label}, elements x {case.finer}", inputs=above)
-
-
-@cache
-def whole(place: int, condition: str, count: int) -> int:
-    """The least whole count that is not below `count`."""
-    from benchmarks.reference_conditions.statics import solved
-
-    while True:
-        try:
-            solved(Case(place, condition, count))
-        except InputError as error:
-            if "cut a cluster" not in str(error):
-                raise
-            count += 1
-        else:
-            return count
-
-
-def far(places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
-    """Ideal joints: rigid, every condition, the full rod; at the first place in all counts and meshes."""
-    found = []
-    for place in places:
-        found += [Case(place, RIGID), Case(place, FULL)]
-        found += [Case(place, c, whole(place, c, COUNT)) for c in CONDITIONS]
-        found += [Case(place, c, whole(place, c, 7)) for c in ("free-free", "fixed-fixed")]
-    found += [Case(places[0], c, whole(places[0], c, n)) for c in CONDITIONS for n in FAR_COUNTS]
-    found += [Case(places[0], "craig-bampton", COUNT, finer=n) for n in FINER]
-    return list(dict.fromkeys(found))
-
-
-def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
-    """Clearance at A1: likewise, as ensembles."""
-    found = []
-    for place in places:
-        found.append((place, RIGID, COUNT))
-        sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in ("free-free", "fixed-fixed")]
-        sets += [("craig-bampton", n) for n in MOST_COMPLETE]
-        found += [(place, c, whole(place, c, n)) for c, n in sets]
-    first = places[0]
-    for condition in ("free-free", "craig-bampton"):
-        found += [(first, condition, whole(first, condition, n)) for n in CLEARANCE_COUNTS]
-    return [Case(*key, clearance=True, members=_share(members, *key[1:])) for key in dict.fromkeys(found)]
-
-
-def _share(members: int, condition: str, count: int) -> int:
-    """Members of an ensemble: fewer where a run is dear; a rigid rod has one run."""
-    if condition == RIGID:
-        return 0
-    # whole counts may lie a little above COUNT
-    return members if count < MOST_COMPLETE[0] else max(2, round(LARGE_SETS * members))

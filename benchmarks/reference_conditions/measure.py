@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 import pipeline
-from benchmarks.reference_conditions import design, statics
+from benchmarks.reference_conditions import chosen, design, statics
 from benchmarks.reference_conditions.cases import BODY
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, PLACES, RIGID, TIMES, Case
 from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
@@ -60,7 +60,7 @@ def mesh_rows() -> Iterator[Row]:
 def frequency_rows() -> Iterator[Row]:
     """Lowest frequencies [Hz] of the assembled mechanism, drives held, at each of `TIMES`."""
     for where in PLACES:
-        sets = [Case(where, c, design.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
+        sets = [Case(where, c, statics.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
         for case in sets:
             for time in TIMES:
                 found = pipeline.frequencies(design.scene(case), time)["undamped_frequency"].values
@@ -70,7 +70,7 @@ def frequency_rows() -> Iterator[Row]:
 
 def far_rows(place: Workplace) -> Iterator[Row]:
     """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
-    runs = bring(design.far(), place)
+    runs = bring(chosen.far(), place)
     for case, run in runs.items():
         rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
         effect = max_deviation(run, rigid, BODY)
@@ -84,7 +84,7 @@ def far_rows(place: Workplace) -> Iterator[Row]:
 
 def clearance_rows(place: Workplace, members: int) -> Iterator[Row]:
     """Clearance at A1: means and standard deviations over the members of each set, one run of the rigid rod."""
-    runs = bring(design.clearance(members), place)
+    runs = bring(chosen.clearance(members), place)
     rigid = bring([Case(where, RIGID) for where in PLACES], place)
     for case, run in runs.items():
         ideal = rigid[Case(case.place, RIGID)]

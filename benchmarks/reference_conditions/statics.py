@@ -46,6 +46,20 @@ def full(place: int) -> dict[str, float]:
     return {d: float(found.sel(direction=d)) for d in (AXIAL, BENDING, TORSION)}
 
 
+@cache
+def whole(place: int, condition: str, count: int) -> int:
+    """The least whole count that is not below `count`."""
+    while True:
+        try:
+            solved(Case(place, condition, count))
+        except InputError as error:
+            if "cut a cluster" not in str(error):
+                raise
+            count += 1
+        else:
+            return count
+
+
 def whole_counts(place: int, condition: str, most: int) -> list[int]:
     """Counts up to `most` that cut no pair."""
     found = []

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.stability.cases import ALONG, RANGES
 from benchmarks.stability.mechanism import Parameters
 from benchmarks.stability.outcome import FINISHED, LEDGER, REFUSED, WRONG, Outcome
+from pipeline.core.integrators import DEFAULT, INTEGRATORS
 from pipeline.post.plotting.style import SOFT, plt, style
 
 if TYPE_CHECKING:
@@ -35,7 +36,10 @@ LABELS = {
 #: planes in which the random points are shown
 PLANES = (("clearance", "stiffness"), ("speed", "mass"), ("restitution", "friction"), ("nearness", "joints"))
 #: symbols by the integrator that made the run
-SYMBOLS = {"dop853": ("o", "as asked for"), "radau": ("s", "an implicit method took over")}
+SYMBOLS = {
+    DEFAULT: ("o", "as asked for"),
+    INTEGRATORS[DEFAULT].hands_over_to: ("s", "an implicit method took over"),
+}
 
 
 @dataclass(frozen=True)

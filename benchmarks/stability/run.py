@@ -14,6 +14,8 @@ from benchmarks.stability.outcome import REFUSED, WRONG, Outcome, judge
 from pipeline import dynamics
 from pipeline.core import quantities
 from pipeline.core.errors import FlexclearError, SolverError
+from pipeline.core.progress import silent
+from pipeline.core.scene.wanted import parse
 from pipeline.dynamics.run.run import engine_of
 from stages import s1_mesh, s2_modes, s3_bundle
 
@@ -37,10 +39,10 @@ def run_case(parameters: Parameters, compiled: Callable[[], None] = lambda: None
     try:
         described = scene(parameters)
         reduced = bundles(described)
-        engine_of(described, reduced, _quiet)
+        engine_of(described, reduced, silent)
         compiled()
         begun = time.process_time()
-        run = dynamics.simulate(described, reduced, _quiet)
+        run = dynamics.simulate(described, reduced, silent)
         seconds = time.process_time() - begun
         return judge(run, _deviation(parameters, described, run), seconds)
     except SolverError as error:
@@ -61,9 +63,9 @@ def _asked(described: Scene, body: str) -> tuple[str, str]:
 
 @cache
 def _bundle(recipe: str, modes: str, bundle: str) -> xr.Dataset:
-    mesh = s1_mesh.run(s1_mesh.params(Path(recipe)), {}, _quiet)["nc"]
-    found = {"mesh": mesh, "modes": s2_modes.run(json.loads(modes), {"mesh": mesh}, _quiet)["nc"]}
-    made: Any = s3_bundle.run(json.loads(bundle), found, _quiet)["nc"]
+    mesh = s1_mesh.run(s1_mesh.params(Path(recipe)), {}, silent)["nc"]
+    found = {"mesh": mesh, "modes": s2_modes.run(json.loads(modes), {"mesh": mesh}, silent)["nc"]}
+    made: Any = s3_bundle.run(json.loads(bundle), found, silent)["nc"]
     return made
 
 
@@ -76,13 +78,9 @@ def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> flo
         return float("nan")
     tight_scene = scene(parameters, max(TIGHTEST, described.solver.rtol * TIGHTER))
     try:
-        tight = dynamics.simulate(tight_scene, bundles(tight_scene), _quiet)
+        tight = dynamics.simulate(tight_scene, bundles(tight_scene), silent)
     except FlexclearError:
         return float("nan")
-    velocity = quantities.parse("platform.velocity", described.owners())
+    velocity = parse("platform.velocity", described.owners())
     until = min(float(run["horizon"]), float(tight["horizon"]))
     return quantities.error(run, tight, velocity, until) / quantities.scale(run, velocity)
-
-
-def _quiet(share: float | None, text: str) -> None:
-    """Nobody watches."""

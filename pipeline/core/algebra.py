@@ -10,6 +10,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from pipeline.core.axes import check_axes
+
 
 def skew(v: np.ndarray) -> np.ndarray:
     """Matrix of the cross product, ``skew(v) @ w == cross(v, w)``; shape (..., 3, 3)."""
@@ -75,28 +77,17 @@ def rotation_vector_to_matrix(v: np.ndarray) -> np.ndarray:
     return quaternion_to_matrix(rotation_vector_to_quaternion(v))
 
 
-def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Components of v, given in the rotated frame, in the parent frame."""
-    return np.einsum("...ij,...j->...i", quaternion_to_matrix(q), v)
-
-
 def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float]]) -> np.ndarray:
     """Rotation matrix whose columns are the frame's axes in the parent.
 
     axes: two named axes (the first exact, the second made perpendicular), or all three.
-    Raises ValueError, in words, when they define no right-handed frame.
+    Raises ValueError as `check_axes` does.
     """
+    check_axes(axes)
     if not isinstance(axes, Mapping):
-        R = np.array(axes, dtype=float).T
-        if not np.allclose(R.T @ R, np.eye(3), atol=1e-6) or np.linalg.det(R) < 0:
-            raise ValueError("three axes are the unit vectors x, y, z of a right-handed frame")
-        u, _, vt = np.linalg.svd(R)
+        u, _, vt = np.linalg.svd(np.array(axes, dtype=float).T)
         return u @ vt
-    if len(axes) != 2 or not set(axes) <= {"x", "y", "z"}:
-        raise ValueError("axes are two of x, y, z, each with its direction in the parent")
     (first, a), (second, b) = ((name, np.array(v, dtype=float)) for name, v in axes.items())
-    if not np.linalg.norm(a) > 0 or np.linalg.norm(np.cross(a, b)) <= 1e-9 * np.linalg.norm(a) * np.linalg.norm(b):
-        raise ValueError("the two axes are zero or parallel")
     a = a / np.linalg.norm(a)
     b = b - a * (a @ b)
     b = b / np.linalg.norm(b)

@@ -1,11 +1,16 @@
-"""From a name in a scene to the part it names, imported only when it is asked for."""
+"""From a name in a scene to the part it names, imported only when it is asked for.
+
+A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to
+``"module:object"``; some hold further tables of that shape. It imports none of its modules. Where a scene's models
+(`pipeline.core.scene`) name the parts of a family already, the table is made from them by `declared`.
+"""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib import import_module
-from typing import Any
+from typing import Any, get_args
 
 from pipeline.core.errors import InputError
 
@@ -13,23 +18,42 @@ from pipeline.core.errors import InputError
 LISTED = 40
 
 
-def lookup(package: str, name: str, *, where: str) -> Any:
-    """The object that `package` lists under `name` in its NAMES, its module imported now.
+def listed(package: str, name: str, *, where: str, table: str = "NAMES") -> tuple[str, str]:
+    """Module (below the package) and object that a family lists under `name`; neither is imported.
 
-    `package` is a family folder whose ``__init__`` holds ``KIND`` (for messages) and ``NAMES``,
-    a table from the scene's name to ``"module:object"``.  Raises InputError for an unknown name.
+    Raises InputError, placed at `where`, for a name that the family does not have.
     """
     family = import_module(package)
-    names: Mapping[str, str] = family.NAMES
+    names: Mapping[str, str] = getattr(family, table)
     if name not in names:
         raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
     module, _, attribute = names[name].partition(":")
+    return module, attribute
+
+
+def module_of(package: str, name: str, *, where: str = "", table: str = "NAMES") -> str:
+    """Full name of the module that a family lists under `name`, which is not imported; InputError as of `listed`."""
+    return f"{package}.{listed(package, name, where=where, table=table)[0]}"
+
+
+def lookup(package: str, name: str, *, where: str) -> Any:
+    """The object that a family lists under `name` in its NAMES, its module imported now; InputError for others."""
+    module, attribute = listed(package, name, where=where)
     return getattr(import_module(f"{package}.{module}"), attribute)
 
 
-def module_of(package: str, name: str, table: str = "NAMES") -> str:
-    """Full name of the module that a family's table lists under `name`, without importing it."""
-    return f"{package}.{getattr(import_module(package), table)[name].partition(':')[0]}"
+def declared(models: Iterable[Any], key: str = "type", made: str = "") -> dict[str, str]:
+    """The table of a family whose parts a scene's models declare: 'point-force' is in the module `point_force`.
+
+    The object there is called like the model, or `made`.  key: field of the models that holds the name.
+    """
+    names = {name: model for model in models for name in get_args(model.model_fields[key].annotation)}
+    return {name: f"{module_name(name)}:{made or model.__name__}" for name, model in names.items()}
+
+
+def module_name(name: str) -> str:
+    """Module of a part that a scene calls `name`."""
+    return name.replace("-", "_")
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:

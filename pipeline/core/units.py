@@ -7,8 +7,6 @@ import re
 from collections.abc import Iterable
 from functools import cache
 
-import numpy as np
-
 Exponents = tuple[float, float, float, float]
 
 #: factor to SI and physical dimension of every unit that a scene or recipe may use
@@ -126,7 +124,7 @@ def _product(text: str) -> tuple[float, Exponents] | None:
     """Factor to SI and exponents of kg, m, s and rad; None when a part of it is no unit."""
     if text in UNITS:
         return UNITS[text][0], _EXPONENTS[UNITS[text][1]]
-    factor, total = 1.0, np.zeros(4)
+    factor, total = 1.0, [0.0] * 4
     for k, side in enumerate(text.split("/")):
         for part in side.split() or [""]:
             found = _FACTOR.fullmatch(part)
@@ -134,8 +132,8 @@ def _product(text: str) -> tuple[float, Exponents] | None:
                 return None
             power = float(found[2] or 1.0) * (-1.0 if k else 1.0)
             factor *= UNITS[found[1]][0] ** power
-            total += power * np.array(_EXPONENTS[UNITS[found[1]][1]])
-    kg, m, s, rad = total.tolist()
+            total = [known + power * one for known, one in zip(total, _EXPONENTS[UNITS[found[1]][1]], strict=True)]
+    kg, m, s, rad = total
     return factor, (kg, m, s, rad)
 
 

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
-
-Progress = Callable[[float | None, str], None]
 
 __all__ = ["ensemble", "equilibrium", "frequencies", "simulate"]
 
@@ -75,5 +74,5 @@ def frequencies(
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from pipeline.dynamics.linear import dataset, solve, vibrations
 
-    bench, found = solve.equilibrium(scene, bundles, progress, time, drives, moving)
-    return dataset.linear(bench, found, vibrations.vibrations(bench, found.at), moving)
+    bench, rest = solve.equilibrium(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, vibrations.vibrations(bench, rest.at), moving)

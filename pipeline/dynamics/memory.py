@@ -188,8 +188,8 @@ _FRAME = "origin:3 axes:9 omega:3 velocity:3 alpha:3 acceleration:3"
 FRAME = record(_FRAME)
 X, U, DU = _places(3)
 LINK_FRAMES, SITE_FRAMES = work(_FRAME), work(_FRAME)
-#: the motion of one joint: rates and their biases, then a column per freedom
-JOINT = work("rotation:9 position:3 omega:3 velocity:3 alpha:3 acceleration:3 columns:36")
+#: the motion subspace S of one joint: a twist per freedom, axes of its first frame
+SUBSPACE = work("angular:3 linear:3")
 #: spatial inertia: mass, mass * centre, inertia about the kernels' origin (xx yy zz xy xz yz); of the link, of its tree
 OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")

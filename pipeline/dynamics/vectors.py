@@ -9,6 +9,8 @@ import numpy as np
 
 from pipeline.dynamics.kernels import kernel
 
+ZERO, IDENTITY = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
 
 @kernel
 def at(a, i):

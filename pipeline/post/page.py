@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import html
 import re
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from pipeline.post.discrepancies import DISCREPANCIES
 from pipeline.post.paper import CITATION
-from pipeline.post.plotting.table import as_html
-
-if TYPE_CHECKING:
-    from pipeline.post.report import Content
+from pipeline.post.plotting.table import Table, as_html
 
 STYLE = """
 :root { --ink: #1f2933; --soft: #5b6570; --line: #dde3ea; --back: #f7f9fb; --accent: #0072B2; }
@@ -35,6 +32,19 @@ th:first-child, td:first-child { text-align: left; } thead th { border-bottom: 2
 table.prose td, table.prose th { text-align: left; }
 figure p { color: var(--soft); font-size: .9rem; margin: .7rem 0 0; } code { font-size: .86em; }
 """
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """All that a report shows. Paths are relative to the report's folder."""
+
+    figures: tuple[str, ...]  #: names with a PNG
+    tables: Mapping[str, Table]
+    assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
+    film: str | None = None
+    still: str | None = None
+    links: Mapping[str, str] = field(default_factory=dict)  #: text -> path
+    facts: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  #: scene -> run attributes
 
 
 def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: Sequence[tuple[str, str, str]]) -> str:

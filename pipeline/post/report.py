@@ -4,42 +4,26 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import xarray as xr
 
 from pipeline.post import figures
 from pipeline.post.discrepancies import DISCREPANCIES
-from pipeline.post.page import html_page
+from pipeline.post.page import Content, html_page
 from pipeline.post.paper import CITATION
 from pipeline.post.plotting.table import Table, from_markdown
 
-#: the film and the browser page are those of this scene, the paper's full model
-HEADLINE = "sps4/far_csj_cb"
 
-
-@dataclass(frozen=True, slots=True)
-class Content:
-    """All that a report shows. Paths are relative to the report's folder."""
-
-    figures: tuple[str, ...]  #: names with a PNG
-    tables: Mapping[str, Table]
-    assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
-    film: str | None = None
-    still: str | None = None
-    links: Mapping[str, str] = field(default_factory=dict)  #: text -> path
-    facts: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  #: scene -> run attributes
-
-
-def collect(results: Path, attributes: Mapping[str, Mapping[str, object]]) -> Content:
+def collect(results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str) -> Content:
     """What lies in a results folder (figures/, tables/, runs/<scene>/).
 
-    attributes: scene -> attributes of its run.  Whatever is not there is left out.
+    attributes: scene -> attributes of its run.  rendered: the scene whose film and pictures are shown.
+    Whatever is not there is left out.
     """
     tables = {path.stem: from_markdown(path.read_text()) for path in sorted((results / "tables").glob("table*.md"))}
     drawn = tuple(name for name in figures.NAMES if (results / "figures" / f"{name}.png").is_file())
-    folder = results / "runs" / HEADLINE
+    folder = results / "runs" / rendered
     films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]
     still = folder / "mechanism.png"
     return Content(

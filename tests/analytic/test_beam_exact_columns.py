@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.structure.modes import exact, solve
+from pipeline.structure.closed_form import beside
+from pipeline.structure.modes import solve
 from tests.analytic.beam_models import build
 
 FINE: dict[str, Any] = {"elements": 24, "torsion": "quadratic", "extension": "quadratic"}
@@ -26,7 +27,7 @@ def test_held_ends_have_their_exact_frequencies(reference: str, interfaces: tupl
     rod = build(**FINE, theory=theory)
     families = LOWEST[reference]
     found = solve(rod, reference, len(families), interfaces)["frequency"].values
-    expected = exact.columns(rod, reference, families, interfaces)[THEORIES[theory]]
+    expected = beside.columns(rod, reference, families, interfaces)[THEORIES[theory]]
     # the third pair of bending with 24 elements: 3e-5
     np.testing.assert_allclose(found, expected, rtol=1e-4)
 
@@ -34,8 +35,8 @@ def test_held_ends_have_their_exact_frequencies(reference: str, interfaces: tupl
 def test_an_interface_inside_the_rod_has_no_closed_form() -> None:
     rod = build(frames={"bottom": {"x": 0.0}, "inside": {"x": 0.06}, "top": {"x": 0.24}})
     for reference in ("cantilever", "pinned-pinned"):
-        assert exact.columns(rod, reference, ["bending_y"], ("inside", "top")) == {}
-    assert exact.columns(rod, "craig-bampton", ["bending_y"], ("bottom", "top")) == {}
+        assert beside.columns(rod, reference, ["bending_y"], ("inside", "top")) == {}
+    assert beside.columns(rod, "craig-bampton", ["bending_y"], ("bottom", "top")) == {}
 
 
 @pytest.mark.parametrize(
@@ -57,12 +58,12 @@ def test_an_interface_inside_the_rod_has_no_closed_form() -> None:
     ids=["mass", "taper", "skew"],
 )
 def test_other_rods_have_none(changes: dict[str, Any]) -> None:
-    assert exact.columns(build(**changes), "free-free", ["bending_y"]) == {}
+    assert beside.columns(build(**changes), "free-free", ["bending_y"]) == {}
 
 
 def test_a_section_without_kappa_has_no_timoshenko_column() -> None:
     section = {"type": "general", "area": 3e-4, "torsion": 1e-8, "second_y": 8e-9, "second_z": 5e-9}
-    assert set(exact.columns(build(section=section), "free-free", ["bending_y"])) == {
+    assert set(beside.columns(build(section=section), "free-free", ["bending_y"])) == {
         "exact_euler_bernoulli",
         "exact_rayleigh",
     }

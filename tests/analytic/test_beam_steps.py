@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+from pipeline.structure.closed_form import frequencies as closed_form
 from pipeline.structure.fe import beam, mesh
 from pipeline.structure.fe.slices import slices
-from pipeline.structure.modes import closed_form
 from tests.analytic.beam_models import RECIPE, build, order
 from tests.analytic.beam_solutions import PAPER_ROD
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
@@ -155,7 +155,8 @@ def test_segments_of_one_section_are_the_straight_rod() -> None:
     kept = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
     cut, whole = mesh.build({**kept, "shape": shape}), build()
     for name in whole.data_vars:
-        np.testing.assert_allclose(cut[name].values, whole[name].values, rtol=1e-15, atol=1e-16, err_msg=str(name))
+        # places are sums of lengths on two ways, which rounding may set some units of the last place apart
+        np.testing.assert_allclose(cut[name].values, whole[name].values, rtol=1e-14, atol=1e-15, err_msg=str(name))
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import xarray as xr
 
 from pipeline import dynamics
 from pipeline.core.errors import InputError
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.post import derive
@@ -26,13 +27,9 @@ def scene() -> Scene:
     return load_scene(TREE / "scenes/checks/bounce.toml", override={"ensemble": asked, "time.end": END})
 
 
-def _quiet(share: float | None, text: str) -> None:
-    """Nobody watches."""
-
-
 @cache
 def members() -> xr.Dataset:
-    return dynamics.ensemble(scene(), {}, _quiet)
+    return dynamics.ensemble(scene(), {}, silent)
 
 
 def test_members_start_the_asked_distance_apart_and_fall_alike() -> None:
@@ -99,7 +96,7 @@ def carried(**path: Any) -> Scene:
 def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
     """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
     asked = carried(actuators=["rail"])
-    known, members = dynamics.simulate(asked, {}, _quiet), dynamics.ensemble(asked, {}, _quiet)
+    known, members = dynamics.simulate(asked, {}, silent), dynamics.ensemble(asked, {}, silent)
     closings = known.event_kind.values == 1
     assert 2 <= closings.sum() < 20
     assert members.impact_count.values.tolist() == [[closings.sum()]] * 2
@@ -112,4 +109,4 @@ def test_members_whose_actuators_cannot_do_it_are_refused_like_the_run() -> None
     asked = carried(actuators=["rail.spin"])
     for made in (dynamics.simulate, dynamics.ensemble):
         with pytest.raises(InputError, match="spin"):
-            made(asked, {}, _quiet)
+            made(asked, {}, silent)

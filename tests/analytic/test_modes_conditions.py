@@ -113,14 +113,15 @@ def means(model: Model) -> sp.csr_array:
 def test_dense_and_sparse_solvers_agree_on_held_functionals(
     monkeypatch: pytest.MonkeyPatch, body: Flexibility, rows: Callable[[Model], sp.csr_array]
 ) -> None:
-    from pipeline.structure.kinds.kind import silent
+    from pipeline.core.progress import silent
     from pipeline.structure.modes import normal
 
     held = rows(body.model)
     dense = normal.lowest(body.model, held, 8, lambda: body, silent)
     monkeypatch.setattr(eigen, "DENSE_LIMIT", 10)
     sparse = normal.lowest(body.model, held, 8, lambda: body, silent)
-    np.testing.assert_allclose(sparse.values, dense.values, rtol=1e-9)
+    # eigenvalues span 1.2e6: the lowest is known to eps times that, 2.6e-10; ten times that
+    np.testing.assert_allclose(sparse.values, dense.values, rtol=3e-9)
     for found in (dense, sparse):
         # what is held moves by rounding only, beside motions of 1 / sqrt(m) = 2
         assert np.abs(held @ found.shapes).max() < 1e-9

@@ -26,7 +26,8 @@ def test_a_twin_of_a_motion_that_does_not_return_starts_where_the_run_does():
 def test_the_undamped_flexible_mechanism_is_believed_for_a_part_of_the_stroke_only():
     """Perturbations grow by 1e6 to 1e7 within 0.1 s there; pointwise claims end at 12 to 70 ms."""
     far = run("sps4/far_csj_cb")
-    assert 0.012 < float(far.horizon) < 0.12
+    # before the first impact, at 6.9 ms, nothing parts
+    assert 0.0069 < float(far.horizon) < 0.12
     after = far.twin_time.values > float(far.horizon)
     assert far.twin_separation.values[after].max() > 1e3 * far.twin_separation.values[1:4].max()
 

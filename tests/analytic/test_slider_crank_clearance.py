@@ -39,9 +39,10 @@ def test_contacts_begin_and_end_when_and_as_hard_as_in_the_plane() -> None:
 
 def test_largest_force_and_penetration_are_those_in_the_plane() -> None:
     dataset, begin = run(SCENE, OVERRIDES), rows("closing")[:3]
-    # the reference samples each contact 4001 times: a parabola's top is missed by (1/8000)^2 of its curvature
-    assert dataset.event_peak_force.values[begin] == pytest.approx([i.force for i in known()], rel=1e-6)
-    assert dataset.event_peak_penetration.values[begin] == pytest.approx([i.depth for i in known()], rel=1e-6)
+    # as above; besides, the reference samples each contact 4001 times: a parabola's top is missed by (1/8000)^2 of its
+    # curvature; and here it is read from the dense output, whose order is one less than that of steps: 5e-7
+    assert dataset.event_peak_force.values[begin] == pytest.approx([i.force for i in known()], rel=5e-6)
+    assert dataset.event_peak_penetration.values[begin] == pytest.approx([i.depth for i in known()], rel=5e-6)
 
 
 def test_pin_stays_in_the_plane_of_its_journal() -> None:

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 import pipeline
 from pipeline.core.artifacts.store import write_dataset
 from pipeline.core.errors import InputError
+from pipeline.core.progress import silent
 from pipeline.core.scene.parts import FlexibleBody, Modes
 from pipeline.structure.fe.exchange import files
 from pipeline.structure.kinds.kind import of_mesh
@@ -22,10 +23,6 @@ from stages.__main__ import main
 from tests.analytic.solid_models import block, build
 
 MESHES = Path(__file__).parents[2] / "meshes"
-
-
-def silent(share: float | None, text: str) -> None:
-    """No progress."""
 
 
 def stored(data: xr.Dataset, path: Path) -> xr.Dataset:

@@ -125,8 +125,9 @@ def test_energy_and_work_of_the_spin_up_agree(case: str) -> None:
 
     Axial modes that nothing moves limit the steps by stability and ring up to the tolerance, at random: at neighbouring
     tolerances of 1e-10 the error is anything from 2e-15 to 2e-11 of the energy, whatever groups its norm has.
-    At 1e-12 what rings is a hundred times smaller, its energy ten thousand times: 1e-14 at most in thirty such runs.
+    At 1e-12 what rings is a hundred times smaller, its energy ten thousand times: of some thirty such runs the worst
+    had 3e-14.
     """
     found = spun(case, 1e-12)
-    assert np.abs(found.energy_error).max() < 1e-13 * found.kinetic.max()
-    assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-13)
+    assert np.abs(found.energy_error).max() < 1e-12 * found.kinetic.max()
+    assert found.drive_work.values[-1] == pytest.approx(found.kinetic.values[-1] + found.elastic.values[-1], rel=1e-12)

@@ -15,21 +15,24 @@ from pipeline.core.registry import module_of
 from pipeline.core.scene.load import compose, load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import loads
-from pipeline.dynamics.compile import functions as fuse
-from pipeline.dynamics.compile.sources import PACKAGES, sources
-from pipeline.dynamics.integrate.method import Scheme, scheme_of
-from pipeline.dynamics.model.contacts import ContactKinds
+from pipeline.dynamics.compile import functions
+from pipeline.dynamics.compile.sources import sources
+from pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
 from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Kinds, tabulate
+from pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import bundles
 
 CONTACT = (
     "pipeline.dynamics.contact",
     "pipeline.dynamics.joints.clearance_spherical",
-    "pipeline.dynamics.integrate.events",
-    "pipeline.dynamics.integrate.trace",
+    "pipeline.dynamics.integrate.contact_events",
+    "pipeline.dynamics.integrate.contact_phases",
 )
-LOADS = ("pipeline.dynamics.loads.fields", "pipeline.dynamics.loads.composing", "pipeline.dynamics.drives.oscillation")
+APPLIED = (
+    "pipeline.dynamics.loads.fields",
+    "pipeline.dynamics.loads.composing",
+    "pipeline.dynamics.drives.oscillation",
+)
 FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
@@ -61,7 +64,7 @@ def below(names: set[str], families: tuple[str, ...]) -> set[str]:
 def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: Path) -> None:
     names = imported_by_a_run(root, IDEAL)
     assert "pipeline.dynamics.joints.spherical" in names
-    assert below(names, (*CONTACT, *FLEXIBLE, *LOADS)) == set()
+    assert below(names, (*CONTACT, *FLEXIBLE, *APPLIED)) == set()
 
 
 def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
@@ -76,48 +79,56 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
 # What is compiled ---------------------------------------------------------------------------------------------------
 
 
-def kinds_of(scene: Scene) -> Kinds:
-    return tabulate(build(scene, bundles(scene))).kinds
+def parts_of(scene: Scene) -> Parts:
+    return tabulate(build(scene, bundles(scene))).parts
 
 
 @cache
-def kinds(path: Path) -> Kinds:
-    return kinds_of(load_scene(path))
+def parts(path: Path) -> Parts:
+    return parts_of(load_scene(path))
 
 
 def reached(texts: dict[str, str]) -> set[str]:
     """Modules of this tower that the machine code depends on."""
-    return {name for text in texts.values() for name in fuse.reached(text)}
+    return {name for text in texts.values() for name in functions.reached(text)}
 
 
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
     "contact": ("clearance_spherical", "pipeline.dynamics.joints.clearance_spherical"),
-    "normal law": ("import force as form_force", "pipeline.dynamics.contact.form.hysteretic"),
+    "normal law": ("import hysteretic", "pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
-    "flexible bodies": ("import flexible, ports", "pipeline.dynamics.bodies.flexible"),
-    "closures": ("equations.closures", "pipeline.dynamics.equations.closures"),
+    "flexible bodies": ("flexible_bodies", "pipeline.dynamics.bodies.flexible"),
+    "closures": ("closures=closures", "pipeline.dynamics.equations.closures"),
     "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
-    "loads": ("import composing", "pipeline.dynamics.loads.composing"),
+    "loads": ("make_loads", "pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),
 }
-SPRING, NONE = ("spring-damper",), ContactKinds()
-SMOOTH = ContactKinds(("clearance-spherical",), ("hysteretic",))
-RUBBING = ContactKinds(("clearance-spherical",), ("hysteretic",), ("modified-coulomb",))
-CASES = {
-    "tree": (Kinds(("spherical",), NONE, False, False), set()),
-    "ideal": (Kinds(("prismatic", "spherical"), NONE, False, True), {"closures"}),
-    "smooth clearance": (Kinds(("free",), SMOOTH, False, False), {"contact", "normal law"}),
+SPRING = ("spring-damper",)
+SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
+RUBBING = {**SMOOTH, "frictions": ("modified-coulomb",)}
+CASES: dict[str, tuple[Parts, set[str]]] = {
+    "tree": (Parts(("spherical",)), set()),
+    "ideal": (Parts(("prismatic", "spherical"), closures=True), {"closures"}),
+    "smooth clearance": (Parts(("free",), **SMOOTH), {"contact", "normal law"}),
     "clearance": (
-        Kinds(("prismatic", "spherical"), RUBBING, False, True),
+        Parts(("prismatic", "spherical"), **RUBBING, closures=True),
         {"contact", "normal law", "friction", "closures"},
     ),
-    "flexible": (Kinds(("fixed",), NONE, True, False), {"flexible bodies"}),
-    "stiffened": (Kinds(("fixed",), NONE, True, False, stiffening=True), {"flexible bodies", "stiffening"}),
-    "springs": (Kinds(("prismatic",), NONE, False, False, loads=SPRING), {"loads"}),
-    "waves": (Kinds(("prismatic",), NONE, False, False, harmonics=True), {"harmonics"}),
+    "flexible": (Parts(("fixed",), flexible=True), {"flexible bodies"}),
+    "stiffened": (Parts(("fixed",), flexible=True, stiffening=True), {"flexible bodies", "stiffening"}),
+    "springs": (Parts(("prismatic",), loads=SPRING), {"loads"}),
+    "waves": (Parts(("prismatic",), harmonics=True), {"harmonics"}),
     "everything": (
-        Kinds(("fixed", "spherical"), RUBBING, True, True, True, ("joint-friction", *SPRING), stiffening=True),
+        Parts(
+            ("fixed", "spherical"),
+            **RUBBING,
+            loads=("joint-friction", *SPRING),
+            closures=True,
+            flexible=True,
+            stiffening=True,
+            harmonics=True,
+        ),
         set(EFFECTS),
     ),
 }
@@ -138,7 +149,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     """An edit of a part that a scene does not use leaves its machine code alone."""
     found, present = CASES[case]
     modules = reached(sources(found, SCHEME))
-    wanted = {module_of(PACKAGES["joint"], n) for n in found.joints}
+    wanted = {module_of(JOINTS, n) for n in found.joints}
     wanted.add("pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
         wanted.add("pipeline.dynamics.joints.clearance_spherical")
@@ -147,8 +158,8 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
         assert below(modules, FLEXIBLE) == set()
-    acting = {module_of(PACKAGES["load"], n) for n in found.loads}
-    kinds_of_loads = {module_of(PACKAGES["load"], n) for n in loads.NAMES}
+    acting = {module_of(LOADS, n) for n in found.loads}
+    kinds_of_loads = {module_of(LOADS, n) for n in loads.NAMES}
     assert modules & kinds_of_loads == acting
 
 
@@ -160,12 +171,12 @@ def test_frictionless_clearance_reaches_no_friction_law() -> None:
 # What the machine code is keyed by ----------------------------------------------------------------------------------
 
 
-def digests(found: Kinds, scheme: Scheme) -> dict[str, str]:
-    return {name: fuse.digest(text) for name, text in sources(found, scheme).items()}
+def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
+    return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
 
 
 def digest(scene: Scene) -> str:
-    return " ".join(digests(kinds_of(scene), scheme_of(scene.solver)).values())
+    return " ".join(digests(parts_of(scene), scheme_of(scene.solver)).values())
 
 
 #: one number of every kind that a scene has
@@ -248,14 +259,15 @@ def test_another_set_of_laws_is_other_machine_code(root: Path) -> None:
 
 
 def test_a_flexible_rod_makes_another_kind_of_mechanism(root: Path) -> None:
-    rigid, flexible = (kinds(path_of(root, name)) for name in (CSJ, "sps4/far_csj_cb"))
+    rigid, flexible = (parts(path_of(root, name)) for name in (CSJ, "sps4/far_csj_cb"))
     assert not rigid.flexible
     assert flexible.flexible
-    assert (rigid.contacts, rigid.closures) == (flexible.contacts, flexible.closures)
+    same = ("surfaces", "forms", "frictions", "closures")
+    assert all(getattr(rigid, kind) == getattr(flexible, kind) for kind in same)
 
 
 def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(root: Path) -> None:
-    free, clamped = (kinds(path_of(root, f"sps4/far_csj_{name}")) for name in ("free", "cb"))
+    free, clamped = (parts(path_of(root, f"sps4/far_csj_{name}")) for name in ("free", "cb"))
     # the same joints in the tree and the same laws, so the same code
     assert free == clamped
 

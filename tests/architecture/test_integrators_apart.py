@@ -6,33 +6,31 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.solver import OWNERS
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
 from pipeline.dynamics.compile.sources import sources
+from pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from pipeline.dynamics.integrate import NAMES
-from pipeline.dynamics.integrate.method import Scheme, scheme_of
-from pipeline.dynamics.model.contacts import ContactKinds
-from pipeline.dynamics.model.model import Kinds
 from stages import s4_simulate
 
 PACKAGE = "pipeline.dynamics.integrate"
-KINDS = Kinds(("free",), ContactKinds(("clearance-spherical",), ("hysteretic",)), False, False)
+PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {
-    "dop853": {"dop853", "dop853_coefficients", "stages"},
-    "dopri5": {"dopri5", "stages"},
-    "rk4": {"rk4", "stages", "hermite"},
-    "adams-bashforth-moulton": {"adams", "rk4", "stages", "hermite"},
-    "generalized-alpha": {"generalized_alpha", "alpha_newton", "alpha_system", "newton", "lu", "hermite"},
-    "radau": {"radau", "radau_systems", "newton", "lu", "hermite"},
+    "dop853": {"dop853", "runge_kutta"},
+    "dopri5": {"dopri5", "runge_kutta"},
+    "rk4": {"rk4", "runge_kutta", "hermite"},
+    "adams-bashforth-moulton": {"adams", "rk4", "runge_kutta", "hermite"},
+    "generalized-alpha": {"generalized_alpha", "newton", "hermite"},
+    "radau": {"radau", "newton", "hermite"},
 }
 STEPPING = {"adaptive", "fixed"}
 
 
 def reached(scheme: Scheme) -> set[str]:
     """Modules of the family that the machine code of a scheme depends on."""
-    modules = {name for text in sources(KINDS, scheme).values() for name in fuse.reached(text)}
+    modules = {name for text in sources(PARTS, scheme).values() for name in functions.reached(text)}
     return {name.removeprefix(f"{PACKAGE}.") for name in modules if name.startswith(f"{PACKAGE}.")}
 
 
@@ -48,12 +46,12 @@ def test_chosen_and_fixed_steps_are_different_code() -> None:
 
 
 def test_events_at_step_ends_are_compiled_when_asked_for() -> None:
-    assert "step_ends" not in reached(Scheme("rk4", fixed=True))
-    assert "step_ends" in reached(Scheme("rk4", fixed=True, located=False))
+    assert "step_end_events" not in reached(Scheme("rk4", fixed=True))
+    assert "step_end_events" in reached(Scheme("rk4", fixed=True, located=False))
 
 
 def test_scenes_and_family_know_the_same_names() -> None:
-    assert set(OWNERS) == set(NAMES)
+    assert set(INTEGRATORS) == set(NAMES)
 
 
 @pytest.mark.parametrize(
@@ -74,5 +72,5 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
 @pytest.mark.parametrize("solver", [{}, {"step": 1e-5}, {"integrator": "rk4", "step": 1e-5, "events": "at step ends"}])
 def test_the_key_of_a_run_holds_what_its_code_reaches(root: Path, solver: dict) -> None:
     scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": solver})
-    known = fuse.SOURCES.closure(["stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
+    known = functions.SOURCES.closure(["stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
     assert {f"{PACKAGE}.{name}" for name in reached(scheme_of(scene.solver))} <= set(known)

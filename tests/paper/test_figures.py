@@ -13,8 +13,7 @@ import pytest
 import pipeline
 from pipeline.core.registry import lookup
 from pipeline.post import figures
-from pipeline.post.figures import fig06, sections
-from pipeline.post.plotting import shape_figure
+from pipeline.post.figures import fig06, mode_shapes, sections
 from tests.paper.material import everything
 
 TREE = Path(pipeline.__file__).parent.parent
@@ -24,7 +23,7 @@ ARTIFACTS = {"run", "tight", "post", "ensemble", "modes", "fine-modes", "bundle"
 @pytest.fixture(autouse=True)
 def _lines_only(monkeypatch):
     """Shapes as lines: what is tested here must hold without GL libraries."""
-    monkeypatch.setattr(shape_figure.gl, "works", lambda: False)
+    monkeypatch.setattr(mode_shapes.gl, "works", lambda: False)
 
 
 def made(name):

@@ -13,6 +13,7 @@ from pipeline.post import figures, report
 from pipeline.post.discrepancies import DISCREPANCIES
 from tests.paper.material import everything
 
+RENDERED = "sps4/far_csj_cb"
 REASON = "assumed: not printed in the paper"
 
 
@@ -25,7 +26,7 @@ def results(tmp_path_factory):
         folder.mkdir(exist_ok=True)
         for file, content in lookup("pipeline.post.figures", name, where="test")(everything()).items():
             (folder / file).write_bytes(content)
-    headline = root / "runs" / report.HEADLINE
+    headline = root / "runs" / RENDERED
     headline.mkdir(parents=True)
     for file in ("film.mp4", "mechanism.png", "mode_rod1.html", "modes_rod1.vtu"):
         (headline / file).write_bytes(b"stand-in")
@@ -37,7 +38,7 @@ def results(tmp_path_factory):
 def content(results):
     """What the report finds there."""
     attributes = {name: everything()[f"{name}:run"].attrs for name in ("sps4/ideal", "sps4/csj")}
-    return report.collect(results, attributes)
+    return report.collect(results, attributes, RENDERED)
 
 
 def test_every_link_of_the_page_leads_somewhere(results, content):
@@ -61,7 +62,7 @@ def test_page_shows_figures_tables_film_assumptions_and_discrepancies(content):
 
 
 def test_an_empty_results_folder_gives_a_page_without_figures(tmp_path):
-    page = report.page(report.collect(tmp_path, {})).decode()
+    page = report.page(report.collect(tmp_path, {}, RENDERED)).decode()
     assert "<img" not in page
     assert "Discrepancies" in page
 

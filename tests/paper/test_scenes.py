@@ -19,8 +19,8 @@ SCENES = TREE / "scenes"
 FILES = sorted(p.relative_to(SCENES).as_posix() for p in SCENES.glob("**/*.toml") if "sweeps" not in p.parts)
 MECHANISMS = [f for f in FILES if f.startswith("sps4/") and "frequencies" not in f]
 MAIN = ["ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb"]
-#: positions are typed to 17 digits; sums of a few lengths below 1 m round to this
-ROUNDING = 5e-16
+#: positions are typed to 17 digits; some ten products and sums of lengths below 1 m round to this, each by 1e-16
+ROUNDING = 3e-15
 
 Placement = tuple[np.ndarray, np.ndarray]
 
@@ -205,5 +205,6 @@ def test_stacked_variant_raises_centres_of_mass_only() -> None:
     moved = {"body.platform"} | {f"body.socket_{n}" for n in ("A1", "A2", "A3", "A4", "C")}
     assert differing("sps4/ideal.toml", "sps4/variants/stacked.toml") == moved
     s = scene("sps4/variants/stacked.toml")
-    assert s.body["platform"].com == pytest.approx((0.0, 0.0, 22.5e-3), abs=1e-18)
-    assert s.body["socket_C"].com == pytest.approx((0.0, 0.0, 7.048e-3), abs=1e-18)
+    # units are turned into SI by a product, and so are these: a unit of the last place, 3e-18, each
+    assert s.body["platform"].com == pytest.approx((0.0, 0.0, 22.5e-3), abs=1e-16)
+    assert s.body["socket_C"].com == pytest.approx((0.0, 0.0, 7.048e-3), abs=1e-16)

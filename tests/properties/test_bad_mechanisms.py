@@ -13,7 +13,7 @@ from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
 from pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, frame, joint, scene, turned
@@ -25,7 +25,7 @@ def _nothing_compiles(monkeypatch: pytest.MonkeyPatch) -> None:
     def entry(*args: Any) -> None:
         raise AssertionError("came as far as the kernels")
 
-    monkeypatch.setattr(fuse, "entry", entry)
+    monkeypatch.setattr(functions, "entry", entry)
 
 
 def four_bar() -> Table:

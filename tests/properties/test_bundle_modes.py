@@ -13,9 +13,10 @@ import scipy.sparse as sp
 import xarray as xr
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import silent
 from pipeline.structure.fe import beam, mesh
 from pipeline.structure.fe.model import Model
-from pipeline.structure.kinds.kind import of_mesh, silent
+from pipeline.structure.kinds.kind import of_mesh
 from pipeline.structure.modes import eigen, normal, reference, select, solve
 from pipeline.structure.modes.statics import Flexibility, support
 

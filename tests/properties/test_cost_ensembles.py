@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.quantities import Quantity, standard_error
+from pipeline.core.quantities import standard_error
+from pipeline.core.scene.wanted import Quantity
 from pipeline.post.cost import statistics
 
 POSITION = Quantity("slider", "position")

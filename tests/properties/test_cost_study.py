@@ -8,7 +8,7 @@ import xarray as xr
 
 from pipeline.core import quantities
 from pipeline.core.errors import SolverError
-from pipeline.core.quantities import Quantity
+from pipeline.core.scene.wanted import Quantity
 from pipeline.post.cost import causes, page, price, split, work_precision
 from pipeline.post.cost.study import Point, assemble, resolved
 

@@ -12,13 +12,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.registry import lookup, module_of
+from pipeline.core.registry import module_of
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import joints
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.contact import forces, friction
 from pipeline.dynamics.contact import form as forms
-from pipeline.dynamics.equations import choice as dispatch
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from tests.properties.kernels import from_python
@@ -66,12 +65,9 @@ def tables_of(laws: Laws) -> Model:
 @cache
 def kernel(laws: Laws) -> Any:
     form = import_module(module_of(forms.__name__, tables_of(laws).laws[0].form))
-    surfaces = import_module(module_of(joints.__name__, laws[2], "CONTACTS"))
-    rub = forces.frictionless()
-    if laws[1] is not None:
-        rub = forces.rubbing(dispatch.choose((lookup(friction.__name__, laws[1], where="test").traction,)))
-    chosen = (dispatch.choose((k,)) for k in (surfaces.separation, form.force, form.stored))
-    return from_python(forces.compose(*chosen, rub))
+    surfaces = import_module(module_of(joints.__name__, laws[2], table="CONTACTS"))
+    frictions = () if laws[1] is None else (import_module(module_of(friction.__name__, laws[1])),)
+    return from_python(forces.make_contacts((surfaces,), (form,), frictions))
 
 
 class Touch:
@@ -211,6 +207,6 @@ def test_rolling_is_no_sliding(laws: Laws, seed: int) -> None:
     touch = Touch(laws, seed, 1e-5, 1.0, together=True)
     assert touch.touch[m.TOUCH.rate] == pytest.approx(0.0, abs=1e-12)  # rounding of speeds of some m/s
     # a sliding speed of rounding, 1e-15 m/s, times slope 1.5 mu_s / v_s = 1e3 s/m, force 1e4 N, and speed; bent
-    # bristles bear up to mu_s of the force at any speed
+    # bristles bear up to mu_s of the force at any speed. The speed is a sum of some products of 10 m/s: ten times that
     bearing = 0.15 * touch.touch[m.TOUCH.normal_force] if laws[1] == "lugre" else 1e-3
-    assert -touch.touch[m.TOUCH.friction_power] <= 1e-15 * bearing
+    assert -touch.touch[m.TOUCH.friction_power] <= 1e-14 * bearing

@@ -16,12 +16,12 @@ from pipeline.dynamics import drives
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.oscillation import oscillate
 from pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from pipeline.dynamics.equations import prescribed_motion as known
+from pipeline.dynamics.equations.prescribed_motion import make_known_motion
 from pipeline.dynamics.model import laws
 from tests.analytic.mechanism_runs import run
 from tests.properties.kernels import from_python
 
-KNOWN_MOTION = from_python(known.compose(oscillate))
+KNOWN_MOTION = from_python(make_known_motion(oscillate))
 #: eq. (35): 60 mm out and back
 STROKE = Step(type="step", start=(0.0, 0.09), end=(0.09, 0.18), change=(0.06, -0.06))
 WAVES = {"type": "harmonic", "amplitude": [0.3, -0.1], "frequency": [2.0, "1.5 Hz"], "phase": [0.4, "90 deg"]}
@@ -119,8 +119,8 @@ def test_value_and_rate_do_not_jump_between_pieces(law: Any) -> None:
     for t in pieces(law).starts[1:]:
         for order in (0, 1):
             left, right = (value(law, t, order, side) for side in ("left", "right"))
-            # rounding of (t - start) / (end - start)
-            assert left == pytest.approx(right, abs=1e-13 * scale(law, order))
+            # some roundings of (t - start) / (end - start) and of the sum of the terms
+            assert left == pytest.approx(right, abs=1e-12 * scale(law, order))
 
 
 @every_law
@@ -145,7 +145,8 @@ def test_the_kernel_evaluates_the_pieces_and_their_exact_derivatives(law: Any) -
 @pytest.mark.parametrize("law", LAWS["spline"], ids=lambda law: f"{law.degree}-{law.ends}")
 def test_splines_pass_their_points_as_smoothly_as_they_say(law: Any) -> None:
     for t, x in zip(law.time, law.value, strict=True):
-        assert value(law, t) == pytest.approx(x, abs=1e-13)
+        # coefficients of up to `scale`, from equations whose condition is some tens
+        assert value(law, t) == pytest.approx(x, abs=1e-12)
     for t in pieces(law).starts[1:]:
         for order in range(law.degree):
             left, right = (value(law, t, order, side) for side in ("left", "right"))
@@ -210,7 +211,7 @@ def test_a_step_drive_is_the_sum_of_eq_29(steps: list[tuple[float, float, float]
 def test_the_papers_stroke_is_flat_at_its_ends_and_60_mm_high() -> None:
     # values of order 0.06 m, slopes of order 1 m/s, in rounding
     assert [value(STROKE, t) for t in (-0.1, 0.0, 0.045, 0.09, 0.135, 0.18, 1.0)] == pytest.approx(
-        [0.0, 0.0, 0.03, 0.06, 0.03, 0.0, 0.0], abs=1e-16
+        [0.0, 0.0, 0.03, 0.06, 0.03, 0.0, 0.0], abs=1e-15
     )
     assert [value(STROKE, t, 1) for t in (-0.1, 0.0, 0.045, 0.09, 0.18)] == pytest.approx(
         [0.0, 0.0, 1.5 * 0.06 / 0.09, 0.0, 0.0], abs=1e-14

@@ -114,13 +114,14 @@ def test_friction_coefficient_is_the_papers_steps(law: ModifiedCoulomb, share: f
             known = adams_step(speed, -law.v_static, -law.static, law.v_static, law.static)
         else:
             known = adams_step(speed, law.v_static, law.static, law.v_dynamic, law.dynamic)
-        # rounding of s near 1/2, where the first step passes through zero
-        assert coefficient(law, speed) == pytest.approx(known, abs=1e-15)
+        # rounding of s near 1/2, where the first step passes through zero: some times 1e-16, with a margin of ten
+        assert coefficient(law, speed) == pytest.approx(known, abs=1e-14)
 
 
 @pytest.mark.parametrize("speed, known", [(0.0, 0.0), (1e-4, 0.0), (5.5e-4, 0.05), (1e-3, 0.1), (1.0, 0.1)])
 def test_ambrosios_friction_is_a_ramp(speed: float, known: float) -> None:
-    assert coefficient(FRICTION["ambrosio"][0], speed) == pytest.approx(known, abs=1e-16)
+    # two units in the last place of 0.1, with a margin of ten
+    assert coefficient(FRICTION["ambrosio"][0], speed) == pytest.approx(known, abs=1e-15)
 
 
 @pytest.mark.parametrize("speed", [1e-4, 1e-3, 5e-3, 0.1])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.core.errors import SolverError
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import trajectory as stepping
@@ -15,9 +16,8 @@ from pipeline.dynamics.run.engine import consistent_start
 from pipeline.dynamics.run.run import observed
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
-FIXED = ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "generalized-alpha", "radau")
-ADAPTIVE = ("dop853", "dopri5", "generalized-alpha", "radau")
-SOLVERS = [{"integrator": name, "step": 0.004} for name in FIXED] + [{"integrator": name} for name in ADAPTIVE]
+ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]
+SOLVERS = [{"integrator": name, "step": 0.004} for name in INTEGRATORS] + [{"integrator": name} for name in ADAPTIVE]
 
 
 def named(solver: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""What post derives from runs: angles, deviations, horizons, impacts, sections, spectra."""
+"""What post derives from runs: angles, deviations, horizons, impacts, sections."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from pipeline.post.errors import ensemble_deviations, max_deviation
 from pipeline.post.horizon import horizon, spread
 from pipeline.post.poincare import at_times, strobe_times
 from pipeline.post.rotations import angle_about_y
-from pipeline.post.spectra import amplitude_spectrum, dominant_frequency
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)
@@ -24,8 +23,8 @@ vectors = st.tuples(*[st.floats(-3.0, 3.0)] * 3).map(np.array)
 @given(angles)
 def test_angle_about_y_is_the_angle_of_a_rotation_about_y(angle):
     q = rotation_vector_to_quaternion(np.array([0.0, angle, 0.0]))
-    # asin loses digits as the square of the distance to 90 degrees: 1/cos(1.5) = 14
-    assert angle_about_y(q) == pytest.approx(angle, abs=1e-14)
+    # asin loses digits as the square of the distance to 90 degrees: 1/cos(1.5) = 14 times the rounding of some products
+    assert angle_about_y(q) == pytest.approx(angle, abs=5e-14)
 
 
 @given(vectors, vectors, vectors)
@@ -197,17 +196,3 @@ def test_sections_are_never_interpolated():
 def test_strobe_leaves_the_transient_out():
     np.testing.assert_allclose(strobe_times(0.0, 1.0, 0.2, transient=2), [0.4, 0.6, 0.8, 1.0])
     assert strobe_times(0.0, 0.18, 0.18, transient=5).size == 0
-
-
-def test_amplitude_of_a_sine_on_a_bin():
-    time = np.arange(0.0, 0.2, 1e-4)
-    frequency, amplitude = amplitude_spectrum(time, 3.0 + 2.0 * np.sin(2 * np.pi * 250.0 * time), 1e-4)
-    k = int(np.argmin(np.abs(frequency - 250.0)))
-    assert frequency[k] == pytest.approx(250.0, rel=1e-12)
-    assert amplitude[k] == pytest.approx(2.0, rel=1e-9)  # Hann is exact on a bin; the rest is rounding
-    assert dominant_frequency(time, np.sin(2 * np.pi * 250.0 * time), 1e-4) == pytest.approx(250.0, rel=1e-12)
-
-
-def test_too_short_a_series_has_no_spectrum():
-    with pytest.raises(ValueError, match="too few"):
-        amplitude_spectrum(np.arange(5.0), np.zeros(5), 1.0)

@@ -14,7 +14,7 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
 from stages import s4_simulate
@@ -122,7 +122,7 @@ def test_it_is_refused_with_place_value_rule_and_remedy(
     def compile_nothing(*_: object) -> None:
         raise AssertionError("compiled before the input was checked")
 
-    monkeypatch.setattr(fuse, "entry", compile_nothing)
+    monkeypatch.setattr(functions, "entry", compile_nothing)
     path = tmp_path / "wrong.toml"
     path.write_text(SCENE + addition)
     with pytest.raises(InputError) as error:

@@ -1,6 +1,7 @@
 """A copy of the project with small engines in place of the real ones, to watch the workflow at work.
 
-The copy's `simulate` and `derive` write little datasets, and log each call to a file.
+The copy's `simulate` and `derive` write little datasets, and log each call to a file. `simulate` does not end while
+there is a file of the name HELD_BY.
 """
 
 from __future__ import annotations
@@ -10,11 +11,14 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+
+#: a process that is silent for so long hangs, however slow or busy the machine is [s]
+PATIENCE = 600.0
 
 ENGINE = """
 import os, time
@@ -33,7 +37,8 @@ def simulate(scene, bundles, progress):
     progress(0.5, "half way")
     if "fails" in scene.name:
         raise SolverError("at t = 0.1 s joint A1: no step is small enough")
-    time.sleep(float(os.environ.get("SECONDS", "0")))
+    while os.path.exists(os.environ.get("HELD_BY", "")):
+        time.sleep(0.01)
     time_axis = np.arange(5) * scene.output.interval
     names = ["a", "platform"]
     data = {"position": (("time", "body"), np.outer(time_axis, [1.0, 2.0]))}
@@ -98,6 +103,7 @@ class Project:
     """The copy: its folder, its results, and the calls that its engines logged."""
 
     folder: Path
+    started: list[subprocess.Popen[str]] = field(default_factory=list)
 
     @property
     def results(self) -> Path:
@@ -109,7 +115,7 @@ class Project:
 
     def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
         """The command, running."""
-        return subprocess.Popen(
+        process = subprocess.Popen(
             [sys.executable, "-m", "stages", *arguments],
             cwd=self.folder,
             env=self.environment(**environment),
@@ -118,12 +124,21 @@ class Project:
             text=True,
             preexec_fn=_interruptible,
         )
+        self.started.append(process)
+        return process
 
     def run(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
         """The command, done."""
         with self.start(*arguments, **environment) as process:
-            out, err = process.communicate(timeout=120)
+            out, err = process.communicate(timeout=PATIENCE)
         return subprocess.CompletedProcess(arguments, process.returncode, out, err)
+
+    @property
+    def hold(self) -> Path:
+        """A file for HELD_BY, there until it is removed."""
+        path = self.folder / "hold"
+        path.touch()
+        return path
 
     def calls(self) -> list[str]:
         """What the engines did since this was asked last."""
@@ -145,7 +160,7 @@ class Project:
 
 
 @pytest.fixture
-def project(tmp_path: Path, root: Path) -> Project:
+def project(tmp_path: Path, root: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
     folder = tmp_path / "project"
     folder.mkdir()
@@ -158,7 +173,10 @@ def project(tmp_path: Path, root: Path) -> Project:
     scenes.mkdir(parents=True)
     (scenes / "ideal.toml").write_text(SCENE + JOINT)
     (scenes / "contact.toml").write_text(CONTACT)
-    return Project(folder)
+    made = Project(folder)
+    yield made
+    for process in made.started:
+        process.kill()  # where a test fails, what it holds would run on
 
 
 @pytest.fixture

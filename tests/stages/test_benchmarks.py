@@ -17,7 +17,6 @@ from benchmarks.engines import (
     damped,
     evaluation_time,
     mechanism,
-    silent,
     states,
     trajectory,
     without_clearance,
@@ -26,6 +25,7 @@ from benchmarks.engines import (
 from benchmarks.exudyn_runs import METHODS, SAMPLING, Samples, solve
 from benchmarks.laws import derivative, holds_at_zero, joint_laws
 from pipeline import dynamics
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m

@@ -152,7 +152,7 @@ def test_help_names_every_stage(command: Said):
     code, out, _ = command("run", "--help")
     assert code == 0
     assert all(stage in out for stage in STAGES)
-    assert parser().prog == "flexclear"
+    assert parser([]).prog == "flexclear"
 
 
 def test_schema_is_json_and_knows_the_parts(command: Said):

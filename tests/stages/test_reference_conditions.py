@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from benchmarks.reference_conditions import claims, design, page
+from benchmarks.reference_conditions import chosen, claims, design, page
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 
 Row = dict[str, Any]
@@ -105,8 +105,8 @@ def test_cases_take_the_scene_of_their_place() -> None:
 
 
 def test_ensembles_of_dear_sets_have_half_the_members(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(design, "whole", lambda place, condition, count: count)
-    cases = design.clearance(8)
+    monkeypatch.setattr(chosen, "whole", lambda place, condition, count: count)
+    cases = chosen.clearance(8)
     assert len(set(cases)) == len(cases)
     assert {case.members for case in cases if case.condition == RIGID} == {0}
     assert {case.members for case in cases if case.condition != RIGID and case.count <= COUNT} == {8}

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import pytest
 import xarray as xr
 
-from tests.stages.conftest import CONTACT, JOINT, SCENE, Project
+from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
 
 
 def test_what_is_fresh_is_not_run_again(project: Project):
@@ -79,19 +79,24 @@ def test_a_corrupt_artifact_is_told_in_one_line_and_rebuilt(project: Project):
 
 
 def test_two_commands_at_once_do_the_work_once(project: Project):
-    both = [project.start("run", "tiny/ideal", SECONDS="2") for _ in range(2)]
-    ends = [process.communicate(timeout=60) for process in both]
-    assert [process.returncode for process in both] == [0, 0], ends
+    hold = project.hold
+    first = project.start("run", "tiny/ideal", HELD_BY=str(hold))
+    _wait_for(lambda: (project.folder / "calls").exists())
+    second = project.start("run", "tiny/ideal")
+    assert second.stderr is not None
+    assert any("waiting for another process" in line for line in second.stderr)
+    hold.unlink()
+    ends = [process.communicate(timeout=PATIENCE) for process in (first, second)]
+    assert [process.returncode for process in (first, second)] == [0, 0], ends
     assert project.calls() == ["simulate tiny/ideal", "post tiny/ideal"]
-    assert any("waiting for another process" in err for _, err in ends)
     assert project.run("why", "tiny/ideal").stdout.count("fresh") == 2
 
 
 def test_a_killed_run_is_simply_run_again(project: Project):
-    process = project.start("run", "tiny/ideal", SECONDS="60")
+    process = project.start("run", "tiny/ideal", HELD_BY=str(project.hold))
     _wait_for(lambda: (project.folder / "calls").exists())
     process.kill()
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE)
     project.calls()
     done = project.run("run", "tiny/ideal")
     assert (done.returncode, project.calls()) == (0, ["simulate tiny/ideal", "post tiny/ideal"])
@@ -99,10 +104,10 @@ def test_a_killed_run_is_simply_run_again(project: Project):
 
 @pytest.mark.parametrize("scenes", [["tiny/ideal"], ["tiny/ideal", "tiny/contact"]], ids=["alone", "workers"])
 def test_an_interrupt_ends_everything_with_130(project: Project, scenes: list[str]):
-    process = project.start("run", *scenes, SECONDS="120")
+    process = project.start("run", *scenes, HELD_BY=str(project.hold))
     _wait_for(lambda: (project.folder / "calls").exists())
     process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=40)
+    _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert "interrupted" in err
     assert "Traceback" not in err
@@ -204,7 +209,7 @@ def test_progress_goes_to_stderr_only(project: Project):
 
 def _wait_for(condition: Callable[[], bool]) -> None:
     """Until something has happened in another process, which on a busy machine takes its time to start."""
-    end = time.monotonic() + 60.0
+    end = time.monotonic() + PATIENCE
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.02)

@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
-from pipeline.core.artifacts.variable import Schema, Variable
+from pipeline.core.scene.output import VARIABLES
+from pipeline.core.variable import Schema, Variable
 
 __all__ = [
     "BUNDLE",
@@ -75,22 +76,6 @@ RUN: Schema = {
     "load_power": _V(
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
     ),
-    "section_force": _V(
-        ("time", "section", "axis"),
-        "N",
-        "N, Qy, Qz: force of the far part of the rod on the near one, axes of the section (x along the rod)",
-        optional=True,
-    ),
-    "section_moment": _V(
-        ("time", "section", "axis"), "N m", "T, My, Mz: its moment about the section's centre, likewise", optional=True
-    ),
-    "peak_axial_stress": _V(
-        ("time", "section"),
-        "Pa",
-        "axial stress of the section that is largest in size, tension positive",
-        optional=True,
-    ),
-    "peak_von_mises_stress": _V(("time", "section"), "Pa", "largest von Mises stress of the section", optional=True),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
     "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
@@ -157,6 +142,7 @@ RUN: Schema = {
     ),
     "event_peak_penetration": _V(("event",), "m", "largest penetration of that contact", optional=True),
     "event_duration": _V(("event",), "s", "duration of that contact", optional=True),
+    **{name: variable for requested in VARIABLES.values() for name, variable in requested.items()},
 }
 
 

@@ -1,8 +1,11 @@
-"""Clearance joints as a scene says them: geometry, materials, normal law, friction law."""
+"""Clearance joints as a scene says them: geometry, materials, normal law, friction law.
+
+What a friction law called 'modified-coulomb' does is in `pipeline.dynamics.contact.friction.modified_coulomb`.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -109,6 +112,8 @@ class LuGre(Part):
 
 
 Friction = Annotated[ModifiedCoulomb | Ambrosio | LuGre, Field(discriminator="law")]
+#: all of them
+FRICTIONS: tuple[Any, ...] = get_args(get_args(Friction)[0])
 
 
 def _not_above(dynamic: float, static: float) -> None:

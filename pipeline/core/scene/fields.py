@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-import numpy as np
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
-from pipeline.core.algebra import axes_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
+from pipeline.core.axes import check_axes
 from pipeline.core.units import a, components, quantity
 
 
@@ -39,6 +39,8 @@ def _vector(dimension: str) -> Any:
 
 
 if TYPE_CHECKING:
+    import numpy as np
+
     Length: TypeAlias = float
     Time: TypeAlias = float
     Mass: TypeAlias = float
@@ -92,18 +94,34 @@ def _inertia(value: Any) -> list[list[float]]:
     lengths = [len(row) for row in given]
     if lengths not in ([1, 1, 1], [3, 3, 3]):
         raise ValueError("an inertia is [Ixx, Iyy, Izz] or a 3x3 matrix, about the centre of mass")
-    entries = np.array(components(chain.from_iterable(given), "inertia"))
-    rows = np.diag(entries) if lengths == [1, 1, 1] else entries.reshape(3, 3)
-    if np.abs(rows - rows.T).max() > _ROUNDING * np.abs(rows).max():
-        raise ValueError("an inertia matrix is symmetric")
-    rows = 0.5 * (rows + rows.T)
-    moments = np.linalg.eigvalsh(rows)
+    entries = components(chain.from_iterable(given), "inertia")
+    if lengths == [1, 1, 1]:
+        rows = [[entries[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
+    else:
+        rows = _symmetric([entries[k : k + 3] for k in (0, 3, 6)])
+    moments = _principal(rows)
     if moments[0] < -_ROUNDING * moments[2] or moments[2] > (moments[0] + moments[1]) * (1 + 1e-9):
         raise ValueError(
-            f"principal moments {moments.tolist()} kg m^2 belong to no body: "
-            "each is >= 0 and at most the sum of the others"
+            f"principal moments {moments} kg m^2 belong to no body: each is >= 0 and at most the sum of the others"
         )
-    return rows.tolist()
+    return rows
+
+
+def _symmetric(rows: list[list[float]]) -> list[list[float]]:
+    off = max(abs(rows[i][j] - rows[j][i]) for i in range(3) for j in range(i))
+    if off > _ROUNDING * max(abs(entry) for row in rows for entry in row):
+        raise ValueError("an inertia matrix is symmetric")
+    return [[0.5 * (rows[i][j] + rows[j][i]) for j in range(3)] for i in range(3)]
+
+
+def _principal(rows: list[list[float]]) -> list[float]:
+    """Principal moments, ascending."""
+    if not any(rows[i][j] for i in range(3) for j in range(i)):
+        return sorted(rows[k][k] for k in range(3))
+    import numpy as np  # here, as in `Pose`: most scenes are checked without it, and commands start in half the time
+
+    found: list[float] = np.linalg.eigvalsh(np.array(rows)).tolist()
+    return found
 
 
 Inertia = Annotated[
@@ -163,14 +181,18 @@ class Pose(Part):
         given = [n for n in ("quaternion", "rotation_vector", "axes") if getattr(self, n) is not None]
         if len(given) > 1:
             raise ValueError(f"an orientation is given once, not by {' and '.join(given)}")
-        if self.quaternion is not None and not 0.999 < float(np.linalg.norm(self.quaternion)) < 1.001:
+        if self.quaternion is not None and not 0.999 < math.hypot(*self.quaternion) < 1.001:
             raise ValueError(f"the quaternion {list(self.quaternion)} (w, x, y, z) has not the norm 1")
         if self.axes is not None:
-            axes_to_matrix(self.axes)
+            check_axes(self.axes)
         return self
 
     def as_quaternion(self) -> np.ndarray:
         """Unit quaternion w x y z, frame to parent, shape (4,)."""
+        import numpy as np
+
+        from pipeline.core.algebra import axes_to_matrix, matrix_to_quaternion, rotation_vector_to_quaternion
+
         if self.quaternion is not None:
             return np.array(self.quaternion) / np.linalg.norm(self.quaternion)
         if self.rotation_vector is not None:

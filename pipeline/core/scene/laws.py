@@ -1,7 +1,7 @@
 """Laws of time: what a prescribed coordinate, or the size of a load, does. One language for drives and loads.
 
 The values of a law are lengths, angles, forces or torques, as the place where it stands demands;
-a bare number is in SI units.
+a bare number is in SI units. How a law of type 'step' goes is in `pipeline.dynamics.drives.step`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import csv
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
@@ -207,10 +207,11 @@ class Repeated(Part):
     law: Bare
 
 
-KINDS = (Constant, Step, Polynomial, Harmonic, Spline, Table, Sum, Piecewise, Repeated)
 Law = Annotated[
     Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
 ]
+#: all of them
+KINDS: tuple[Any, ...] = get_args(get_args(Law)[0])
 
 
 def _bare(law: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import tomllib
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -117,7 +118,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         if path.stat().st_size > LARGEST:
             raise InputError(str(path), f"is larger than {LARGEST >> 20} MB", "name a TOML file")
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return copy.deepcopy(_parsed(path.read_text(encoding="utf-8-sig")))
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -128,6 +129,12 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), f"is not TOML: {error}", _toml_hint(str(error))) from None
     except RecursionError:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
+
+
+@lru_cache(maxsize=64)
+def _parsed(text: str) -> dict[str, Any]:
+    """A text's table; many scenes extend one, and recipes are asked for by several stages. Copy it before any edit."""
+    return tomllib.loads(text)
 
 
 def _toml_hint(message: str) -> str | None:

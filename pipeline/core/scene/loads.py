@@ -1,8 +1,11 @@
-"""Loads: gravity, forces and torques on frames, springs and dampers, and what acts along joint coordinates."""
+"""Loads: gravity, forces and torques on frames, springs and dampers, and what acts along joint coordinates.
+
+A load of type 'point-force' acts as the class of the same name in `pipeline.dynamics.loads.point_force` says.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
@@ -107,3 +110,5 @@ Load = Annotated[
     Gravity | PointForce | PointTorque | SpringDamper | JointForce | JointSpring | JointFriction,
     Field(discriminator="type"),
 ]
+#: all of them
+KINDS: tuple[Any, ...] = get_args(get_args(Load)[0])

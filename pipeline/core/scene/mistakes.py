@@ -26,10 +26,8 @@ EXPECTED = {
 TAGS = {
     "JointDrive": ("joint-drive",),
     "PathDrive": ("path-drive",),
-    "ExplicitPair": ("<explicit>",),
-    "FixedStep": ("<fixed>",),
+    "PlainIntegrator": ("<plain>",),
     "GeneralizedAlpha": ("<generalized-alpha>",),
-    "Radau": ("<radau>",),
     "RatioPerMode": ("RatioPerMode",),
     "Rayleigh": ("Rayleigh",),
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
@@ -134,11 +134,14 @@ Body = Annotated[Ground | RigidBody | FlexibleBody, Field(discriminator="type")]
 class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z.
 
-    A free joint holds nothing: it says that a body shall fly.
+    A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
+    `pipeline.dynamics.joints.planar`.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
     between: tuple[FrameName, FrameName]
 
 
+#: types of ideal joints
+IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
 Joint = Annotated[IdealJoint | ClearanceSpherical | ClearanceRevolute, Field(discriminator="type")]

@@ -7,11 +7,11 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core import quantities
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
 from pipeline.core.scene.loads import Gravity, Load
+from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
@@ -19,8 +19,9 @@ from pipeline.core.scene.parts import (
     Joint,
     RigidBody,
 )
-from pipeline.core.scene.solver import ExplicitPair, Solver
+from pipeline.core.scene.solver import PlainIntegrator, Solver
 from pipeline.core.scene.start import Start
+from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
 #: rows of a run that a machine can be asked to hold
@@ -38,16 +39,6 @@ class TimeSpan(Part):
         if not self.end > self.start:
             raise ValueError(f"time.end = {self.end} s must lie after time.start = {self.start} s")
         return self
-
-
-class Output(Part):
-    """Regular output interval; drive breaks and events are always added.
-
-    stress: flexible bodies whose section forces and peak stresses are recorded.
-    """
-
-    interval: Annotated[Time, Field(gt=0.0)] = 1e-4
-    stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
 
 
 class Ensemble(Part):
@@ -73,7 +64,7 @@ class Accuracy(Part):
     """Wanted accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
-    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.quantities`.
+    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
     """
 
     quantities: dict[str, Wanted] = Field(default_factory=dict)
@@ -104,7 +95,7 @@ def _wanted(name: str, value: Any) -> Any:
         return value
     if isinstance(value, str) and value.rstrip().endswith("%"):
         return {"relative": quantity(value, "number")}
-    kind = quantities.KINDS.get(name.rpartition(".")[2])
+    kind = KINDS.get(name.rpartition(".")[2])
     if kind is None:
         return {"absolute": 1.0}  # the scene, which knows its parts, tells what could have been meant
     problems = []
@@ -127,7 +118,7 @@ class Scene(Part):
     load: dict[PartName, Load] = Field(default_factory=dict)
     time: TimeSpan
     start: Start | None = None
-    solver: Solver = ExplicitPair()
+    solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None
@@ -146,7 +137,7 @@ class Scene(Part):
     def _quantities_are_there(self) -> Scene:
         for name in self.accuracy.quantities if self.accuracy else ():
             try:
-                quantities.parse(name, self.owners())
+                parse(name, self.owners())
             except ValueError as error:
                 raise ValueError(f"accuracy.{name}: {error}") from None
         return self
@@ -169,10 +160,10 @@ class Scene(Part):
             "contact": tuple(self.contacts()),
         }
 
-    def wanted(self) -> list[quantities.Quantity]:
+    def wanted(self) -> list[Quantity]:
         """The quantities that `[accuracy]` names; without it the usual ones."""
         if self.accuracy is not None and self.accuracy.quantities:
-            return [quantities.parse(name, self.owners()) for name in self.accuracy.quantities]
+            return [parse(name, self.owners()) for name in self.accuracy.quantities]
         moving = {name for name, body in self.body.items() if not isinstance(body, Ground)}
         joints = {
             name: [frame.partition(".")[0] for frame in joint.between if frame.partition(".")[0] in moving]
@@ -180,7 +171,7 @@ class Scene(Part):
             if joint.type != "fixed"
         }
         hosts = self._hosts()
-        return quantities.usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+        return usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""
@@ -213,10 +204,6 @@ class Scene(Part):
     def flexible(self) -> dict[str, FlexibleBody]:
         """Flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
-
-    def ground_frames(self) -> dict[str, object]:
-        """Frames of the fixed world by name, over all bodies of type ground."""
-        return {f"{n}.{f}": p for n, b in self.body.items() if isinstance(b, Ground) for f, p in b.frames.items()}
 
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""

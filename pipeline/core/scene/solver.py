@@ -5,24 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
+from pipeline.core.integrators import DEFAULT, INTEGRATORS
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.fields import Number, Part, Time
-
-DEFAULT = "dop853"
 
 
 class Stepping(Part):
     """What all integrators have.
 
     rtol: relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations.
-    ledger_tolerance: largest energy error of a run, as a share of the energy that it turns over; default 1e5 rtol,
-        but from 1e-4 to 1e-3, where the error chooses the steps (generalized-alpha: 1e-3), and 1 for fixed steps.
+    ledger_tolerance: largest energy error of a run, as a share of the energy that it turns over; default 1e5 rtol, but
+        from 1e-4 to 1e-3, where the error chooses the steps (1e-3 of methods that damp by their order: that of
+        generalized-alpha is 2), and 1 for fixed steps.
     evaluations: most right-hand sides of one run.  step: present means steps of this length.
     events: where contacts begin and end, ``at step ends`` only with fixed steps.
     """
 
+    integrator: str
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
     ledger_tolerance: Annotated[Number, Field(gt=0.0)] | None = None
     evaluations: Annotated[int, Field(gt=0, le=10**15)] = 50_000_000
@@ -35,21 +36,9 @@ class Stepping(Part):
             raise ValueError('events = "at step ends" needs fixed steps: give step, or leave events out')
         return self
 
-
-class ExplicitPair(Stepping):
-    """Embedded Runge-Kutta pair of Dormand and Prince, of order 8 or 5."""
-
-    integrator: Literal["dop853", "dopri5"] = "dop853"
-
-
-class FixedStep(Stepping):
-    """A method without an error estimate, so with fixed steps only."""
-
-    integrator: Literal["rk4", "adams-bashforth-moulton"]
-
     @model_validator(mode="after")
-    def _has_step(self) -> FixedStep:
-        if self.step is None:
+    def _has_what_chooses_steps(self) -> Stepping:
+        if self.step is None and not INTEGRATORS[self.integrator].estimates:
             raise ValueError(f'{self.integrator} has no error estimate to choose steps by: give step, e.g. "1e-5 s"')
         return self
 
@@ -61,45 +50,38 @@ class GeneralizedAlpha(Stepping):
     rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.8
 
 
-class Radau(Stepping):
-    """Implicit Runge-Kutta method of order 5 for stiff scenes."""
+#: models of the integrators that have parameters of their own
+OWN: Mapping[str, type[Stepping]] = {"generalized-alpha": GeneralizedAlpha}
+PLAIN = [name for name in INTEGRATORS if name not in OWN]
 
-    integrator: Literal["radau"]
 
+class PlainIntegrator(Stepping):
+    """Every integrator without parameters of its own."""
 
-#: integrator -> tag of its model; tags stand in angles because error messages leave those out
-OWNERS: Mapping[str, str] = {
-    "dop853": "<explicit>",
-    "dopri5": "<explicit>",
-    "rk4": "<fixed>",
-    "adams-bashforth-moulton": "<fixed>",
-    "generalized-alpha": "<generalized-alpha>",
-    "radau": "<radau>",
-}
+    integrator: Annotated[str, WithJsonSchema({"type": "string", "enum": PLAIN})] = DEFAULT
 
 
 def _known(value: Any) -> Any:
     """Refuse a name that no integrator has, and a parameter that belongs to another one."""
     if isinstance(value, Mapping):
         name = str(value.get("integrator", DEFAULT))
-        if name not in OWNERS:
-            raise ValueError(f"no integrator is called '{name}'; {suggestion(name, list(OWNERS))}")
-        if "rho_inf" in value and name != "generalized-alpha":
-            raise ValueError(f"rho_inf belongs to generalized-alpha, {name} does not have it: remove it")
+        if name not in INTEGRATORS:
+            raise ValueError(f"no integrator is called '{name}'; {suggestion(name, INTEGRATORS)}")
+        for owner, model in OWN.items():
+            for key in model.model_fields.keys() - Stepping.model_fields.keys():
+                if key in value and owner != name:
+                    raise ValueError(f"{key} belongs to {owner}, {name} does not have it: remove it")
     return value
 
 
-def _owner(value: Any) -> str:
-    """Tag of the model that knows the named integrator."""
+def _tag(value: Any) -> str:
+    """Tag of the model that knows the named integrator; in angles, because error messages leave those out."""
     name = value.get("integrator", DEFAULT) if isinstance(value, Mapping) else getattr(value, "integrator", DEFAULT)
-    return OWNERS[name]
+    return f"<{name}>" if name in OWN else "<plain>"
 
 
 Solver = Annotated[
-    Annotated[ExplicitPair, Tag("<explicit>")]
-    | Annotated[FixedStep, Tag("<fixed>")]
-    | Annotated[GeneralizedAlpha, Tag("<generalized-alpha>")]
-    | Annotated[Radau, Tag("<radau>")],
-    Discriminator(_owner),
+    Annotated[PlainIntegrator, Tag("<plain>")] | Annotated[GeneralizedAlpha, Tag("<generalized-alpha>")],
+    Discriminator(_tag),
     BeforeValidator(_known),
 ]

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
 from pipeline.core.artifacts.store import Record, Store
+from pipeline.core.progress import Progress
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.task import Task, facts, in_order, key, reasons
-
-#: told the done share of a task (None: unknown) and what it is doing
-Progress = Callable[[float | None, str], None]
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,10 @@ OWN = ("pipeline", "stages")
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg"}
 
 
+#: folder that holds the packages; sources are read below it
+TREE = Path(__file__).resolve().parents[3]
+
+
 @dataclass(frozen=True, slots=True)
 class Module:
     """One source file: digest of its bytes, own modules and libraries that it imports."""
@@ -68,8 +72,7 @@ class Sources:
     def module(self, name: str) -> Module | None:
         """The module called `name`, or None when there is no such file (an attribute, say)."""
         if name not in self.read:
-            base = self.root.joinpath(*name.split("."))
-            path = next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
+            path = source_file(self.root, name)
             self.read[name] = None if path is None else self._parse(path, name)
         return self.read[name]
 
@@ -103,6 +106,12 @@ class Sources:
         if self.memo is not None and not self.imports:
             with contextlib.suppress(OSError, ValueError):
                 self.imports.update(json.loads(self.memo.read_bytes()))
+
+
+def source_file(root: Path, name: str) -> Path | None:
+    """The file of the module called `name` in the source tree under `root`, or None when there is none."""
+    base = root.joinpath(*name.split("."))
+    return next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
 
 
 def parents(name: str) -> list[str]:

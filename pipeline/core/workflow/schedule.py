@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.core.artifacts.store import Record, Store
 from pipeline.core.errors import FlexclearError, ResourceError
+from pipeline.core.progress import Progress
 from pipeline.core.workflow import cores
-from pipeline.core.workflow.execute import Progress, execute, find, key_of
+from pipeline.core.workflow.execute import execute, find, key_of
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import Task, in_order

@@ -12,6 +12,8 @@ from pipeline.core.workflow.fingerprint import Sources, library_version
 
 #: libraries that every artifact passes through on its way to disk
 STORE = "pipeline.core.artifacts.store"
+#: made once: `json.dumps` with options makes one for every value
+_JSON = json.JSONEncoder(ensure_ascii=False, default=str)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +94,7 @@ def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (Mapping, list, tuple)) for x in node):
         items = [(str(n), value) for n, value in enumerate(node)]
     else:
-        return [(place, json.dumps(node, ensure_ascii=False, default=str))]
+        return [(place, _JSON.encode(node))]
     return [leaf for name, value in items for leaf in flatten(value, f"{place}.{name}".lstrip("."))]
 
 

@@ -13,9 +13,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies.modal_terms import RATE, carried, mass_matrix, places, spatial, spin, stiffness, tensor
+from pipeline.dynamics.bodies.modal_terms import (
+    RATE,
+    body_mass_matrix,
+    carried,
+    modal_forces,
+    places,
+    port_load,
+    spatial,
+    spin,
+    stiffness,
+    tensor,
+)
+from pipeline.dynamics.bodies.ports import make_ports
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import (
     accumulate,
@@ -46,17 +59,30 @@ def plain(f, data, n, j):
 
 
 @dataclass(frozen=True)
-class Kernels:
-    """What `equations` and `observe` compose: see the functions of the same names in `compose`."""
+class FlexibleBodies:
+    """Kernels of all flexible bodies.
 
+    site(h, f, w, s), inboard(h, f, w, i, ...): of frames on them (see `ports`).  inertia(h, f, w, n): spatial inertias,
+    wrenches and modal forces, modal accelerations taken as zero.  mass_matrix(h, f, w): modal blocks, right after it.
+    modal_inertia(h, f, w, n): what these add to the wrenches.  port_load(h, w, i): a link on a flexible parent loads
+    its modes, too.  modal_forces(h, w): generalised forces of the modes.  energies(h, f, w): kinetic and elastic [J].
+    """
+
+    site: Callable
+    inboard: Callable
     inertia: Callable
     mass_matrix: Callable
     modal_inertia: Callable
+    port_load: Callable
+    modal_forces: Callable
     energies: Callable
 
 
-def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
-    """The kernels of a body whose bending shortens it by these forms (h, f, w, k, j, vector), or by `straight`."""
+def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
+    """The kernels of bodies with linear shapes, or with those that bending shortens (the module `shortening`)."""
+    first_moment = straight if shortening is None else shortening.first_moment
+    second_moment = straight if shortening is None else shortening.second_moment
+    site, inboard = make_ports(straight if shortening is None else shortening.at_port)
 
     @kernel
     def invariants(h, f, w, k):
@@ -128,7 +154,7 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
             carried(h, w, k)
 
     @kernel
-    def inertia(h, f, w, k):
+    def body_inertia(h, f, w, k):
         """Spatial inertia, wrench, modal forces and modal momenta of flexible body k.
 
         As `rigid.inertia`, with the modal accelerations taken as zero; `modal_inertia` adds theirs.
@@ -161,7 +187,7 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         stiffness(h, f, w, k)
 
     @kernel
-    def modal_inertia(h, f, w, k):
+    def body_modal_inertia(h, f, w, k):
         """Add what the modal accelerations in DU demand to the wrench on the body's link (after `inertia`)."""
         n = m.FLEXES.n_modes(h, k)
         i, du, P = m.FLEXES.link(h, k), h[m.DU] + m.FLEXES.c0(h, k), h[m.MODAL]
@@ -177,7 +203,7 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
         accumulate(w, m.WRENCH.row(h, i) + 3, force)
 
     @kernel
-    def energies(h, f, w, k):
+    def body_energies(h, f, w, k):
         """Kinetic and elastic energy [J] of flexible body k."""
         n, x, u, data = places(h, k)
         invariants(h, f, w, k)
@@ -196,4 +222,28 @@ def compose(first_moment: Callable, second_moment: Callable) -> Kernels:
                 kinetic += 0.5 * f[M + i * n + j] * w[u + i] * w[u + j]
         return kinetic, elastic
 
-    return Kernels(inertia, mass_matrix, modal_inertia, energies)
+    @kernel
+    def inertia(h, f, w, n):
+        for k in range(h[m.N_FLEX]):
+            body_inertia(h, f, w, k)
+
+    @kernel
+    def mass_matrix(h, f, w):
+        for k in range(h[m.N_FLEX]):
+            body_mass_matrix(h, f, w, k)
+
+    @kernel
+    def modal_inertia(h, f, w, n):
+        for k in range(h[m.N_FLEX]):
+            body_modal_inertia(h, f, w, k)
+
+    @kernel
+    def energies(h, f, w):
+        kinetic = elastic = 0.0
+        for k in range(h[m.N_FLEX]):
+            moving, bent = body_energies(h, f, w, k)
+            kinetic += moving
+            elastic += bent
+        return kinetic, elastic
+
+    return FlexibleBodies(site, inboard, inertia, mass_matrix, modal_inertia, port_load, modal_forces, energies)

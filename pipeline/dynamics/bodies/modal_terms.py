@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import carry
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot, dot6, put, scale, turn_symmetric
 
@@ -84,7 +85,7 @@ def stiffness(h, f, w, k):
 
 
 @kernel
-def mass_matrix(h, f, w, k):
+def body_mass_matrix(h, f, w, k):
     """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
     n, _, _, data = places(h, k)
     c0, moves = m.FLEXES.c0(h, k), m.FLEXES.inboard(h, k)
@@ -96,3 +97,28 @@ def mass_matrix(h, f, w, k):
                 value += dot6(w, m.MOMENTA.row(h, c0 + i), w, m.COLUMNS.row(h, c0 + j))
                 value += dot6(w, m.COLUMNS.row(h, c0 + i), w, m.DEFORMATION.row(h, c0 + j))
             w[start + j] += value
+
+
+@kernel
+def port_load(h, w, i):
+    """A link on a flexible parent also loads the parent's modes, through its port."""
+    p = m.LINKS.carried_by(h, i)
+    if p < 0:
+        return
+    b = m.PORTS.flex(h, p)
+    c0, first = m.FLEXES.c0(h, b), m.PORTS.column(h, p)
+    for j in range(m.FLEXES.n_modes(h, b)):
+        k = first + j
+        carry(h, w, i, k)
+        accumulate(w, m.MOMENTA.row(h, c0 + j), at(w, m.MOMENTA.row(h, k)))
+        accumulate(w, m.MOMENTA.row(h, c0 + j) + 3, at(w, m.MOMENTA.row(h, k) + 3))
+        w[h[m.MODAL_BIAS] + c0 + j] += dot6(w, m.COLUMNS.row(h, k), w, m.WRENCH.row(h, i))
+
+
+@kernel
+def modal_forces(h, w):
+    """Generalised forces of the modes."""
+    for b in range(h[m.N_FLEX]):
+        c0 = m.FLEXES.c0(h, b)
+        for j in range(c0, c0 + m.FLEXES.n_modes(h, b)):
+            w[h[m.BIAS] + j] = w[h[m.MODAL_BIAS] + j]

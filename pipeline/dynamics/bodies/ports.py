@@ -35,7 +35,7 @@ def _shape(f, first, n, j):
     return (f[first + j], f[first + n + j], f[first + 2 * n + j])
 
 
-def compose(shortening: Callable) -> tuple[Callable, Callable]:
+def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
     """The kernels `site` and `inboard`; shortening(h, f, w, p, j, vector) is what bending adds along x, or zero."""
 
     @kernel

@@ -4,9 +4,20 @@ from __future__ import annotations
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, at6, at9, congruence, cross, dot, put, scale, turn, turn_symmetric
-
-MASS, COM, TENSOR, NUMBERS = 0, 1, 4, 10  # fields of LINK_NUMBERS
+from pipeline.dynamics.vectors import (
+    accumulate,
+    add,
+    at,
+    at6,
+    at9,
+    congruence,
+    cross,
+    dot,
+    put,
+    scale,
+    turn,
+    turn_symmetric,
+)
 
 
 @kernel
@@ -33,10 +44,10 @@ def inertia(h, f, w, i):
     frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
     R = at9(w, frame + m.FRAME.axes)
     omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
-    arm = turn(R, at(f, numbers + COM))
+    arm = turn(R, at(f, numbers + m.LINK_NUMBERS.com))
     c = add(at(w, frame + m.FRAME.origin), arm)
-    mass = f[numbers + MASS]
-    J = congruence(R, at6(f, numbers + TENSOR))
+    mass = f[numbers + m.LINK_NUMBERS.mass]
+    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
     spatial(w, m.OWN.row(h, i), mass, c, J)
     a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
     force = scale(mass, a)
@@ -52,6 +63,30 @@ def kinetic_energy(h, f, w, i):
     frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
     R = at9(w, frame + m.FRAME.axes)
     omega = at(w, frame + m.FRAME.omega)
-    v = add(at(w, frame + m.FRAME.velocity), cross(omega, turn(R, at(f, numbers + COM))))
-    J = congruence(R, at6(f, numbers + TENSOR))
-    return 0.5 * (f[numbers + MASS] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
+    v = add(at(w, frame + m.FRAME.velocity), cross(omega, turn(R, at(f, numbers + m.LINK_NUMBERS.com))))
+    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
+    return 0.5 * (f[numbers + m.LINK_NUMBERS.mass] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
+
+
+@kernel
+def carry(h, w, i, k):
+    """Store the momentum of the subtree of link i moving with column k."""
+    I, s, o = m.INERTIA.row(h, i), m.COLUMNS.row(h, k), m.MOMENTA.row(h, k)
+    omega, v, c = at(w, s), at(w, s + 3), at(w, I + m.INERTIA.moment)
+    put(w, o, add(turn_symmetric(at6(w, I + m.INERTIA.inertia), omega), cross(c, v)))
+    put(w, o + 3, add(scale(w[I + m.INERTIA.mass], v), cross(omega, c)))
+
+
+@kernel
+def apply_wrench(h, w, s, moment, force):
+    """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
+    o = m.WRENCH.row(h, m.SITES.link(h, s))
+    accumulate(w, o, scale(-1.0, moment))
+    accumulate(w, o + 3, scale(-1.0, force))
+    p = m.SITES.port(h, s)
+    if p >= 0:
+        b = m.PORTS.flex(h, p)
+        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b), m.PORTS.column(h, p)
+        for j in range(m.FLEXES.n_modes(h, b)):
+            o = m.COLUMNS.row(h, first + j)
+            w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)

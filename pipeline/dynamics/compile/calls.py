@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from llvmlite import ir
-from numba import carray, cfunc, config, types
+from numba import cfunc, config, njit, types
 from numba.extending import intrinsic
 
 from pipeline.dynamics import memory as m
@@ -26,12 +26,12 @@ SIGNATURES = {
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(_INTEGERS, _FLOATS, _PLACE, _PLACE, _PLACE, _PLACE),
 }
-#: types of h, f, w and n, and of tables with rows, in functions that are called from Python
-ARRAYS = (types.int64[::1], types.float64[::1], types.float64[::1], types.int64[::1])
-TABLE, WHOLE_TABLE = types.float64[:, ::1], types.int64[:, ::1]
-#: length of an array behind a pointer: the header knows it, and no kernel asks the array
-SOME = 1 << 40
-array = carray
+_ARRAYS = (types.int64[::1], types.float64[::1], types.float64[::1], types.int64[::1])
+_TABLE = types.float64[:, ::1]
+#: signatures of what Python calls: (h, f, w, n, rows, pieces, tolerance, out); (h, f, w, n, t, repeat, outputs, rows,
+#: events)
+OBSERVE = types.void(*_ARRAYS, _TABLE, types.int64[:, ::1], types.float64, _TABLE)
+ADVANCE = types.void(*_ARRAYS, types.float64, types.int64, types.float64[::1], _TABLE, _TABLE)
 
 
 @intrinsic
@@ -65,6 +65,11 @@ def exported(name: str) -> Callable[[Callable], Any]:
     return cfunc(SIGNATURES[name], cache=True, error_model="numpy")
 
 
+def called(signature: Any) -> Callable[[Callable], Any]:
+    """Decorator: a function that Python calls, fetched from disk or compiled at once."""
+    return njit(signature, cache=True, nogil=True)
+
+
 if config.DISABLE_JIT:  # for debugging: the same calls between functions of Python
     interpreted: dict[int, Callable] = {}
 
@@ -88,17 +93,17 @@ if config.DISABLE_JIT:  # for debugging: the same calls between functions of Pyt
 
 @kernel
 def evaluate(h, f, w, n, t, y, dy):
-    """The right-hand side: `equations.compose`."""
+    """The right-hand side: `equations.right_hand_side`."""
     call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
 
 
 @kernel
 def project(h, f, w, n, t, y, dy, tolerance):
-    """Back onto the closures: `project.compose`."""
+    """Back onto the closures: `equations.projection`."""
     return call(h[m.PROJECT], (h, f, w, n, float(t), y, dy, tolerance))
 
 
 @kernel
 def retract(h, w, y, retractment, out, total):
-    """Positions after a retractment: `retract.compose`."""
+    """Positions after a retractment: `equations.retraction`."""
     call(h[m.RETRACT], (h, w, y, retractment, out, total))

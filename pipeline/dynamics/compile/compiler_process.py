@@ -18,7 +18,7 @@ from pathlib import Path
 from numba import config
 
 from pipeline.core.workflow.cores import free
-from pipeline.dynamics.compile.generated import claimed, take
+from pipeline.dynamics.compile.files import claimed, take
 
 # started by a command, since multiprocessing would run the user's script again in the child
 COMMAND = """import json, sys
@@ -29,7 +29,7 @@ work(sys.argv[2:])
 
 
 @contextmanager
-def companion(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None]:
+def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None]:
     """Meanwhile a second process compiles the files, in this order; None where there is to be none.
 
     There is at most one for a folder of kernels, whoever started it.
@@ -37,7 +37,7 @@ def companion(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None]:
     with ExitStack() as stack:
         process = None
         if len(paths) > 1 and wanted():
-            alone = stack.enter_context(claimed(paths[0].with_name("companion"), wait=False))
+            alone = stack.enter_context(claimed(paths[0].with_name("compiler"), wait=False))
             process = _start(paths) if alone else None
         if process is not None:
             stack.enter_context(process)  # waits for it, so that it is no zombie

@@ -24,15 +24,14 @@ import numba
 import numpy as np
 
 from pipeline.core.artifacts.paths import kernel_root
-from pipeline.core.workflow.fingerprint import Sources, imported
+from pipeline.core.workflow.fingerprint import TREE, Sources, imported
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile.compiler_process import companion
-from pipeline.dynamics.compile.generated import bring, compiled
+from pipeline.dynamics.compile.compiler_process import second_process
+from pipeline.dynamics.compile.files import bring, compiled
 from pipeline.dynamics.compile.sources import sources
-from pipeline.dynamics.integrate.method import Scheme
-from pipeline.dynamics.model.model import Kinds
+from pipeline.dynamics.effects import Parts, Scheme
 
-SOURCES = Sources(Path(__file__).resolve().parents[3])
+SOURCES = Sources(TREE)
 #: what the functions are to who waits for them
 WORDS = {
     "evaluate": "equations of motion",
@@ -43,7 +42,7 @@ WORDS = {
 }
 #: what others call, and where the header keeps its address
 ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
-#: what this process compiles first and a companion last: the others have kernels in common, compiled once by a process
+#: what this process compiles first and the second one last: the others have kernels in common, compiled once each
 OURS = "advance"
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 
@@ -92,14 +91,14 @@ class Entry:
         self.modules["observe"].observe(h, f, w, n, rows, pieces, tolerance, out)
 
 
-def entry(kinds: Kinds, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
-    """The compiled functions for these kinds; `tell` hears of what has to be compiled."""
+def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
+    """The compiled functions for these parts; `tell` hears of what has to be compiled."""
     folder, began = _folder(tell), time.monotonic()
-    files = {name: _file(folder, name, source) for name, source in sources(kinds, scheme).items()}
+    files = {name: _file(folder, name, source) for name, source in sources(parts, scheme).items()}
     names = {path: name for name, path in files.items() if path.stem not in sys.modules}
     ours_first = sorted(names, key=lambda path: names[path] != OURS)
     ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
-    with companion(ours_last):
+    with second_process(ours_last):
         bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
     return Entry({name: sys.modules[path.stem] for name, path in files.items()})
 

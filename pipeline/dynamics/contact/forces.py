@@ -10,12 +10,15 @@ material points there, so that rolling is no sliding. Acting at one point keeps 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import apply_wrench
+from pipeline.dynamics.choice import choose
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, add, at, at9, cross, dot, put, scale, sub, turn, turn_back
+from pipeline.dynamics.vectors import add, at, at9, cross, dot, put, scale, sub, turn, turn_back
 
 
 @kernel
@@ -26,18 +29,8 @@ def contact_slots(h, c):
 
 @kernel
 def push(h, w, s, point, force):
-    """Apply a force [N] at a point, both world, on the link (and its modes) that carries site s."""
-    moment = cross(point, force)
-    o = m.WRENCH.row(h, m.SITES.link(h, s))
-    accumulate(w, o, scale(-1.0, moment))
-    accumulate(w, o + 3, scale(-1.0, force))
-    p = m.SITES.port(h, s)
-    if p >= 0:
-        k = m.PORTS.flex(h, p)
-        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, k), m.PORTS.column(h, p)
-        for j in range(m.FLEXES.n_modes(h, k)):
-            a = m.COLUMNS.row(h, first + j)
-            w[bias + j] -= dot(at(w, a), moment) + dot(at(w, a + 3), force)
+    """Apply a force [N] at a point, both world, on the link that carries site s."""
+    apply_wrench(h, w, s, cross(point, force), force)
 
 
 @kernel
@@ -111,8 +104,14 @@ def rubbing(traction: Callable) -> Callable:
     return rub
 
 
-def compose(separation: Callable, normal: Callable, stored: Callable, rub: Callable) -> Callable:
-    """The kernel that applies all contacts; separation, normal and stored choose by a kind, their first argument."""
+def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: tuple[Any, ...]) -> Callable:
+    """The kernel contacts(h, f, w, n) that applies all contacts, given the modules of their kinds.
+
+    surfaces: with `separation`.  forms: of normal forces, with `force` and `stored`.  frictions: laws with `traction`.
+    """
+    separation = choose(tuple(kind.separation for kind in surfaces))
+    normal, stored = choose(tuple(form.force for form in forms)), choose(tuple(form.stored for form in forms))
+    rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless()
 
     @kernel
     def measure(h, f, w, c):

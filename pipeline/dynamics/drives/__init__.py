@@ -1,18 +1,12 @@
-"""Laws of time, of drives and loads. To add one: a module here, a line below, its parameters in core/scene/laws.
+"""Laws of time, of drives and loads. To add one: a module here that is called like its type, and its
+parameters in core/scene/laws.
 
 Each module has ``pieces(law, dimension) -> Pieces`` (see `pieces`), which raises ValueError, in
 words, for values that are not of that dimension.
 """
 
+from pipeline.core.registry import declared
+from pipeline.core.scene.laws import KINDS
+
 KIND = "law"
-NAMES = {
-    "constant": "constant:pieces",
-    "step": "step:pieces",
-    "polynomial": "polynomial:pieces",
-    "harmonic": "harmonic:pieces",
-    "spline": "spline:pieces",
-    "table": "table:pieces",
-    "sum": "sum:pieces",
-    "piecewise": "piecewise:pieces",
-    "repeated": "repeated:pieces",
-}
+NAMES = declared(KINDS, made="pieces")

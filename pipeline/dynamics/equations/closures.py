@@ -141,14 +141,6 @@ def independence(h, w):
 
 
 @kernel
-def keep_scales(h, w):
-    """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
-    for r in range(h[m.N_KEPT_ROWS]):
-        o = h[m.ROW_SCALE] + r
-        w[o] = max(w[o], w[o + h[m.N_CLOSURE_ROWS]])
-
-
-@kernel
 def add_spread(h, w, y, weight):
     """Y <- y + weight L^-1 J^T lambda, y in w."""
     for c in range(h[m.N_CLOSURES]):

@@ -3,21 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.choice import choose
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, at9, cross, product, put, put9, scale, turn
-
-
-@kernel
-def no_port(h, f, w, s):
-    """Stands for ports where no body is flexible."""
-
-
-@kernel
-def no_inboard(h, f, w, i, p, R, omega, v, alpha, a):
-    """A rigid link's frame is its inboard joint frame."""
-    return p, R, omega, v, alpha, a
+from pipeline.dynamics.vectors import ZERO, add, at, at9, cross, product, put, put9, scale, turn
 
 
 @kernel
@@ -44,34 +35,49 @@ def rigid_site(h, f, w, s):
     _store(w, m.SITE_FRAMES.row(h, s), p, product(R, at9(f, numbers + 3)), omega, v, alpha, a)
 
 
-def compose(joint_motion: Callable, port_site: Callable, inboard: Callable) -> Callable:
-    """The kernel that moves everything.
+@kernel
+def rigid_inboard(h, f, w, i, p, R, omega, v, alpha, a):
+    """A rigid link's frame is its inboard joint frame."""
+    return p, R, omega, v, alpha, a
 
-    joint_motion(kind, w, x, u, du, joint, rate); port_site adds the deformation of a flexible
-    link to a site; inboard steps from the inboard joint frame to a flexible link's frame.
+
+def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
+    """The kernel kinematics(h, f, w) that moves everything.
+
+    joints: modules of the joint types present.  flexible: kernels of the flexible bodies (`bodies.flexible`); their
+    `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to the link's.
     """
+    joint_motion = choose(tuple(joint.motion for joint in joints))
+    position_rate = choose(tuple(joint.position_rate for joint in joints))
+    inboard = rigid_inboard if flexible is None else flexible.inboard
+    port_site = rigid_site if flexible is None else flexible.site
 
     @kernel
     def place(h, f, w, i):
-        """Link i from its inboard site, which must be up to date."""
-        s, j, c0 = m.SITE_FRAMES.row(h, i - 1), h[m.JOINT.place], m.LINKS.c0(h, i)
-        q = m.LINKS.q0(h, i)
-        joint_motion(m.LINKS.joint(h, i), w, h[m.X] + q, h[m.U] + c0, h[m.DU] + c0, j, h[m.POSITION_RATE] + q)
-        F = at9(w, s + m.FRAME.axes)
-        omega_F, alpha_F = at(w, s + m.FRAME.omega), at(w, s + m.FRAME.alpha)
-        arm, turning = turn(F, at(w, j + m.JOINT.position)), turn(F, at(w, j + m.JOINT.omega))
-        sliding = turn(F, at(w, j + m.JOINT.velocity))
+        """Link i from its inboard site, which must be up to date.
+
+        The relative twist is S u in the axes of the joint's first frame F, its rate S u' + bias.
+        """
+        s, S, c0, n = m.SITE_FRAMES.row(h, i - 1), h[m.SUBSPACE.place], m.LINKS.c0(h, i), m.LINKS.n_speeds(h, i)
+        kind, x, u, du = m.LINKS.joint(h, i), h[m.X] + m.LINKS.q0(h, i), h[m.U] + c0, h[m.DU] + c0
+        R_FG, p_FG, bias_angular, bias_linear = joint_motion(kind, w, x, u, S)
+        position_rate(kind, w, x, u, h[m.POSITION_RATE] + m.LINKS.q0(h, i))
+        F, omega_F, alpha_F = at9(w, s + m.FRAME.axes), at(w, s + m.FRAME.omega), at(w, s + m.FRAME.alpha)
+        arm = turn(F, p_FG)
         p, swing = add(at(w, s + m.FRAME.origin), arm), cross(omega_F, arm)
-        v = add(at(w, s + m.FRAME.velocity), add(swing, sliding))
-        alpha = add(alpha_F, add(turn(F, at(w, j + m.JOINT.alpha)), cross(omega_F, turning)))
-        a = add(at(w, s + m.FRAME.acceleration), add(cross(alpha_F, arm), cross(omega_F, swing)))
-        a = add(a, add(scale(2.0, cross(omega_F, sliding)), turn(F, at(w, j + m.JOINT.acceleration))))
-        for k in range(m.LINKS.n_speeds(h, i)):
-            o = m.COLUMNS.row(h, c0 + k)
-            angular = turn(F, at(w, j + m.JOINT.columns + 6 * k))
+        turning, sliding, growing, speeding = ZERO, ZERO, turn(F, bias_angular), turn(F, bias_linear)
+        for k in range(n):
+            o, rate, second = m.COLUMNS.row(h, c0 + k), w[u + k], w[du + k]
+            angular, linear = turn(F, at(w, S + 6 * k)), turn(F, at(w, S + 6 * k + 3))
             put(w, o, angular)
-            put(w, o + 3, add(turn(F, at(w, j + m.JOINT.columns + 6 * k + 3)), cross(p, angular)))
-        omega, R = add(omega_F, turning), product(F, at9(w, j + m.JOINT.rotation))
+            put(w, o + 3, add(linear, cross(p, angular)))
+            turning, sliding = add(turning, scale(rate, angular)), add(sliding, scale(rate, linear))
+            growing, speeding = add(growing, scale(second, angular)), add(speeding, scale(second, linear))
+        v = add(at(w, s + m.FRAME.velocity), add(swing, sliding))
+        alpha = add(alpha_F, add(growing, cross(omega_F, turning)))
+        a = add(at(w, s + m.FRAME.acceleration), add(cross(alpha_F, arm), cross(omega_F, swing)))
+        a = add(a, add(scale(2.0, cross(omega_F, sliding)), speeding))
+        omega, R = add(omega_F, turning), product(F, R_FG)
         if m.LINKS.flex(h, i) >= 0:
             p, R, omega, v, alpha, a = inboard(h, f, w, i, p, R, omega, v, alpha, a)
         _store(w, m.LINK_FRAMES.row(h, i), p, R, omega, v, alpha, a)

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.closures import keep_scales
-from pipeline.dynamics.equations.projection import BLIND, largest
+from pipeline.dynamics.bodies import rigid
+from pipeline.dynamics.equations.kinematics import make_kinematics
+from pipeline.dynamics.equations.projection import BLIND, keep_scales, largest
+from pipeline.dynamics.equations.right_hand_side import make_forces, nothing
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import accumulate, at, dot
 
@@ -35,40 +38,8 @@ def widths(size: Callable[[int], int]) -> dict[str, int]:
 
 @kernel
 def no_energy(h, f, w):
-    """No flexible body."""
+    """Kinetic and elastic energy where no body is flexible."""
     return 0.0, 0.0
-
-
-@kernel
-def no_modal(h, f, w):
-    """No flexible body."""
-
-
-def flexible_energies(energies: Callable) -> Callable:
-    """Sum over the flexible bodies."""
-
-    @kernel
-    def run(h, f, w):
-        kinetic = elastic = 0.0
-        for k in range(h[m.N_FLEX]):
-            a, b = energies(h, f, w, k)
-            kinetic += a
-            elastic += b
-        return kinetic, elastic
-
-    return run
-
-
-def modal_inertias(inertia: Callable, modal_inertia: Callable) -> Callable:
-    """Inertial wrenches of the flexible bodies at their full accelerations."""
-
-    @kernel
-    def run(h, f, w):
-        for k in range(h[m.N_FLEX]):
-            inertia(h, f, w, k)
-            modal_inertia(h, f, w, k)
-
-    return run
 
 
 @kernel
@@ -78,17 +49,22 @@ def _copy(w, first, count, out, column):
     return column + count
 
 
-def compose(
+def make_observation(
     evaluate: Callable,
     project: Callable,
-    kinematics: Callable,
-    rigid: tuple[Callable, Callable],
-    flexible: tuple[Callable, Callable],
-    contacts: Callable,
+    joints: tuple[Any, ...],
+    flexible: Any = None,
+    contacts: Callable | None = None,
+    loads: Callable | None = None,
 ) -> Callable:
-    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row."""
-    rigid_inertia, rigid_energy = rigid
-    flexible_inertia, flexible_energy = flexible
+    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
+
+    evaluate, project: as the stepper calls them; the other arguments are those of `make_right_hand_side`.
+    """
+    kinematics = make_kinematics(joints, flexible)
+    forces = make_forces(flexible, contacts, loads)
+    modal_inertia = nothing if flexible is None else flexible.modal_inertia
+    flexible_energy = no_energy if flexible is None else flexible.energies
 
     @kernel
     def closure_wrenches(h, w, out, column):
@@ -108,13 +84,8 @@ def compose(
     def joint_wrenches(h, f, w, n, out, column):
         """Wrench on every link through its inboard joint, at the accelerations in DU (Newton-Euler)."""
         kinematics(h, f, w)
-        for e in range(6):
-            w[m.WRENCH.row(h, 0) + e] = 0.0
-        for i in range(1, h[m.N_LINKS]):
-            if m.LINKS.flex(h, i) < 0:
-                rigid_inertia(h, f, w, i)
-        flexible_inertia(h, f, w)
-        contacts(h, f, w, n)
+        forces(h, f, w, n)
+        modal_inertia(h, f, w, n)
         after = closure_wrenches(h, w, out, column + 6 * h[m.N_LINKS])
         for i in range(h[m.N_LINKS] - 1, 0, -1):
             up = m.WRENCH.row(h, m.LINKS.parent(h, i))
@@ -130,7 +101,7 @@ def compose(
         potential = 0.0
         for i in range(1, h[m.N_LINKS]):
             if m.LINKS.flex(h, i) < 0:
-                kinetic += rigid_energy(h, f, w, i)
+                kinetic += rigid.kinetic_energy(h, f, w, i)
             potential -= dot(at(f, h[m.GRAVITY.place]), at(w, m.OWN.row(h, i) + m.OWN.moment))
         for c in range(h[m.N_CONTACTS]):
             elastic += w[m.TOUCH.row(h, c) + m.TOUCH.stored] + w[m.TOUCH.row(h, c) + m.TOUCH.bent]
@@ -140,7 +111,7 @@ def compose(
         return column + 3
 
     @kernel
-    def settle(h, f, w, n, t, tolerance):
+    def evaluate_closed(h, f, w, n, t, tolerance):
         """Evaluate the state in Y with its loops closed to `tolerance`."""
         evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
         if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
@@ -160,7 +131,7 @@ def compose(
                 w[h[m.Y] + k] = row[1 + 2 * contacts_count + k]
             for k in range(h[m.N_LAWS]):
                 n[n[m.ACTIVE] + k] = pieces[r, k]
-            settle(h, f, w, n, row[0], tolerance)
+            evaluate_closed(h, f, w, n, row[0], tolerance)
             if n[m.EVALUATION] == m.OK:
                 keep_scales(h, w)
             status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])

@@ -13,8 +13,9 @@ def no_harmonics(h, f, w, law, piece, s):
     """Polynomials only."""
 
 
-def compose(harmonics: Callable) -> Callable:
+def make_known_motion(harmonics: Callable | None = None) -> Callable:
     """The kernel known_motion(h, f, w, n, t); harmonics(h, f, w, law, piece, s) adds to value, rate, second rate."""
+    add_harmonics = no_harmonics if harmonics is None else harmonics
 
     @kernel
     def laws(h, f, w, n, t):
@@ -30,7 +31,7 @@ def compose(harmonics: Callable) -> Callable:
                 x = x * s + f[o + c]
             law = m.LAW.row(h, k)
             w[law], w[law + 1], w[law + 2] = x, v, a
-            harmonics(h, f, w, law, piece, s)
+            add_harmonics(h, f, w, law, piece, s)
 
     @kernel
     def known_motion(h, f, w, n, t):

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.retraction import make_position_rates
 from pipeline.dynamics.kernels import kernel
 
 ITERATIONS = 8
@@ -25,28 +27,32 @@ def largest(w, first, count):
 
 
 @kernel
-def none(h, f, w, n, t, y, dy, tolerance):
+def no_projection(h, f, w, n, t, y, dy, tolerance):
     """A tree cannot drift."""
     return 0
 
 
-def compose(evaluate: Callable, joint_motion: Callable, correction: Callable) -> Callable:
-    """The kernel project(h, f, w, n, t, y, dy, tolerance)."""
+@kernel
+def keep_scales(h, w):
+    """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
+    for r in range(h[m.N_KEPT_ROWS]):
+        o = h[m.ROW_SCALE] + r
+        w[o] = max(w[o], w[o + h[m.N_CLOSURE_ROWS]])
+
+
+def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) -> Callable:
+    """The kernel project(h, f, w, n, t, y, dy, tolerance).
+
+    evaluate: the right-hand side.  joints: modules of the joint types.  closures: the module of that name.
+    """
+    position_rates, correction = make_position_rates(joints), closures.correction
 
     @kernel
     def move(h, w, y, step):
         """Add to the positions of y the change that a small displacement of the coordinates means."""
         for k in range(h[m.NV]):
             w[h[m.U] + k] = w[step + k]
-        for i in range(1, h[m.N_LINKS]):
-            q, c = m.LINKS.q0(h, i), m.LINKS.c0(h, i)
-            joint_motion(
-                m.LINKS.joint(h, i), w, h[m.X] + q, h[m.U] + c, h[m.DU] + c, h[m.JOINT.place], h[m.POSITION_RATE] + q
-            )
-        for k in range(h[m.N_FLEX]):
-            q, c = m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
-            for j in range(m.FLEXES.n_modes(h, k)):
-                w[h[m.POSITION_RATE] + q + j] = w[step + c + j]
+        position_rates(h, w)
         for k in range(h[m.NQ]):
             w[y + k] += w[h[m.POSITION_RATE] + k]
 

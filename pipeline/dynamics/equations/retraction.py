@@ -8,26 +8,33 @@ the angle, which is far below what a method of second order leaves.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.choice import choose
 from pipeline.dynamics.kernels import kernel
 
 
-def compose(joint_motion: Callable) -> Callable:
-    """The kernel retract(h, w, y, displacement, out, total); places in w, `total` is scratch of NQ floats."""
+def make_position_rates(joints: tuple[Any, ...]) -> Callable:
+    """The kernel position_rates(h, w): rates of the positions in X at the speeds in U, modes included."""
+    joint_rate = choose(tuple(joint.position_rate for joint in joints))
 
     @kernel
-    def rates(h, w):
-        """Position rates at the positions in X and the speeds in U."""
+    def position_rates(h, w):
         for i in range(1, h[m.N_LINKS]):
             q, c = m.LINKS.q0(h, i), m.LINKS.c0(h, i)
-            joint_motion(
-                m.LINKS.joint(h, i), w, h[m.X] + q, h[m.U] + c, h[m.DU] + c, h[m.JOINT.place], h[m.POSITION_RATE] + q
-            )
+            joint_rate(m.LINKS.joint(h, i), w, h[m.X] + q, h[m.U] + c, h[m.POSITION_RATE] + q)
         for k in range(h[m.N_FLEX]):
             q, c = m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
             for j in range(m.FLEXES.n_modes(h, k)):
                 w[h[m.POSITION_RATE] + q + j] = w[h[m.U] + c + j]
+
+    return position_rates
+
+
+def make_retraction(joints: tuple[Any, ...]) -> Callable:
+    """The kernel retract(h, w, y, displacement, out, total); places in w, `total` is scratch of NQ floats."""
+    position_rates = make_position_rates(joints)
 
     @kernel
     def retract(h, w, y, displacement, out, total):
@@ -38,7 +45,7 @@ def compose(joint_motion: Callable) -> Callable:
             w[x + k] = w[y + k]
             w[total + k] = 0.0
         for stage in range(4):
-            rates(h, w)
+            position_rates(h, w)
             weight = (1.0 if stage in (0, 3) else 2.0) / 6.0
             reach = 0.5 if stage < 2 else 1.0
             for k in range(h[m.NQ]):

@@ -7,45 +7,39 @@ mass matrix, closures, accelerations, and the forces that the drives supply.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies import rigid
+from pipeline.dynamics.bodies.rigid import carry
 from pipeline.dynamics.equations.envelope import backward, factor, forward
+from pipeline.dynamics.equations.kinematics import make_kinematics
+from pipeline.dynamics.equations.prescribed_motion import make_known_motion
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot6, put, scale, turn_symmetric
+from pipeline.dynamics.vectors import accumulate, at, dot6
 
 #: pivots of M below this share of their diagonal mean a coordinate that moves no mass
 MASSLESS_PIVOT = 1e-15
 
 
 @kernel
-def no_flexible(h, f, w):
-    """No flexible body."""
+def nothing(h, f, w, n):
+    """Stands for the forces of parts that a mechanism does not have."""
 
 
 @kernel
-def no_port_load(h, w, i):
-    """No flexible parent."""
-
-
-@kernel
-def no_modal(h, w):
+def no_modal_mass(h, f, w):
     """No modes."""
 
 
 @kernel
-def no_contacts(h, f, w, n):
-    """No clearance joint."""
+def no_modal_forces(h, w):
+    """No modes."""
 
 
-def both(contacts: Callable, loads: Callable) -> Callable:
-    """Forces of contacts and of loads."""
-
-    @kernel
-    def run(h, f, w, n):
-        contacts(h, f, w, n)
-        loads(h, f, w)
-
-    return run
+@kernel
+def no_link_load(h, w, i):
+    """No link is carried by a flexible one."""
 
 
 @kernel
@@ -56,15 +50,6 @@ def no_closures(h, w, n):
 @kernel
 def no_known_forces(h, w):
     """No closure loads a drive."""
-
-
-@kernel
-def carry(h, w, i, k):
-    """Store the momentum of the subtree of link i moving with column k."""
-    I, s, o = m.INERTIA.row(h, i), m.COLUMNS.row(h, k), m.MOMENTA.row(h, k)
-    omega, v, c = at(w, s), at(w, s + 3), at(w, I + m.INERTIA.moment)
-    put(w, o, add(turn_symmetric(at6(w, I + m.INERTIA.inertia), omega), cross(c, v)))
-    put(w, o + 3, add(scale(w[I + m.INERTIA.mass], v), cross(omega, c)))
 
 
 @kernel
@@ -81,31 +66,6 @@ def gather(h, w, i):
     accumulate(w, up + 3, at(w, o + 3))
     for e in range(m.INERTIA.size):
         w[tree + e] += w[m.INERTIA.row(h, i) + e]
-
-
-@kernel
-def gather_port(h, w, i):
-    """A link on a flexible parent also loads the parent's modes, through its port."""
-    p = m.LINKS.carried_by(h, i)
-    if p < 0:
-        return
-    b = m.PORTS.flex(h, p)
-    c0, first = m.FLEXES.c0(h, b), m.PORTS.column(h, p)
-    for j in range(m.FLEXES.n_modes(h, b)):
-        k = first + j
-        carry(h, w, i, k)
-        accumulate(w, m.MOMENTA.row(h, c0 + j), at(w, m.MOMENTA.row(h, k)))
-        accumulate(w, m.MOMENTA.row(h, c0 + j) + 3, at(w, m.MOMENTA.row(h, k) + 3))
-        w[h[m.MODAL_BIAS] + c0 + j] += dot6(w, m.COLUMNS.row(h, k), w, m.WRENCH.row(h, i))
-
-
-@kernel
-def modal_forces(h, w):
-    """Generalised forces of the modes."""
-    for b in range(h[m.N_FLEX]):
-        c0 = m.FLEXES.c0(h, b)
-        for j in range(c0, c0 + m.FLEXES.n_modes(h, b)):
-            w[h[m.BIAS] + j] = w[h[m.MODAL_BIAS] + j]
 
 
 @kernel
@@ -127,30 +87,47 @@ def drive_forces(h, w):
         w[h[m.DRIVE_FORCE] + m.KNOWN_PAIRS.drive(h, p)] += dot6(w, momentum, w, column) * acceleration
 
 
-def flexible_inertia(inertia: Callable, mass_matrix: Callable) -> Callable:
-    """The kernel that treats all flexible bodies."""
+def make_forces(flexible: Any = None, contacts: Callable | None = None, loads: Callable | None = None) -> Callable:
+    """The kernel forces(h, f, w, n): inertia and applied forces of all links, before the tree gathers them."""
+    flexible_inertia = nothing if flexible is None else flexible.inertia
+    contact_forces = nothing if contacts is None else contacts
+    applied = nothing if loads is None else loads
 
     @kernel
-    def run(h, f, w):
-        for k in range(h[m.N_FLEX]):
-            inertia(h, f, w, k)
-            mass_matrix(h, f, w, k)
+    def forces(h, f, w, n):
+        for e in range(6):
+            w[m.WRENCH.row(h, 0) + e] = 0.0
+        for i in range(1, h[m.N_LINKS]):
+            if m.LINKS.flex(h, i) < 0:
+                rigid.inertia(h, f, w, i)
+        flexible_inertia(h, f, w, n)
+        contact_forces(h, f, w, n)
+        applied(h, f, w, n)
 
-    return run
+    return forces
 
 
-def compose(
-    known_motion: Callable,
-    kinematics: Callable,
-    rigid_inertia: Callable,
-    flexible: Callable,
-    port_load: Callable,
-    modal: Callable,
-    contacts: Callable,
-    close: Callable,
-    known_forces: Callable,
+def make_right_hand_side(
+    joints: tuple[Any, ...],
+    flexible: Any = None,
+    contacts: Callable | None = None,
+    loads: Callable | None = None,
+    closures: Any = None,
+    harmonics: Callable | None = None,
 ) -> Callable:
-    """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that the scene has."""
+    """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
+
+    joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads: the kernels that
+    apply them.  closures: the module of that name.  harmonics: adds those of the laws of time.
+    """
+    known_motion = make_known_motion(harmonics)
+    kinematics = make_kinematics(joints, flexible)
+    forces = make_forces(flexible, contacts, loads)
+    port_load = no_link_load if flexible is None else flexible.port_load
+    modal_mass = no_modal_mass if flexible is None else flexible.mass_matrix
+    modal = no_modal_forces if flexible is None else flexible.modal_forces
+    close = no_closures if closures is None else closures.close
+    known_forces = no_known_forces if closures is None else closures.known_forces
 
     @kernel
     def spread_state(h, w, y):
@@ -163,17 +140,12 @@ def compose(
             w[h[m.TURN] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_TURNS] + k]
 
     @kernel
-    def forces(h, f, w, n):
-        """Inertia, contacts, then the tree from its leaves to the ground."""
+    def gather_forces(h, f, w, n):
+        """Forces of all parts, then the tree from its leaves to the ground."""
         for k in range(h[m.MASS], h[m.MASS] + h[m.MASS_SIZE]):
             w[k] = 0.0
-        for e in range(6):
-            w[m.WRENCH.row(h, 0) + e] = 0.0
-        for i in range(1, h[m.N_LINKS]):
-            if m.LINKS.flex(h, i) < 0:
-                rigid_inertia(h, f, w, i)
-        flexible(h, f, w)
-        contacts(h, f, w, n)
+        forces(h, f, w, n)
+        modal_mass(h, f, w)
         for k in range(m.INERTIA.size * h[m.N_LINKS]):
             w[h[m.INERTIA.place] + k] = w[h[m.OWN.place] + k]
         for i in range(h[m.N_LINKS] - 1, 0, -1):
@@ -204,7 +176,7 @@ def compose(
         for k in range(h[m.N_LEDGER]):
             w[h[m.LEDGER_RATE] + k] = 0.0
         kinematics(h, f, w)
-        forces(h, f, w, n)
+        gather_forces(h, f, w, n)
         assemble_mass(h, w)
         n[m.EVALUATION] = m.OK
         if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], MASSLESS_PIVOT) > MASSLESS_PIVOT:

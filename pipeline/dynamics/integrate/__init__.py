@@ -1,16 +1,12 @@
-"""Integrators. To add one: a module with a `METHOD` (see `method`), a line below, a row in the order test,
-and its parameters in `pipeline.core.scene.solver`.
+"""Integrators. To add one: a module with a `METHOD` (see `method`), a line in `pipeline.core.integrators`, a row in the
+order test, and parameters of its own, if it has any, in `pipeline.core.scene.solver`.
 
-`stepper` runs any method, with steps that `adaptive` or `fixed` choose; `events` locates contacts in
-its steps (`step_ends` does not), `project` keeps loops closed, `observe` evaluates what is recorded.
+`stepper` runs any method, with steps that `adaptive` or `fixed` choose; `contact_events` locates contacts in its steps
+(`step_end_events` does not), `contact_phases` follows what happens inside them, `singular_step` steps over singular
+poses, `recording` writes down. Methods share `runge_kutta`, `newton`, `hermite` and `norms`.
 """
 
+from pipeline.core.integrators import INTEGRATORS
+
 KIND = "integrator"
-NAMES = {
-    "dop853": "dop853:METHOD",
-    "dopri5": "dopri5:METHOD",
-    "rk4": "rk4:METHOD",
-    "adams-bashforth-moulton": "adams:METHOD",
-    "generalized-alpha": "generalized_alpha:METHOD",
-    "radau": "radau:METHOD",
-}
+NAMES = {name: f"{traits.module}:METHOD" for name, traits in INTEGRATORS.items()}

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import hermite, rk4, stages
-from pipeline.dynamics.integrate.method import Method
+from pipeline.dynamics.integrate import hermite, rk4
+from pipeline.dynamics.integrate.method import Method, slope
+from pipeline.dynamics.integrate.runge_kutta import make_stages
 from pipeline.dynamics.kernels import kernel
 
-ORDER, LAST = 4, rk4.STAGES
+LAST = rk4.STAGES
 # memory: number of slopes kept, their distance, then the slopes themselves, the latest first
 COUNT, DISTANCE, KEPT = range(3)
 MOST = 3
@@ -52,29 +54,29 @@ def keep(h, f, w, n, step):
     for c in range(size):
         w[o + KEPT + 2 * size + c] = w[o + KEPT + size + c]
         w[o + KEPT + size + c] = w[o + KEPT + c]
-        w[o + KEPT + c] = w[h[m.SLOPES] + c]
+        w[o + KEPT + c] = w[slope(h, 0) + c]
     w[o + COUNT] = min(w[o + COUNT] + 1.0, MOST)
 
 
-def compose(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
-    _, start = stages.compose(evaluate, rk4.A, rk4.B, rk4.C)
+    _, runge_kutta_step = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
 
     @kernel
     def attempt(h, f, w, n, step):
         """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
-        o, size, slope = h[m.MEMORY], h[m.NY], h[m.SLOPES]
+        o, size, now, predicted = h[m.MEMORY], h[m.NY], slope(h, 0), slope(h, 1)
         if w[o + COUNT] < MOST or not alike(h, w, step):
-            return start(h, f, w, n, step)
+            return runge_kutta_step(h, f, w, n, step)
         one, two, three = o + KEPT, o + KEPT + size, o + KEPT + 2 * size
         for c in range(size):
-            ahead = 55.0 * w[slope + c] - 59.0 * w[one + c]
+            ahead = 55.0 * w[now + c] - 59.0 * w[one + c]
             ahead += 37.0 * w[two + c] - 9.0 * w[three + c]
             w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], slope + size)
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], predicted)
         n[m.EVALUATIONS] += 1
         for c in range(size):
-            ahead = 9.0 * w[slope + size + c] + 19.0 * w[slope + c]
+            ahead = 9.0 * w[predicted + c] + 19.0 * w[now + c]
             ahead += w[two + c] - 5.0 * w[one + c]
             w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
         return n[m.EVALUATION] == m.OK
@@ -82,4 +84,12 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
     return begin, attempt, None, hermite.make_extend(LAST), keep
 
 
-METHOD = Method(LAST + 2, LAST, hermite.ROWS, ORDER, compose, hermite.interpolate, memory=memory)
+METHOD = Method(
+    traits=INTEGRATORS["adams-bashforth-moulton"],
+    slopes=LAST + 2,
+    last=LAST,
+    dense=hermite.ROWS,
+    make_kernels=make_kernels,
+    interpolate=hermite.interpolate,
+    memory=memory,
+)

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.stepper import FAILED, finite, scaled_norm, set_magnitudes
+from pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
+from pipeline.dynamics.integrate.stepper import FAILED
 from pipeline.dynamics.kernels import kernel
 
 # the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
@@ -25,15 +26,15 @@ LEAST_NORM = 1e-4
 STRICTER = 10.0
 
 
-def compose(
+def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, judge, after_rejection and next_step of the stepper."""
+    """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
     steady = method.steady
-    start_watch, closed = contacts
+    watch_start, any_closed = contacts
 
     @kernel
     def first_step(h, f, w, n):
@@ -45,8 +46,8 @@ def compose(
         if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
             n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
             return False
-        start_watch(h, w)
-        set_magnitudes(h, f, w, y)
+        watch_start(h, w)
+        set_error_scales(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
         step = 1e-6 * w[c + m.SPAN]
         if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
@@ -61,7 +62,7 @@ def compose(
             steepness = max(steepness, scaled_norm(h, w, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        if closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
+        if any_closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
             step = min(step, w[c + m.TOUCHED_STEP])
         w[c + m.STEP] = step
         w[c + m.FIRST], w[c + m.REJECTED_STEP] = 1.0, 0.0
@@ -71,10 +72,10 @@ def compose(
         return True
 
     @kernel
-    def judge(h, f, w, n, step):
+    def error_norm(h, f, w, n, step):
         """Error norm of the step to Y_NEW, 1 at the tolerance."""
-        set_magnitudes(h, f, w, h[m.Y_NEW])
-        if closed(h, n):
+        set_error_scales(h, f, w, h[m.Y_NEW])
+        if any_closed(h, n):
             for g in range(h[m.N_GROUPS]):
                 w[h[m.MAGNITUDE] + g] /= STRICTER
         return error(h, f, w, n, step)
@@ -106,7 +107,7 @@ def compose(
     def next_step(h, w, n, step, norm):
         """Length of the step after the one that has just been accepted."""
         c = h[m.CONTROL]
-        if w[c + m.FIRST] > 0.0 and closed(h, n):
+        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
             w[c + m.TOUCHED_STEP] = step
         w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
         norm = max(norm, LEAST_NORM)
@@ -115,4 +116,4 @@ def compose(
         w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 
-    return first_step, judge, after_rejection, next_step
+    return first_step, error_norm, after_rejection, next_step

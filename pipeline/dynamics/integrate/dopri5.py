@@ -10,10 +10,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import stages
-from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
-from pipeline.dynamics.integrate.stages import slope
+from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from pipeline.dynamics.integrate.norms import error_scale
+from pipeline.dynamics.integrate.runge_kutta import make_stages
 from pipeline.dynamics.kernels import kernel
 
 STAGES, ERROR_ORDER = 6, 4
@@ -45,46 +46,46 @@ def weighted(h, w, weights, c):
     """Weighted sum of the slopes of state variable c."""
     total = 0.0
     for j in range(STAGES + 1):
-        total += weights[j] * w[h[m.SLOPES] + h[m.NY] * j + c]
+        total += weights[j] * w[slope(h, j) + c]
     return total
 
 
 @kernel
 def error(h, f, w, n, step):
-    """Norm of the local error, 1 at the tolerance; MAGNITUDE holds each group's scale."""
+    """Norm of the local error, 1 at the tolerance."""
     total = 0.0
     for c in range(h[m.NY]):
-        total += (step * weighted(h, w, E, c) / w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]) ** 2
+        total += (step * weighted(h, w, E, c) / error_scale(h, w, c)) ** 2
     return np.sqrt(total / h[m.NY])
 
 
 @kernel
 def extend(h, f, w, n, step):
     """Prepare the dense output of the step to Y_NEW."""
-    size, F = h[m.NY], h[m.DENSE]
+    size, dense = h[m.NY], h[m.DENSE]
     for c in range(size):
         delta = w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
-        bend = step * w[h[m.SLOPES] + c] - delta
-        w[F + c] = w[h[m.Y] + c]
-        w[F + size + c] = delta
-        w[F + 2 * size + c] = bend
-        w[F + 3 * size + c] = delta - step * w[slope(h, STAGES) + c] - bend
-        w[F + 4 * size + c] = step * weighted(h, w, D, c)
+        bend = step * w[slope(h, 0) + c] - delta
+        w[dense + c] = w[h[m.Y] + c]
+        w[dense + size + c] = delta
+        w[dense + 2 * size + c] = bend
+        w[dense + 3 * size + c] = delta - step * w[slope(h, STAGES) + c] - bend
+        w[dense + 4 * size + c] = step * weighted(h, w, D, c)
 
 
 @kernel
 def interpolate(h, w, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, F, s = h[m.NY], h[m.DENSE], 1.0 - theta
+    size, dense, s = h[m.NY], h[m.DENSE], 1.0 - theta
     for c in range(size):
-        v = w[F + 3 * size + c] + s * w[F + 4 * size + c]
-        v = w[F + size + c] + s * (w[F + 2 * size + c] + theta * v)
-        w[out + c] = w[F + c] + theta * v
+        v = w[dense + 3 * size + c] + s * w[dense + 4 * size + c]
+        v = w[dense + size + c] + s * (w[dense + 2 * size + c] + theta * v)
+        w[out + c] = w[dense + c] + theta * v
 
 
-def compose(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
-    _, advance = stages.compose(evaluate, A, B, C)
+    _, advance = make_stages(evaluate, A, B, C)
 
     @kernel
     def attempt(h, f, w, n, step):
@@ -98,5 +99,14 @@ def compose(evaluate: Callable, retract: Callable) -> tuple:
     return begin_afresh, attempt, error, extend, keep_nothing
 
 
-# 3.25: Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
-METHOD = Method(STAGES + 2, STAGES, 5, ERROR_ORDER, compose, interpolate, ends=True, stability=3.25)
+METHOD = Method(
+    traits=INTEGRATORS["dopri5"],
+    slopes=STAGES + 2,
+    last=STAGES,
+    dense=5,
+    make_kernels=make_kernels,
+    interpolate=interpolate,
+    error_order=ERROR_ORDER,
+    ends=True,
+    stability=3.25,  # Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
+)

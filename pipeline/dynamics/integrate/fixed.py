@@ -7,15 +7,15 @@ from collections.abc import Callable
 from typing import Any
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.stepper import finite, set_magnitudes
+from pipeline.dynamics.integrate.norms import finite, set_error_scales
 from pipeline.dynamics.kernels import kernel
 
 
-def compose(
+def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, judge, after_rejection and next_step of the stepper."""
-    start_watch, _ = contacts
+    """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
+    watch_start, _ = contacts
 
     @kernel
     def first_step(h, f, w, n):
@@ -26,21 +26,21 @@ def compose(
         if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
             n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
             return False
-        start_watch(h, w)
+        watch_start(h, w)
         w[c + m.STEP] = w[c + m.FIXED]
         n[m.FRESH] = 0
         begin(h, f, w, n)
         return True
 
     @kernel
-    def judge(h, f, w, n, step):
+    def no_error(h, f, w, n, step):
         """Every step that could be made is good."""
         return 0.0
 
     @kernel
-    def judge_with_scales(h, f, w, n, step):
+    def no_error_with_scales(h, f, w, n, step):
         """The same, of a method that looks for stiffness, which measures changes in units of the tolerance."""
-        set_magnitudes(h, f, w, h[m.Y_NEW])
+        set_error_scales(h, f, w, h[m.Y_NEW])
         return 0.0
 
     @kernel
@@ -57,5 +57,5 @@ def compose(
         """All steps are alike."""
         return w[h[m.CONTROL] + m.FIXED]
 
-    good = judge if method.stability is None else judge_with_scales
-    return first_step, good, after_rejection, next_step
+    error_norm = no_error if method.stability is None else no_error_with_scales
+    return first_step, error_norm, after_rejection, next_step

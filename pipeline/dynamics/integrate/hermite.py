@@ -8,8 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.method import slope
 from pipeline.dynamics.kernels import kernel
 
+#: rows of DENSE: coefficients of the powers of the share of the step
 ROWS = 4
 
 
@@ -18,15 +20,14 @@ def make_extend(last: int) -> Callable:
 
     @kernel
     def extend(h, f, w, n, step):
-        size, F, first = h[m.NY], h[m.DENSE], h[m.SLOPES]
-        final = first + size * last
+        size, dense, first, final = h[m.NY], h[m.DENSE], slope(h, 0), slope(h, last)
         for c in range(size):
             y, delta = w[h[m.Y] + c], w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
             start, end = step * w[first + c], step * w[final + c]
-            w[F + c] = y
-            w[F + size + c] = start
-            w[F + 2 * size + c] = 3.0 * delta - 2.0 * start - end
-            w[F + 3 * size + c] = start + end - 2.0 * delta
+            w[dense + c] = y
+            w[dense + size + c] = start
+            w[dense + 2 * size + c] = 3.0 * delta - 2.0 * start - end
+            w[dense + 3 * size + c] = start + end - 2.0 * delta
 
     return extend
 
@@ -34,7 +35,7 @@ def make_extend(last: int) -> Callable:
 @kernel
 def interpolate(h, w, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`); any cubic in DENSE."""
-    size, F = h[m.NY], h[m.DENSE]
+    size, dense = h[m.NY], h[m.DENSE]
     for c in range(size):
-        v = w[F + 3 * size + c] * theta + w[F + 2 * size + c]
-        w[out + c] = (v * theta + w[F + size + c]) * theta + w[F + c]
+        v = w[dense + 3 * size + c] * theta + w[dense + 2 * size + c]
+        w[out + c] = (v * theta + w[dense + size + c]) * theta + w[dense + c]

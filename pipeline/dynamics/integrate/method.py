@@ -6,45 +6,52 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.core.integrators import Traits
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.memory import Room
+
+
+@kernel
+def slope(h, i):
+    """Where w holds row i of SLOPES, the slope of a state."""
+    return h[m.SLOPES] + h[m.NY] * i
 
 
 @kernel
 def begin_afresh(h, f, w, n):
-    """A one-step method remembers nothing."""
+    """`begin` of a one-step method, which has nothing to forget."""
 
 
 @kernel
 def keep_nothing(h, f, w, n, step):
-    """A one-step method remembers nothing."""
+    """`keep` of a one-step method, which has nothing to remember."""
 
 
 def no_memory(nq: int, nv: int, ny: int) -> int:
-    """Floats that a method without memory needs."""
+    """`memory` of a method that keeps nothing between steps."""
     return 0
 
 
 def no_parameter(solver: Any) -> float:
-    """Number that a method without a parameter takes from the scene."""
+    """`parameter` of a method that has none."""
     return 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Method:
     """An integration method.
 
-    slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the events.
+    traits: what is known of it elsewhere.
+    slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the search for events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
-    error_order: the error estimate falls with this power of the step plus one; for methods without one, their order.
-    compose: (evaluate, retract) -> kernels that count their evaluations themselves:
+    make_kernels: (evaluate, retract) -> kernels that count their evaluations themselves:
         begin(h, f, w, n) after every restart, with the slope and the length of the first step known;
         attempt(h, f, w, n, step) fills Y_NEW, False when it could not;
         error(h, f, w, n, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
         extend(h, f, w, n, step) prepares the dense output once the slope at the end is known;
         keep(h, f, w, n, step) remembers an accepted step.
     interpolate: (h, w, share of the step, out) the dense output.
-    retracts: whether `compose` uses retract.
+    error_order: the error estimate falls with this power of the step plus one; 0 for methods without one.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
     memory: floats kept between steps, from the numbers of positions, speeds and state variables.
@@ -53,33 +60,19 @@ class Method:
         stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
     """
 
+    traits: Traits
     slopes: int
     last: int
     dense: int
-    error_order: int
-    compose: Callable
+    make_kernels: Callable
     interpolate: Callable
-    retracts: bool = False
+    error_order: int = 0
     ends: bool = False
     steady: float = 1.0
     memory: Callable[[int, int, int], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
     stability: float | None = None
 
-    def room(self, nq: int, nv: int, ny: int) -> Room:
+    def room(self, nq: int, nv: int, ny: int) -> m.Room:
         """What it needs of the work space, from the numbers of positions, speeds and state variables."""
-        return Room(self.slopes, self.dense, self.memory(nq, nv, ny))
-
-
-@dataclass(frozen=True)
-class Scheme:
-    """Which stepper is compiled: method, fixed or chosen steps, events located or noticed at step ends."""
-
-    integrator: str
-    fixed: bool = False
-    located: bool = True
-
-
-def scheme_of(solver: Any) -> Scheme:
-    """The scheme that a scene's solver table asks for."""
-    return Scheme(solver.integrator, solver.step is not None, solver.events == "located")
+        return m.Room(self.slopes, self.dense, self.memory(nq, nv, ny))

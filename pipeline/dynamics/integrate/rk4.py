@@ -9,20 +9,29 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.integrate import hermite, stages
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.dynamics.integrate import hermite
 from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
+from pipeline.dynamics.integrate.runge_kutta import make_stages
 
-STAGES, ORDER = 4, 4
+STAGES = 4
 A = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
 B = np.array([1.0, 2.0, 2.0, 1.0]) / 6.0
 C = np.array([0.0, 0.5, 0.5, 1.0])
 
 
-def compose(evaluate: Callable, retract: Callable) -> tuple:
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
-    _, attempt = stages.compose(evaluate, A, B, C)
+    _, attempt = make_stages(evaluate, A, B, C)
     return begin_afresh, attempt, None, hermite.make_extend(STAGES), keep_nothing
 
 
-# 2.785: its stability polynomial 1 + z + z^2/2 + z^3/6 + z^4/24 is 1 there
-METHOD = Method(STAGES + 2, STAGES, hermite.ROWS, ORDER, compose, hermite.interpolate, stability=2.785)
+METHOD = Method(
+    traits=INTEGRATORS["rk4"],
+    slopes=STAGES + 2,
+    last=STAGES,
+    dense=hermite.ROWS,
+    make_kernels=make_kernels,
+    interpolate=hermite.interpolate,
+    stability=2.785,  # where its stability polynomial 1 + z + z^2/2 + z^3/6 + z^4/24 is 1
+)

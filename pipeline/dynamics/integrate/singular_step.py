@@ -12,7 +12,6 @@ whatever the method and its tolerance. Contacts are searched on it as on any den
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,7 @@ import numpy as np
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.envelope import base
 from pipeline.dynamics.equations.projection import BLIND
+from pipeline.dynamics.integrate.poses import Poses
 from pipeline.dynamics.kernels import kernel
 
 NEVER = 1e300
@@ -98,7 +98,7 @@ def full(h, w, r):
     return max(w[most(h, r)], HALF * np.sqrt(max(w[o], w[o + h[m.N_CLOSURE_ROWS]])))
 
 
-def foreseeing(evaluate: Callable) -> Callable:
+def make_foresee(evaluate: Callable) -> Callable:
     """The kernel foresee(h, f, w, n, t)."""
 
     @kernel
@@ -194,7 +194,7 @@ def done(h, w, t):
         w[c + m.PASS_TIME] = w[c + m.MOST_REACH] = NEVER
 
 
-def along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callable, Callable, Callable]:
+def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callable, Callable, Callable]:
     """The method's kernels attempt, extend and interpolate, for steps along the polynomial as well."""
     interpolate, last = method.interpolate, method.last
 
@@ -223,7 +223,7 @@ def along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callable, C
     return attempt_along, extend_along, interpolate_along
 
 
-def arriving(evaluate: Callable, project: Callable, attempt: Callable, method: Any) -> Callable:
+def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method: Any) -> Callable:
     """The kernel arrive(h, f, w, n, step, t_new)."""
     last = method.last
 
@@ -247,83 +247,4 @@ def arriving(evaluate: Callable, project: Callable, attempt: Callable, method: A
     return arrive
 
 
-# Without closures ----------------------------------------------------------------------------------------------------
-
-
-@kernel
-def note_nothing(h, w):
-    """No row to depend on others."""
-
-
-@kernel
-def stand_anywhere(h, w, t):
-    """No row to depend on others."""
-
-
-@kernel
-def step_as_planned(h, w, t):
-    """No pose to stop before."""
-    return w[h[m.CONTROL] + m.STEP]
-
-
-def foreseeing_nothing(evaluate: Callable) -> Callable:
-    """The stepper of a tree."""
-
-    @kernel
-    def foresee(h, f, w, n, t):
-        """No pose to foresee."""
-
-    return foresee
-
-
-@kernel
-def never_ready(h, w):
-    """No polynomial."""
-    return False
-
-
-@kernel
-def nothing_done(h, w, t):
-    """No polynomial."""
-
-
-def along_nothing(method: Any, attempt: Callable, extend: Callable) -> tuple[Callable, Callable, Callable]:
-    """The method's own kernels."""
-    return attempt, extend, method.interpolate
-
-
-def arriving_nowhere(evaluate: Callable, project: Callable, attempt: Callable, method: Any) -> Callable:
-    """No polynomial to arrive along."""
-
-    @kernel
-    def arrive(h, f, w, n, step, t_new):
-        """No polynomial."""
-
-    return arrive
-
-
-@dataclass(frozen=True)
-class Poses:
-    """What the stepper does about singular poses; see the functions of the same names."""
-
-    note: Callable
-    stand: Callable
-    steer: Callable
-    ready: Callable
-    done: Callable
-    foreseeing: Callable
-    along: Callable
-    arriving: Callable
-
-
-POSES = Poses(note, stand, steer, ready, done, foreseeing, along, arriving)
-NO_POSES = Poses(
-    note_nothing,
-    stand_anywhere,
-    step_as_planned,
-    never_ready,
-    nothing_done,
-    foreseeing_nothing,
-    along_nothing,
-    arriving_nowhere,
-)
+OVER_POSES = Poses(note, stand, steer, ready, done, make_foresee, make_along, make_arrive)

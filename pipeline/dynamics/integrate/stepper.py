@@ -11,17 +11,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.closures import keep_scales
-from pipeline.dynamics.equations.projection import largest
-from pipeline.dynamics.integrate.rows import hold_modes, snapshot
-from pipeline.dynamics.integrate.singular_step import Poses
-from pipeline.dynamics.integrate.stiffness import detect
+from pipeline.dynamics.equations.projection import keep_scales, largest
+from pipeline.dynamics.integrate.norms import finite
+from pipeline.dynamics.integrate.poses import NO_POSES, Poses
+from pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
+from pipeline.dynamics.integrate.stiffness import make_detect_stiffness
 from pipeline.dynamics.kernels import kernel
 
-#: what settle returns for an event after which integration starts afresh; another positive number only records it
+#: what resolve_events returns for an event after which integration starts afresh; another positive number only
+#: records it
 RESTART = 1
 #: share of the planned step below which a step has been cut short
 CUT = 0.9
@@ -31,40 +30,6 @@ MOST_BLIND = 20.0
 FAILED = 1e9
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
-
-
-@kernel
-def set_magnitudes(h, f, w, y):
-    """Scale of each error group: tolerance times its floor plus the length of its vector at the step's ends.
-
-    The length, not the largest component: that would depend on the axes in which a scene is written.
-    """
-    magnitudes, o = h[m.MAGNITUDE], h[m.Y]
-    for g in range(h[m.N_GROUPS]):
-        w[magnitudes + g] = 0.0
-    for c in range(h[m.NY]):
-        g = magnitudes + m.GROUPS.group(h, c)
-        w[g] += 0.5 * (w[y + c] ** 2 + w[o + c] ** 2)
-    for g in range(h[m.N_GROUPS]):
-        w[magnitudes + g] = w[h[m.CONTROL] + m.RTOL] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[magnitudes + g]))
-
-
-@kernel
-def scaled_norm(h, w, a):
-    """Root mean square of the stretch of w from a, in units of the magnitudes."""
-    total = 0.0
-    for c in range(h[m.NY]):
-        total += (w[a + c] / w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]) ** 2
-    return np.sqrt(total / h[m.NY])
-
-
-@kernel
-def finite(h, w, a):
-    """Whether the stretch of w from a holds numbers only."""
-    result = True
-    for c in range(h[m.NY]):
-        result &= abs(w[a + c]) <= 1e300
-    return result
 
 
 @kernel
@@ -86,39 +51,47 @@ def none_closed(h, n):
     return False
 
 
-def settle_nothing(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-    """The stepper without root finding."""
+def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+    """The kernel resolve_events of a stepper that looks for none."""
 
     @kernel
-    def settle(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, events):
         return 0, False, t_new, step
 
-    return settle
+    return resolve_events
 
 
-def compose(
+#: `events` of scenes without contacts
+NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
+
+
+def make_advance(
     evaluate: Callable,
     project: Callable,
     retract: Callable,
     method: Any,
-    stepping: Callable,
-    contact_events: tuple[Callable, Callable, Callable],
-    poses: Poses,
+    stepping: Any,
+    events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
+    poses: Poses = NO_POSES,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
-    stepping: `compose` of `adaptive` or `fixed`.
-    contact_events: start_watch, make_settle and closed of `events` or `step_ends`, or those that do nothing.
+    stepping: the module `adaptive` or `fixed`.
+    events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    begin, attempt_method, error, extend_method, keep = method.compose(evaluate, retract)
-    attempt, extend, interpolate = poses.along(method, attempt_method, extend_method)
+    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(evaluate, retract)
+    attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
     last, ends = method.last, method.ends
-    start_watch, make_settle, closed = contact_events
-    settle = make_settle(evaluate, attempt, extend, project, replace(method, interpolate=interpolate))
-    feel = detect(method)
-    first_step, judge, after_rejection, next_step = stepping(evaluate, (start_watch, closed), begin, error, method)
+    watch_start, make_resolve_events, any_closed = events
+    dense = replace(method, interpolate=interpolate)
+    resolve_events = make_resolve_events(evaluate, attempt, extend, project, dense)
+    record_outputs = make_record_outputs(extend, interpolate)
+    detect_stiffness = make_detect_stiffness(method)
+    first_step, error_norm, after_rejection, next_step = stepping.make_step_control(
+        evaluate, (watch_start, any_closed), begin, error, method
+    )
     note, stand, steer, ready, done = poses.note, poses.stand, poses.steer, poses.ready, poses.done
-    foresee, arrive = poses.foreseeing(evaluate), poses.arriving(evaluate, project, attempt, method)
+    foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
@@ -142,20 +115,6 @@ def compose(
         else:
             return False
         return True
-
-    @kernel
-    def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
-        """Snapshots at the output times up to t_end, from the dense output."""
-        t = w[h[m.CONTROL] + m.TIME]
-        while n[m.NEXT_OUTPUT] < outputs.shape[0] and outputs[n[m.NEXT_OUTPUT]] <= t_end:
-            wanted = outputs[n[m.NEXT_OUTPUT]]
-            if wanted > t:
-                if not ready:
-                    extend(h, f, w, n, step)
-                    ready = True
-                interpolate(h, w, (wanted - t) / step, h[m.Y_STAGE])
-                snapshot(h, w, n, rows, wanted, h[m.Y_STAGE])
-            n[m.NEXT_OUTPUT] += 1
 
     @kernel
     def finish(h, f, w, n, t_new):
@@ -187,7 +146,7 @@ def compose(
             return 0.0
         if not attempt(h, f, w, n, step):
             return FAILED
-        norm = judge(h, f, w, n, step)
+        norm = error_norm(h, f, w, n, step)
         if norm != norm:
             n[m.EVALUATION] = m.NOT_FINITE
             return FAILED
@@ -195,7 +154,7 @@ def compose(
             return min(norm, FAILED)
         if not finish(h, f, w, n, t_new):
             return FAILED
-        feel(h, w, n, step)
+        detect_stiffness(h, w, n, step)
         return norm
 
     @kernel
@@ -214,7 +173,7 @@ def compose(
         """What `first_step` does for the contacts, before a step along a polynomial; True, for it can be made."""
         evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], h[m.SLOPES])
         n[m.EVALUATIONS] += 1
-        start_watch(h, w)
+        watch_start(h, w)
         n[m.EVALUATION], n[m.FRESH] = m.OK, 0
         return True
 
@@ -230,7 +189,7 @@ def compose(
         return True
 
     @kernel
-    def length(h, w, n, t):
+    def choose_step(h, w, n, t):
         """Length of the step to try from t; 0, with the reason in n[STATUS], when none can be."""
         c = h[m.CONTROL]
         step = w[c + m.COLLOCATED] if ready(h, w) else steer(h, w, t)
@@ -255,7 +214,7 @@ def compose(
             t = w[c + m.TIME]
             if n[m.FRESH] and not start(h, f, w, n):
                 return
-            step = length(h, w, n, t)
+            step = choose_step(h, w, n, t)
             if step == 0.0:
                 return
             final = t + 1.0001 * step >= w[c + m.END]
@@ -269,25 +228,23 @@ def compose(
             along = ready(h, w)
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, dense, t_end, step = settle(h, f, w, n, step, t_new, events)
+            happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, events)
             if happened < 0:
                 return
             n[m.STEPS] += 1
             if along:
                 snapshot(h, w, n, rows, t, h[m.Y])
-            record_outputs(h, f, w, n, step, dense, outputs, rows, t_end)
+            record_outputs(h, f, w, n, step, known, outputs, rows, t_end)
             keep(h, f, w, n, step)
             accept(h, w, t_end)
             plan(h, w, step, following)
             if along:
                 done(h, w, t_end)
-                n[m.FRESH] = 1
             elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
                 foresee(h, f, w, n, t_end)
             if happened > 0 or along:
                 hold_modes(h, w, n)
                 snapshot(h, w, n, rows, t_end, h[m.Y])
-            if happened > 0 and not along:
-                n[m.FRESH] = 1 if happened == RESTART else 0
+                n[m.FRESH] = 1 if along or happened == RESTART else 0
 
     return advance

@@ -1,4 +1,7 @@
-"""Whether a step of an explicit method is limited by stability, not by accuracy."""
+"""Whether a step of an explicit method is limited by stability, not by accuracy.
+
+Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.method import slope
+from pipeline.dynamics.integrate.norms import error_scale
 from pipeline.dynamics.kernels import kernel
 
 #: changes of state below this share of the tolerance are rounding, from which no rate can be told
-FELT = 1e-2
+LEAST_CHANGE = 1e-2
 #: where stability limits them, steps of chosen length swing about its limit: from this share of it on they count
 SWINGING = 0.7
 
@@ -22,7 +27,7 @@ def difference(h, w, first, count, a, b):
     total = 0.0
     for k in range(first, first + count):
         change = w[a + k] - w[b + k]
-        total += (change / w[h[m.MAGNITUDE] + m.GROUPS.group(h, k)]) ** 2
+        total += (change / error_scale(h, w, k)) ** 2
     return np.sqrt(total)
 
 
@@ -30,39 +35,39 @@ def difference(h, w, first, count, a, b):
 def steepness(h, w, last):
     """Largest rate [1/s] that the equations show between the last stage and the end of the step.
 
-    Both are at the same time; the change of slope over the change of state estimates the spectral
-    radius (Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2). Taken of the
-    speeds alone it explodes where an oscillation's speeds happen to agree, so that it is at most the
-    geometric mean with that of the positions, which an oscillation makes its frequency.
+    Both are at the same time; the change of slope over the change of state estimates the spectral radius. Taken of the
+    speeds alone it explodes where an oscillation's speeds happen to agree, so that it is at most the geometric mean
+    with that of the positions, which an oscillation makes its frequency.
     """
-    end, stage = h[m.SLOPES] + h[m.NY] * last, h[m.SLOPES] + h[m.NY] * (last - 1)
+    end, stage = slope(h, last), slope(h, last - 1)
     speeds = difference(h, w, h[m.NQ], h[m.NV], h[m.Y_NEW], h[m.Y_STAGE])
-    if not speeds > FELT * np.sqrt(h[m.NV]):
+    if not speeds > LEAST_CHANGE * np.sqrt(h[m.NV]):
         return 0.0
     rate = difference(h, w, h[m.NQ], h[m.NV], end, stage) / speeds
     positions = difference(h, w, 0, h[m.NQ], h[m.Y_NEW], h[m.Y_STAGE])
-    if not positions > FELT * np.sqrt(h[m.NQ]):
+    if not positions > LEAST_CHANGE * np.sqrt(h[m.NQ]):
         return rate
     return min(rate, np.sqrt(rate * difference(h, w, 0, h[m.NQ], end, stage) / positions))
 
 
 @kernel
-def unfelt(h, w, n, step):
-    """An implicit method, or one whose stages do not tell."""
+def detect_nothing(h, w, n, step):
+    """`detect_stiffness` of an implicit method, or of one whose stages do not tell."""
 
 
-def detect(method: Any) -> Callable:
-    """The kernel feel(h, w, n, step) after an accepted step: notes its steepness, and whether that limits the step."""
+def make_detect_stiffness(method: Any) -> Callable:
+    """The kernel detect_stiffness(h, w, n, step), after an accepted step."""
     if method.stability is None:
-        return unfelt
+        return detect_nothing
     last, reach = method.last, method.stability
 
     @kernel
-    def feel(h, w, n, step):
+    def detect_stiffness(h, w, n, step):
+        """Note the step's steepness, and count the step if that limits it."""
         rate, c = steepness(h, w, last), h[m.CONTROL]
         w[c + m.STEEPEST] = max(w[c + m.STEEPEST], rate)
         share = 1.0 if w[c + m.FIXED] > 0.0 else SWINGING
         if rate * step > share * reach:
             n[m.STIFF_STEPS] += 1
 
-    return feel
+    return detect_stiffness

@@ -1,30 +1,32 @@
-"""Joint types. To add one: a module here and a line below; the family tests pick it up.
+"""Joint types. To add one: a module here that is called like the type, and that type in core/scene/parts; the family
+tests pick it up.
 
-Each module holds one class with
+Each module has the kernels
+- ``motion(w, x, u, S) -> R_FG, p_FG, bias``: pose of the second frame in the first, motion subspace and bias
+  (see `spherical.motion`);
+- ``position_rate(w, x, u, rate)``: rates of the positions at the speeds;
+
+and one class, `RotationVector` for 'rotation-vector', with
 - ``POSITIONS``, ``SPEEDS``: coordinates of a tree joint of this type, one letter each (r, t);
 - ``TRANSLATIONS``: axes of the first frame along which a closure forbids displacement;
 - ``ROTATIONS``: pairs (axis of the first frame, axis of the second) that a closure keeps perpendicular;
-- ``motion``: kernel for the motion of the second frame relative to the first (see `spherical`);
 - ``COORDINATES``: its freedoms by name, in the order of the speeds, where drives and loads may act on them;
   turning and sliding them one after the other, from the first frame on, is its motion (see `coordinate`);
 - ``coordinates(R, p)``: joint positions of a relative pose, for the start.
 """
 
+from pipeline.core.registry import module_name
+from pipeline.core.scene.parts import IDEAL
+
 KIND = "joint type"
-NAMES = {
-    "fixed": "fixed:Fixed",
-    "prismatic": "prismatic:Prismatic",
-    "revolute": "revolute:Revolute",
-    "cylindrical": "cylindrical:Cylindrical",
-    "planar": "planar:Planar",
-    "universal": "universal:Universal",
-    "spherical": "spherical:Spherical",
-    "rotation-vector": "rotation_vector:RotationVector",
-    "free": "free:Free",
-}
+#: a class in a module of the same name; paths alone make a joint that no scene can name
+NAMES = {name: f"{module_name(name)}:{name.title().replace('-', '')}" for name in (*IDEAL, "rotation-vector")}
 CONTACTS = {
     "clearance-spherical": "clearance_spherical:ClearanceSpherical",
     "clearance-revolute": "clearance_revolute:ClearanceRevolute",
 }
+#: joints that are always one link; others may become chains of those in CHAIN (see `model.chain`)
+WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
+CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
 #: the ideal joint that a clearance joint keeps beside its contact
 HELD = {"clearance-revolute": "planar"}

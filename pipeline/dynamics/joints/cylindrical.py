@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import ROTATION, TRANSLATION, angle_about_z
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import about_z, put9
+from pipeline.dynamics.vectors import ZERO, about_z
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x radians about z, then metres along z (see `spherical.motion`)."""
-    for k in range(m.JOINT.columns + 12):
-        w[joint + k] = 0.0
-    put9(w, joint + m.JOINT.rotation, about_z(w[x]))
-    w[joint + m.JOINT.position + 2] = w[x + 1]
-    w[joint + m.JOINT.omega + 2], w[joint + m.JOINT.velocity + 2] = w[u], w[u + 1]
-    w[joint + m.JOINT.alpha + 2], w[joint + m.JOINT.acceleration + 2] = w[du], w[du + 1]
-    w[joint + m.JOINT.columns + 2] = w[joint + m.JOINT.columns + 6 + 5] = 1.0
+    for k in range(12):
+        w[S + k] = 0.0
+    w[S + 2] = w[S + 6 + 5] = 1.0
+    return about_z(w[x]), (0.0, 0.0, w[x + 1]), ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The positions' rates are the speeds."""
     w[rate], w[rate + 1] = w[u], w[u + 1]
 
 
@@ -30,7 +31,6 @@ class Cylindrical:
     TRANSLATIONS: tuple[int, ...] = (0, 1)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
     COORDINATES = (ROTATION, TRANSLATION)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import IDENTITY, ZERO
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """The two frames coincide (see `spherical.motion`)."""
-    for k in range(m.JOINT.columns):
-        w[joint + k] = 0.0
-    w[joint] = w[joint + 4] = w[joint + 8] = 1.0
+    return IDENTITY, ZERO, ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """There are no positions."""
 
 
 class Fixed:
@@ -24,7 +27,6 @@ class Fixed:
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
     COORDINATES: tuple[Coordinate, ...] = ()
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

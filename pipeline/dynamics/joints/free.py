@@ -5,31 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import from_quaternion, put9, quaternion_rate
+from pipeline.dynamics.vectors import ZERO, at, from_quaternion, put, quaternion_rate
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: quaternion and position from x, 7 numbers (see `spherical.motion`).
 
     u: angular velocity, then velocity of G's origin, components in F, 6 numbers.
     """
-    put9(w, joint + m.JOINT.rotation, from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3]))
     for k in range(36):
-        w[joint + m.JOINT.columns + k] = 0.0
-    for k in range(3):
-        w[joint + m.JOINT.position + k] = w[x + 4 + k]
-        w[joint + m.JOINT.omega + k] = w[u + k]
-        w[joint + m.JOINT.velocity + k] = w[u + 3 + k]
-        w[joint + m.JOINT.alpha + k] = w[du + k]
-        w[joint + m.JOINT.acceleration + k] = w[du + 3 + k]
-        w[joint + m.JOINT.columns + 7 * k] = 1.0
-        w[joint + m.JOINT.columns + 18 + 7 * k + 3] = 1.0
-        w[rate + 4 + k] = w[u + 3 + k]
+        w[S + k] = 0.0
+    for k in range(6):
+        w[S + 7 * k] = 1.0
+    return from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3]), at(w, x + 4), ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """Rates of quaternion and position."""
     quaternion_rate(w, x, u, rate)
+    put(w, rate + 4, at(w, u + 3))
 
 
 class Free:
@@ -39,7 +37,6 @@ class Free:
     TRANSLATIONS: tuple[int, ...] = ()
     ROTATIONS: tuple[tuple[int, int], ...] = ()
     COORDINATES: tuple[Coordinate, ...] = ()
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

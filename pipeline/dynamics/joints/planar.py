@@ -4,27 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import about_z, put9
+from pipeline.dynamics.vectors import ZERO, about_z
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x metres along x and y of F, radians about z (see `spherical.motion`)."""
-    for k in range(m.JOINT.columns + 18):
-        w[joint + k] = 0.0
-    put9(w, joint + m.JOINT.rotation, about_z(w[x + 2]))
-    for k in range(2):
-        w[joint + m.JOINT.position + k] = w[x + k]
-        w[joint + m.JOINT.velocity + k] = w[u + k]
-        w[joint + m.JOINT.acceleration + k] = w[du + k]
-        w[joint + m.JOINT.columns + 7 * k + 3] = 1.0
-        w[rate + k] = w[u + k]
-    w[joint + m.JOINT.omega + 2] = w[rate + 2] = w[u + 2]
-    w[joint + m.JOINT.alpha + 2] = w[du + 2]
-    w[joint + m.JOINT.columns + 12 + 2] = 1.0
+    for k in range(18):
+        w[S + k] = 0.0
+    w[S + 3] = w[S + 6 + 4] = w[S + 12 + 2] = 1.0
+    return about_z(w[x + 2]), (w[x], w[x + 1], 0.0), ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The positions' rates are the speeds."""
+    w[rate], w[rate + 1], w[rate + 2] = w[u], w[u + 1], w[u + 2]
 
 
 class Planar:
@@ -34,7 +31,6 @@ class Planar:
     TRANSLATIONS: tuple[int, ...] = (2,)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
     COORDINATES = (Coordinate("x", False, axis=0), Coordinate("y", False, axis=1), ROTATION)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import TRANSLATION
 from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import IDENTITY, ZERO
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x metres along z (see `spherical.motion`)."""
-    for k in range(m.JOINT.columns + 6):
-        w[joint + k] = 0.0
-    w[joint] = w[joint + 4] = w[joint + 8] = 1.0
-    w[joint + m.JOINT.position + 2] = w[x]
-    w[joint + m.JOINT.velocity + 2] = w[u]
-    w[joint + m.JOINT.acceleration + 2] = w[du]
-    w[joint + m.JOINT.columns + 5] = 1.0
+    for k in range(6):
+        w[S + k] = 0.0
+    w[S + 5] = 1.0
+    return IDENTITY, (0.0, 0.0, w[x]), ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The position's rate is the speed."""
     w[rate] = w[u]
 
 
@@ -29,7 +31,6 @@ class Prismatic:
     TRANSLATIONS: tuple[int, ...] = (0, 1)
     ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1), (1, 2), (2, 0))
     COORDINATES = (TRANSLATION,)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import ROTATION, angle_about_z
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import about_z, put9
+from pipeline.dynamics.vectors import ZERO, about_z
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: x radians about z (see `spherical.motion`)."""
-    for k in range(m.JOINT.columns + 6):
-        w[joint + k] = 0.0
-    put9(w, joint + m.JOINT.rotation, about_z(w[x]))
-    w[joint + m.JOINT.omega + 2] = w[u]
-    w[joint + m.JOINT.alpha + 2] = w[du]
-    w[joint + m.JOINT.columns + 2] = 1.0
+    for k in range(6):
+        w[S + k] = 0.0
+    w[S + 2] = 1.0
+    return about_z(w[x]), ZERO, ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The position's rate is the speed."""
     w[rate] = w[u]
 
 
@@ -29,7 +31,6 @@ class Revolute:
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
     COORDINATES = (ROTATION,)
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, cross, dot, put, put9, scale
+from pipeline.dynamics.vectors import ZERO, add, at, cross, dot, put, scale
 
 #: angle^2 below which the functions are taken from their series; their next terms are below rounding there
 SMALL = 1e-2
@@ -38,38 +37,35 @@ def _functions(s):
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
+def motion(w, x, u, S):
     """Motion of frame G in frame F: the rotation vector stored from x (see `spherical.motion`)."""
-    for k in range(9, m.JOINT.columns + 18):
-        w[joint + k] = 0.0
-    v, r, second = at(w, x), at(w, u), at(w, du)
+    v, r = at(w, x), at(w, u)
     c, a, b, da, db = _functions(dot(v, v))
-    put9(
-        w,
-        joint,
-        (
-            1.0 - a * (v[1] * v[1] + v[2] * v[2]),
-            a * v[0] * v[1] - c * v[2],
-            a * v[0] * v[2] + c * v[1],
-            a * v[0] * v[1] + c * v[2],
-            1.0 - a * (v[0] * v[0] + v[2] * v[2]),
-            a * v[1] * v[2] - c * v[0],
-            a * v[0] * v[2] - c * v[1],
-            a * v[1] * v[2] + c * v[0],
-            1.0 - a * (v[0] * v[0] + v[1] * v[1]),
-        ),
+    R = (
+        1.0 - a * (v[1] * v[1] + v[2] * v[2]),
+        a * v[0] * v[1] - c * v[2],
+        a * v[0] * v[2] + c * v[1],
+        a * v[0] * v[1] + c * v[2],
+        1.0 - a * (v[0] * v[0] + v[2] * v[2]),
+        a * v[1] * v[2] - c * v[0],
+        a * v[0] * v[2] - c * v[1],
+        a * v[1] * v[2] + c * v[0],
+        1.0 - a * (v[0] * v[0] + v[1] * v[1]),
     )
-    vr, vs, ds = cross(v, r), cross(v, second), 2.0 * dot(v, r)
-    vvr = cross(v, vr)
-    put(w, joint + m.JOINT.omega, add(r, add(scale(a, vr), scale(b, vvr))))
-    own = add(second, add(scale(a, vs), scale(b, cross(v, vs))))
-    bias = add(add(scale(da * ds, vr), scale(db * ds, vvr)), scale(b, cross(r, vr)))
-    put(w, joint + m.JOINT.alpha, add(own, bias))
     for k in range(3):
         unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
         vu = cross(v, unit)
-        put(w, joint + m.JOINT.columns + 6 * k, add(unit, add(scale(a, vu), scale(b, cross(v, vu)))))
-        w[rate + k] = w[u + k]
+        put(w, S + 6 * k, add(unit, add(scale(a, vu), scale(b, cross(v, vu)))))
+        put(w, S + 6 * k + 3, ZERO)
+    vr, ds = cross(v, r), 2.0 * dot(v, r)
+    bias = add(add(scale(da * ds, vr), scale(db * ds, cross(v, vr))), scale(b, cross(r, vr)))
+    return R, ZERO, bias, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """The vector's rate is the speed."""
+    put(w, rate, at(w, u))
 
 
 class RotationVector:
@@ -79,7 +75,6 @@ class RotationVector:
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ()
     COORDINATES: tuple[Coordinate, ...] = ()
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

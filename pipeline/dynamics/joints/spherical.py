@@ -5,27 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import from_quaternion, put9, quaternion_rate
+from pipeline.dynamics.vectors import ZERO, from_quaternion, quaternion_rate
 
 
 @kernel
-def motion(w, x, u, du, joint, rate):
-    """Motion of frame G in frame F, components in F; all arguments after w are places in it.
+def motion(w, x, u, S):
+    """Pose and motion subspace of frame G in frame F, components in F: R_FG, p_FG, and the bias S' u.
 
-    x: quaternion of R_FG (4); u: angular velocity [rad/s] (3); du: known part of its rate (3).
-    Fills `joint` (layout: tables.J_*) and the position rates `rate` (4).
+    All arguments after w are places in it.  x: quaternion of R_FG (4).  u: angular velocity [rad/s] (3).
+    S: filled with a twist (angular velocity; velocity of G's origin) per unit speed, so that the relative twist is
+    S u and its rate S u' + bias; the bias is returned as its angular and its linear part.
     """
-    R = from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3])
-    put9(w, joint + m.JOINT.rotation, R)
-    for k in range(9, m.JOINT.columns + 18):
-        w[joint + k] = 0.0
+    for k in range(18):
+        w[S + k] = 0.0
     for k in range(3):
-        w[joint + m.JOINT.omega + k] = w[u + k]
-        w[joint + m.JOINT.alpha + k] = w[du + k]
-        w[joint + m.JOINT.columns + 7 * k] = 1.0
+        w[S + 7 * k] = 1.0
+    return from_quaternion(w[x], w[x + 1], w[x + 2], w[x + 3]), ZERO, ZERO, ZERO
+
+
+@kernel
+def position_rate(w, x, u, rate):
+    """Rates of the positions x at the speeds u, all places in w."""
     quaternion_rate(w, x, u, rate)
 
 
@@ -36,7 +38,6 @@ class Spherical:
     TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
     ROTATIONS: tuple[tuple[int, int], ...] = ()
     COORDINATES: tuple[Coordinate, ...] = ()
-    motion = staticmethod(motion)
 
     @staticmethod
     def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:

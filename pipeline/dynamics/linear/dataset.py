@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import NO_IMPACT, Bench, seen, state
-from pipeline.dynamics.linear.settle import Settled
+from pipeline.dynamics.linear.equilibrium import Equilibrium
 from pipeline.dynamics.linear.shares import by_body
 from pipeline.dynamics.linear.vibrations import Vibrations
 from pipeline.dynamics.record.dataset import attributes, dataset
@@ -22,9 +22,9 @@ from pipeline.dynamics.run.trajectory import Trajectory
 PARTS = ("real", "imaginary")
 
 
-def equilibrium(bench: Bench, found: Settled, moving: bool) -> xr.Dataset:
+def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     """The pose and what holds it (schema EQUILIBRIUM)."""
-    rows = seen(bench, state(bench, found.at.q)[None, :])
+    rows = seen(bench, state(bench, rest.at.q)[None, :])
     contacts = bench.contacts
     ahead = [np.full((1, 1), bench.time), np.ones((1, contacts)), np.full((1, contacts), NO_IMPACT)]
     once = Trajectory(
@@ -43,18 +43,18 @@ def equilibrium(bench: Bench, found: Settled, moving: bool) -> xr.Dataset:
         **attributes(bench.scene),
         time=bench.time,
         drives="moving" if moving else "held",
-        residual=found.residual,
-        iterations=found.iterations,
-        mobility=found.at.Z.shape[1],
-        redundant_closure_rows=found.at.redundant,
+        residual=rest.residual,
+        iterations=rest.iterations,
+        mobility=rest.at.Z.shape[1],
+        redundant_closure_rows=rest.at.redundant,
     )
 
 
-def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.Dataset:
+def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> xr.Dataset:
     """The equilibrium with its natural vibrations (schema LINEAR)."""
-    still = equilibrium(bench, found, moving)
+    still = equilibrium(bench, rest, moving)
     value, w = small.value, small.shape
-    translation, rotation, energy = _motions(bench, found, w)
+    translation, rotation, energy = _motions(bench, rest, w)
     phase = _phase(translation, rotation, w)
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
     size, parts = np.abs(value), list(energy)
@@ -86,14 +86,14 @@ def linear(bench: Bench, found: Settled, small: Vibrations, moving: bool) -> xr.
     return conform(made, LINEAR, **still.attrs, motions_without_stiffness=small.free)
 
 
-def _motions(bench: Bench, found: Settled, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
     """Motion of every named frame in each vibration, and the share of every body in its kinetic energy.
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).
     """
     model, n = bench.engine.model, w.shape[1]
     speeds = np.concatenate([np.zeros((1, len(w))), w.real.T, w.imag.T])
-    rows = seen(bench, np.array([state(bench, found.at.q, v) for v in speeds]))
+    rows = seen(bench, np.array([state(bench, rest.at.q, v) for v in speeds]))
     links = link_motions(model, rows["link_frame"])
     velocities = frame_velocities(model, rows, links)
 
@@ -109,15 +109,15 @@ def _motions(bench: Bench, found: Settled, w: np.ndarray) -> tuple[np.ndarray, n
 
 def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.ndarray:
     """Factor per vibration that makes its largest component real and positive: of the frames, else of the speeds."""
-    found = []
+    phases = []
     for k in range(w.shape[1]):
         shown = translation[k].ravel() if np.abs(translation[k]).max(initial=0.0) > 0.0 else rotation[k].ravel()
         every = shown if np.abs(shown).max(initial=0.0) > 0.0 else w[:, k]
         # of components equal but for rounding always the first, so that the sign does not depend on the machine
         size = np.abs(every)
         largest = every[np.flatnonzero(size >= (1.0 - 1e-6) * size.max())[0]]
-        found.append(np.conj(largest) / abs(largest))
-    return np.array(found, dtype=complex)
+        phases.append(np.conj(largest) / abs(largest))
+    return np.array(phases, dtype=complex)
 
 
 def _split(values: np.ndarray) -> np.ndarray:

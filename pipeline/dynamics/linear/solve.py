@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.linear.bench import Bench, balance, hold, set_drives
-from pipeline.dynamics.linear.settle import Settled, settle
+from pipeline.dynamics.linear.equilibrium import Equilibrium, find_equilibrium
 from pipeline.dynamics.linear.tangent import scales
 from pipeline.dynamics.run.engine import Progress
 
@@ -27,25 +27,25 @@ def equilibrium(
     time: float | None,
     drives: Mapping[str, float] | None,
     moving: bool,
-) -> tuple[Bench, Settled]:
+) -> tuple[Bench, Equilibrium]:
     """The bench of a scene and its equilibrium; see `pipeline.dynamics.equilibrium`."""
     bench, q = hold(scene, bundles, progress, time, drives, moving)
     progress(None, "looking for the equilibrium")
-    found = settle(bench, q)
+    rest = find_equilibrium(bench, q)
     if moving:
-        _require_steady(bench, found)
-    return bench, found
+        _require_steady(bench, rest)
+    return bench, rest
 
 
-def _require_steady(bench: Bench, found: Settled) -> None:
+def _require_steady(bench: Bench, rest: Equilibrium) -> None:
     """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
     fastest = float(np.max(np.abs(bench.drives[:, 1]), initial=0.0))
     if fastest == 0.0:
         return
-    before = balance(bench, found.at.q)
+    before = balance(bench, rest.at.q)
     onward = bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, np.zeros(len(bench.drives))], axis=1)
     set_drives(bench, onward)
-    after = balance(bench, found.at.q)
+    after = balance(bench, rest.at.q)
     set_drives(bench, bench.drives)
     size = scales(bench)
     change = float(np.max(np.abs(after.bias - before.bias) * size, initial=0.0))

@@ -1,18 +1,13 @@
-"""Loads. To add one: a module here, a line below, its parameters in core/scene/loads.
+"""Loads. To add one: a module here that is called like its type, and its parameters in core/scene/loads.
 
-Each module but that of gravity, which is a field, holds one class with
+Each module but that of gravity, which is a field, holds a class, called like its parameters, with
 - ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: what it acts on
   and with (see `row.Row`); ValueError, in words, for values that cannot be;
 - ``apply(h, f, w, k)``: kernel that applies load k by `fields.act`.
 """
 
+from pipeline.core.registry import declared
+from pipeline.core.scene.loads import KINDS
+
 KIND = "load"
-NAMES = {
-    "gravity": "gravity:field",
-    "point-force": "point_force:PointForce",
-    "point-torque": "point_torque:PointTorque",
-    "spring-damper": "spring_damper:SpringDamper",
-    "joint-force": "joint_force:JointForce",
-    "joint-spring": "joint_spring:JointSpring",
-    "joint-friction": "joint_friction:JointFriction",
-}
+NAMES = declared(KINDS) | {"gravity": "gravity:field"}

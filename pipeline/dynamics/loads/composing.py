@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.kernels import kernel
 
 
-def compose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
-    """The kernel loads(h, f, w) that applies the loads of all kinds present, apply(h, f, w, load) each."""
+def make_loads(kinds: tuple[Any, ...]) -> Callable:
+    """The kernel loads(h, f, w, n) that applies the loads of all kinds present, given their modules."""
+    apply = _in_order(tuple(kind.apply for kind in kinds))
+
+    @kernel
+    def loads(h, f, w, n):
+        apply(h, f, w)
+
+    return loads
+
+
+def _in_order(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
     if not kernels:
 
         @kernel
@@ -17,7 +28,7 @@ def compose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
             """No kind is left."""
 
         return nothing
-    head, tail = kernels[0], compose(kernels[1:], first + 1)
+    head, tail = kernels[0], _in_order(kernels[1:], first + 1)
 
     @kernel
     def loads(h, f, w):

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.bodies.rigid import apply_wrench
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, add, at, at9, axis, cross, dot, put, scale, sub
+from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, put, scale, sub
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -27,21 +28,6 @@ def law(h, w, k, which):
 
 
 @kernel
-def push(h, w, s, moment, force):
-    """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
-    o = m.WRENCH.row(h, m.SITES.link(h, s))
-    accumulate(w, o, scale(-1.0, moment))
-    accumulate(w, o + 3, scale(-1.0, force))
-    p = m.SITES.port(h, s)
-    if p >= 0:
-        b = m.PORTS.flex(h, p)
-        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b), m.PORTS.column(h, p)
-        for j in range(m.FLEXES.n_modes(h, b)):
-            o = m.COLUMNS.row(h, first + j)
-            w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)
-
-
-@kernel
 def act(h, w, k, moment, force, value, rate, stored, power, loss):
     """Apply the wrench of load k on b and against it on a; note what it does, and book power and loss."""
     o = m.LOAD.row(h, k)
@@ -52,9 +38,9 @@ def act(h, w, k, moment, force, value, rate, stored, power, loss):
     ledger = h[m.LEDGER_RATE] + h[m.LOAD_SLOT]
     w[ledger] += power
     w[ledger + 1] += loss
-    push(h, w, m.LOADS.b(h, k), moment, force)
+    apply_wrench(h, w, m.LOADS.b(h, k), moment, force)
     if m.LOADS.a(h, k) >= 0:
-        push(h, w, m.LOADS.a(h, k), scale(-1.0, moment), scale(-1.0, force))
+        apply_wrench(h, w, m.LOADS.a(h, k), scale(-1.0, moment), scale(-1.0, force))
 
 
 @kernel

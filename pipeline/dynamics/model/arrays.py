@@ -125,7 +125,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
     tables = {
         m.LINK_FRAMES: links,
         m.SITE_FRAMES: int(h[m.N_SITES]),
-        m.JOINT: 1,
+        m.SUBSPACE: 6,
         m.OWN: links,
         m.INERTIA: links,
         m.WRENCH: links,

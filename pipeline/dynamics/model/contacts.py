@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
 from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.effects import Parts
 from pipeline.dynamics.model.mechanism import Mechanism, Site
 from pipeline.dynamics.model.numbering import Numbering
 
@@ -23,31 +23,12 @@ SURFACES = "pipeline.dynamics.contact"
 Touching = Sequence[tuple[int, int]]
 
 
-@dataclass(frozen=True)
-class ContactKinds:
-    """Which kinds of contacts a system has, each sorted by name."""
-
-    surfaces: tuple[str, ...] = ()
-    forms: tuple[str, ...] = ()
-    frictions: tuple[str, ...] = ()
-
-
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """The normal law of every contact with its numbers; InputError for a law that cannot be had."""
     return tuple(_resolve(mechanism, name, joint, (a, b)) for name, joint, a, b in mechanism.contacts)
 
 
-def kinds(mechanism: Mechanism, laws: Sequence[Resolved]) -> ContactKinds:
-    """The kinds that are there."""
-    joints = [joint for _, joint, _, _ in mechanism.contacts]
-    return ContactKinds(
-        tuple(sorted({j.type for j in joints})),
-        tuple(sorted({law.form for law in laws})),
-        tuple(sorted({j.friction.law for j in joints if j.friction is not None})),
-    )
-
-
-def fill(numbering: Numbering, present: ContactKinds, laws: Sequence[Resolved], touching: Touching) -> dict[Any, Any]:
+def fill(numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching) -> dict[Any, Any]:
     """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact."""
     mechanism = numbering.mechanism
     places = bristle_places(numbering)
@@ -56,9 +37,9 @@ def fill(numbering: Numbering, present: ContactKinds, laws: Sequence[Resolved], 
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
             friction = _friction(name, joint)
-            friction_kind = present.frictions.index(joint.friction.law)
+            friction_kind = parts.frictions.index(joint.friction.law)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
-        kinds_of = (present.forms.index(law.form), friction_kind, present.surfaces.index(joint.type))
+        kinds_of = (parts.forms.index(law.form), friction_kind, parts.surfaces.index(joint.type))
         rows.append((*sites, *kinds_of, place))
         reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}

@@ -12,6 +12,7 @@ import numpy as np
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.effects import Parts
 from pipeline.dynamics.model import contacts as contact_numbers
 from pipeline.dynamics.model import flexible_bodies as flexible
 from pipeline.dynamics.model import laws as lawful
@@ -19,7 +20,6 @@ from pipeline.dynamics.model import loads as loading
 from pipeline.dynamics.model import wiring
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.contacts import ContactKinds
 from pipeline.dynamics.model.driving import drive_laws, joint_class
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
@@ -32,19 +32,6 @@ NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
-class Kinds:
-    """Which kinds of parts a system has: all that its compiled code depends on."""
-
-    joints: tuple[str, ...]
-    contacts: ContactKinds
-    flexible: bool
-    closures: bool
-    harmonics: bool = False
-    loads: tuple[str, ...] = ()
-    stiffening: bool = False
-
-
-@dataclass(frozen=True)
 class Model:
     """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system.
 
@@ -53,7 +40,7 @@ class Model:
 
     mechanism: Mechanism
     numbering: Numbering
-    kinds: Kinds
+    parts: Parts
     arrays: Arrays
     closure_order: np.ndarray
     laws: tuple[Resolved, ...]
@@ -84,7 +71,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
     loads = loading.LEDGER if mechanism.scene.forces() else 0
     groups, floors = _error_groups(numbering, loads, turns)
     sites = [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)]
-    kinds = _kinds(mechanism, normals, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
+    parts = _parts(mechanism, normals, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
     arrays = pack(
         {
             m.NQ: numbering.nq,
@@ -95,14 +82,14 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
             m.MOST_MODES: max(numbering.modes.values(), default=0),
         },
         {
-            m.LINKS: _links(numbering, kinds),
+            m.LINKS: _links(numbering, parts),
             m.LINK_NUMBERS: [_link_numbers(link) for link in mechanism.links],
             m.SITES: sites,
             m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
             **flexible.fill(numbering),
             **wiring.mass_entries(numbering),
             **closures,
-            **contact_numbers.fill(numbering, kinds.contacts, normals, touching),
+            **contact_numbers.fill(numbering, parts, normals, touching),
             **law_tables,
             **loaded.tables,
             m.GRAVITY: loading.gravity(mechanism.scene),
@@ -111,18 +98,21 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
         },
         numbering.columns,
     )
-    return Model(mechanism, numbering, kinds, arrays, order, normals)
+    return Model(mechanism, numbering, parts, arrays, order, normals)
 
 
-def _kinds(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Kinds:
-    return Kinds(
+def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
+    contacts = [joint for _, joint, _, _ in mechanism.contacts]
+    return Parts(
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
-        contacts=contact_numbers.kinds(mechanism, normals),
-        flexible=any(link.flexible for link in mechanism.links),
-        closures=bool(mechanism.closures),
-        harmonics=harmonics,
+        surfaces=tuple(sorted({joint.type for joint in contacts})),
+        forms=tuple(sorted({law.form for law in normals})),
+        frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
         loads=loads,
+        closures=bool(mechanism.closures),
+        flexible=any(link.flexible for link in mechanism.links),
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
+        harmonics=harmonics,
     )
 
 
@@ -130,11 +120,11 @@ def _pose_row(place: Placement) -> np.ndarray:
     return np.concatenate([place.p, place.R.ravel()])
 
 
-def _links(numbering: Numbering, kinds: Kinds) -> list[tuple[int, ...]]:
+def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
     rows: list[tuple[int, ...]] = []
     flexible = sorted(numbering.modes)
     for i, link in enumerate(numbering.mechanism.links):
-        joint = kinds.joints.index(link.kind) if i else -1
+        joint = parts.joints.index(link.kind) if i else -1
         flex = flexible.index(i) if i in numbering.modes else -1
         inboard = numbering.port_of_inboard(i) if flex >= 0 else -1
         port = numbering.port_of(i - 1) if i else -1

@@ -54,9 +54,9 @@ def dataset(run: Run) -> xr.Dataset:
         coordinates["twin_time"] = run.twin.time
         variables["twin_separation"] = (("twin_time",), run.twin.separation)
         variables["horizon"] = ((), np.array(run.twin.horizon))
-    if run.scene.output.stress is not None:
-        record = lookup("pipeline.dynamics.record", "stress", where="[output]")
-        record(model, seen, run.scene.output.stress, variables, coordinates)
+    for name, asked in run.scene.output.requests().items():
+        record = lookup("pipeline.dynamics.record", name, where="[output]")
+        record(model, seen, asked, variables, coordinates)
     variables.update(ledger.series(model, seen))
     topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
     made = xr.Dataset(variables | topological, coords=coordinates | named)

@@ -18,11 +18,10 @@ import xarray as xr
 
 from pipeline.core import quantities
 from pipeline.core.errors import InputError, SolverError
-from pipeline.core.quantities import Quantity
+from pipeline.core.progress import Progress
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
-
-Progress = Callable[[float | None, str], None]
+from pipeline.core.scene.wanted import Quantity, parse
 
 #: the estimate compares with a run at this share of the tolerance
 FINER = 1e-2
@@ -81,7 +80,7 @@ class Search:
         assert accuracy is not None
         found = {}
         for name, want in accuracy.quantities.items():
-            quantity = quantities.parse(name, self.scene.owners())
+            quantity = parse(name, self.scene.owners())
             absolute = want.absolute
             if absolute is None:
                 absolute = (want.relative or 0.0) * quantities.scale(run, quantity)
@@ -171,7 +170,7 @@ def _missed(search: Search, best: Attempt, wanted: Mapping[str, float]) -> str:
     looser = min((r for r in search.runs if r > best.rtol), default=None)
     if looser is None:
         return text
-    quantity = quantities.parse(name, search.scene.owners())
+    quantity = parse(name, search.scene.owners())
     before = quantities.error(search.runs[looser], best.run, quantity)
     if not best.errors[name] < STUCK * before:
         until = _trusted_until(search, best, quantity, wanted[name])

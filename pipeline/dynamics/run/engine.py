@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile import functions as fuse
+from pipeline.dynamics.compile import functions
+from pipeline.dynamics.effects import scheme_of
 from pipeline.dynamics.equations import observation as observing
-from pipeline.dynamics.integrate.method import Method, scheme_of
+from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import initial, selection
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
 INTEGRATORS = "pipeline.dynamics.integrate"
-Progress = Callable[[float | None, str], None]
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
@@ -36,7 +36,7 @@ class Engine:
     """
 
     model: Model
-    entry: fuse.Entry
+    entry: functions.Entry
     method: Method
     h: np.ndarray
     kept: np.ndarray
@@ -130,7 +130,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
     scheme = scheme_of(scene.solver)
-    entry = fuse.entry(model.kinds, scheme, lambda text: progress(None, text))
+    entry = functions.entry(model.parts, scheme, lambda text: progress(None, text))
     method = lookup(INTEGRATORS, scene.solver.integrator, where="[solver.integrator]")
     h, w, n = model.arrays.work_space(method.room)
     kept = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
@@ -156,7 +156,7 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     y = initial.given_velocities(model, motion, y)
     if not engine.mobility.singular_start:
         y = project(engine, y)
-    if model.kinds.loads:
+    if model.parts.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, model.mechanism.start_residual

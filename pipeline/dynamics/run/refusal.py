@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.core.integrators import DEFAULT
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
@@ -12,8 +13,6 @@ from pipeline.dynamics.run.engine import Engine
 STIFF_SHARE = 0.3
 #: events per step from which on they are named as the cause
 OFTEN = 0.05
-#: integrators with Newton iterations
-IMPLICIT = ("generalized-alpha", "radau")
 
 
 def text(engine: Engine) -> str:
@@ -53,28 +52,31 @@ def text(engine: Engine) -> str:
 
 def _other_integrator(engine: Engine) -> str:
     """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
-    name = engine.model.scene.solver.integrator
-    return f"; or it moves on and {name} does not get over the pose: try dop853" if name in IMPLICIT else ""
+    if engine.method.traits.passes_singular:
+        return ""
+    return f"; or it moves on and {engine.model.scene.solver.integrator} does not get over the pose: try {DEFAULT}"
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
     """What used the evaluations up, and what helps."""
     name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
+    other = engine.method.traits.hands_over_to
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
     told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
     if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
-        return f"{told[0]}; {stiffness(n, control)}; choose an implicit integrator (radau), or a larger v_static"
+        choice = f"choose an implicit integrator ({other}), or " if other else ""
+        return f"{told[0]}; {stiffness(n, control)}; {choice}a larger v_static"
     if control[m.STEEPEST] > 0.0:
         told.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
     if done > 0.0:
         whole = n[m.EVALUATIONS] * control[m.SPAN] / done
         told.append(f"at this pace the whole run takes {whole:.1g} evaluations")
-    return "; ".join([*told, _remedy(steps, rejected, events, name)])
+    return "; ".join([*told, _remedy(steps, rejected, events, other)])
 
 
-def _remedy(steps: int, rejected: int, events: int, name: str) -> str:
-    """What helps by what there was most of."""
-    implicit = "" if name in IMPLICIT else ", radau where contacts or friction are stiff,"
+def _remedy(steps: int, rejected: int, events: int, other: str) -> str:
+    """What helps by what there was most of; other: the implicit method that is one of the remedies, or nothing."""
+    implicit = f", {other} where contacts or friction are stiff," if other else ""
     if events > OFTEN * steps:
         return (
             "contacts begin and end all the time: soften or damp them, end the run earlier, or allow more evaluations"

@@ -6,19 +6,17 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.run.engine import Engine, Progress
 from pipeline.dynamics.run.handover import StiffError
 from pipeline.dynamics.run.trajectory import Trajectory, integrate
 
-#: what takes over
-IMPLICIT = "radau"
-
 
 def implicit(scene: Scene) -> Scene:
     """The scene with the integrator that takes over."""
-    return edited(scene, {"solver.integrator": IMPLICIT})
+    return edited(scene, {"solver.integrator": INTEGRATORS[scene.solver.integrator].hands_over_to})
 
 
 def follow(
@@ -31,6 +29,6 @@ def follow(
     try:
         return engine, integrate(engine, y, progress), ""
     except StiffError as stiff:
-        progress(None, f"{stiff}; going on with {IMPLICIT}")
+        progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
         second = other()
         return second, integrate(second, y, progress, left=stiff.handover), str(stiff)

@@ -263,7 +263,7 @@ def _rescued(engine: Engine, run: _Run) -> bool:
 def _crawls(engine: Engine, run: _Run) -> bool:
     """Whether stability limits the steps so much that the run would take far too long."""
     n, control = run.n, engine.view(m.CONTROL, m.N_CONTROLS)
-    if engine.method.stability is None or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
+    if not engine.method.traits.hands_over_to or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
         return False
     done = max((control[m.TIME] - engine.start) / control[m.SPAN], 1e-12)
     too_many = min(HOPELESS, n[m.CAP])

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core import quantities
-from pipeline.core.quantities import Quantity
+from pipeline.core.scene.wanted import Quantity
 from pipeline.post.cost.statistics import relative_error
 from pipeline.post.cost.study import Point, horizon_of, relative
 

@@ -15,7 +15,7 @@ import xarray as xr
 
 from pipeline.core import quantities
 from pipeline.core.errors import SolverError
-from pipeline.core.quantities import Quantity
+from pipeline.core.scene.wanted import Quantity
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {

@@ -13,18 +13,14 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from pipeline.core.integrators import INTEGRATORS
 from pipeline.post.cost.study import GROUPS, MARGIN, resolved
 from pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
 
+COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
+MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")
 #: one colour and mark per integrator, the same in every figure
-LOOKS = {
-    "dop853": ("#0072B2", "o"),
-    "dopri5": ("#56B4E9", "s"),
-    "radau": ("#009E73", "^"),
-    "generalized-alpha": ("#D55E00", "v"),
-    "rk4": ("#CC79A7", "D"),
-    "adams-bashforth-moulton": ("#E69F00", "P"),
-}
+LOOKS = {name: (COLOURS[k % len(COLOURS)], MARKS[k % len(MARKS)]) for k, name in enumerate(INTEGRATORS)}
 COLUMNS = 3
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray as xr
 
+from pipeline.post.figures import mode_shapes
 from pipeline.post.paper import TABLE4_NORMAL_MODE
-from pipeline.post.plotting import shape_figure
 
 NEEDS = ("sps4/frequencies/fixed_circle:bundle/rod",)
 USES_GL = True
@@ -13,4 +13,4 @@ USES_GL = True
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig03.png and fig03.svg."""
-    return shape_figure.make("fig03", "Figure 3: fixed-fixed mode shapes", data[NEEDS[0]], TABLE4_NORMAL_MODE)
+    return mode_shapes.make("fig03", "Figure 3: fixed-fixed mode shapes", data[NEEDS[0]], TABLE4_NORMAL_MODE)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray as xr
 
+from pipeline.post.figures import mode_shapes
 from pipeline.post.paper import TABLE5_NORMAL_MODE
-from pipeline.post.plotting import shape_figure
 
 NEEDS = ("sps4/frequencies/free_circle:bundle/rod",)
 USES_GL = True
@@ -13,4 +13,4 @@ USES_GL = True
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig04.png and fig04.svg."""
-    return shape_figure.make("fig04", "Figure 4: free-free mode shapes", data[NEEDS[0]], TABLE5_NORMAL_MODE)
+    return mode_shapes.make("fig04", "Figure 4: free-free mode shapes", data[NEEDS[0]], TABLE5_NORMAL_MODE)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
+from pipeline.core.progress import Progress, silent
 from pipeline.post.body_shape import faces
 from pipeline.post.plotting import style
 from pipeline.post.render.mechanism import (
@@ -50,7 +51,7 @@ def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> n
     return result
 
 
-def film(drawn: Mechanism, post: xr.Dataset, progress: Callable[[float, str], None] | None = None) -> tuple[str, bytes]:
+def film(drawn: Mechanism, post: xr.Dataset, progress: Progress = silent) -> tuple[str, bytes]:
     """File suffix and content: MP4 where ffmpeg is there, else GIF; the whole run in SECONDS."""
     frames = _frames(drawn, post, progress)
     return write(frames, RATE)
@@ -88,7 +89,7 @@ def write(frames: Iterator[np.ndarray], rate: int) -> tuple[str, bytes]:
         return path.suffix.lstrip("."), path.read_bytes()
 
 
-def _frames(drawn: Mechanism, post: xr.Dataset, progress: Callable[[float, str], None] | None) -> Iterator[np.ndarray]:
+def _frames(drawn: Mechanism, post: xr.Dataset, progress: Progress) -> Iterator[np.ndarray]:
     time = drawn.run.time.values
     steps = np.searchsorted(time, np.linspace(time[0], time[-1], round(SECONDS * RATE)) - 1e-9)
     scene = plotter((VIEW, HEIGHT))
@@ -104,7 +105,7 @@ def _frames(drawn: Mechanism, post: xr.Dataset, progress: Callable[[float, str],
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             yield np.concatenate([image(scene), plots.frame(int(step))], axis=1)
-            if progress is not None and k % 15 == 0:
+            if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")
     scene.close()
 

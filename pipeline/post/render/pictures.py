@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 
+from pipeline.core.progress import Progress, silent
 from pipeline.post.render import gl
 from pipeline.post.series import derive
 
-Progress = Callable[[float, str], None]
-
 
 def pictures(
-    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], post: xr.Dataset | None = None, progress: Progress | None = None
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], post: xr.Dataset | None = None, progress: Progress = silent
 ) -> dict[str, bytes]:
     """File contents by name: ``mechanism.png``, ``film.mp4`` (or gif), ``mode_<body>.html``, ``modes_<body>.vtu``.
 

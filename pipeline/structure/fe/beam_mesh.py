@@ -19,7 +19,7 @@ from pipeline.structure.fe.beam_recipe import (
     segments,
 )
 from pipeline.structure.fe.quadrature import POINTS
-from pipeline.structure.fe.recipe import sources
+from pipeline.structure.fe.recipe_sources import sources
 
 #: constants that a taper changes, each with a profile
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")

@@ -104,8 +104,6 @@ InertiaSection = Annotated[
     CircleSection | TubeSection | RectangleSection | GeneralSection | EqualAreaSquare, Field(discriminator="type")
 ]
 
-#: names by which a section's model is chosen
-TYPES = ("circle", "tube", "rectangle", "general", "equal-area-square")
 #: lengths that a linear taper changes
 DIMENSIONS: dict[str, tuple[str, ...]] = {
     "circle": ("radius",),

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
+from pipeline.structure.closed_form import beside
 from pipeline.structure.fe import beam as beams
 from pipeline.structure.fe import mesh as meshes
 from pipeline.structure.fe.beam import N_DOFS, Beam
@@ -17,7 +18,6 @@ from pipeline.structure.fe.inertia_integrals import integrate
 from pipeline.structure.fe.model import Drawn, Families, Interface, Model
 from pipeline.structure.fe.slices import slices
 from pipeline.structure.kinds.kind import Kind
-from pipeline.structure.modes import exact
 
 #: components along the rod's axes by family, the one that decides the sign first
 FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}
@@ -93,4 +93,4 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     return [name.partition("_")[0] for name in families]
 
 
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=exact.columns)
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=beside.columns)

@@ -15,8 +15,6 @@ from pipeline.structure.fe.model import Model
 from pipeline.structure.kinds import SHAPES
 
 FAMILY = "pipeline.structure.kinds"
-#: told the done share of the work (None: unknown) and what is being done
-Progress = Callable[[float | None, str], None]
 
 
 def no_closed_form(
@@ -61,7 +59,3 @@ def of_mesh(mesh: xr.Dataset) -> Kind:
     """The kind of body whose mesh dataset this is."""
     found: Kind = lookup(FAMILY, str(mesh.attrs.get("body_kind", "beam")), where="mesh")
     return found
-
-
-def silent(share: float | None, text: str) -> None:
-    """A progress callback that says nothing."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress
 from pipeline.structure.fe.model import Interface, Model
-from pipeline.structure.kinds.kind import Progress
 from pipeline.structure.modes import compliance, eigen, normal, select
 from pipeline.structure.modes.condition import Condition
 from pipeline.structure.modes.normal import Normal

@@ -33,8 +33,8 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from pipeline.core.artifacts.compliance import shares
+from pipeline.core.progress import Progress
 from pipeline.structure.fe.model import DIRECTIONS, Model
-from pipeline.structure.kinds.kind import Progress
 from pipeline.structure.modes import compliance, eigen, normal
 from pipeline.structure.modes.statics import Flexibility
 

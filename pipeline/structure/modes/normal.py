@@ -11,8 +11,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 
 from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import Progress
 from pipeline.structure.fe.model import Model, own_dofs
-from pipeline.structure.kinds.kind import Progress
 from pipeline.structure.modes import eigen, select
 from pipeline.structure.modes.statics import Flexibility, border
 from pipeline.structure.sparse.multifrontal import negative_pivots
@@ -105,7 +105,7 @@ def _sparse(
     below = eigen.gap(values)
     if below is not None and not rough:
         progress(None, "checking that no mode was missed")
-        _nothing_missed(model, held, values, *below)
+        _nothing_missed(model, held, *below)
     return Normal(values, shapes, rigid)
 
 
@@ -117,7 +117,7 @@ def _rigid_frequency(model: Model, first: float) -> np.ndarray:
     return np.sort(eigen.frequency(values))
 
 
-def _nothing_missed(model: Model, held: sp.csr_array, values: np.ndarray, found: int, between: float) -> None:
+def _nothing_missed(model: Model, held: sp.csr_array, found: int, between: float) -> None:
     """Sylvester's law of inertia: K - s M has as many negative pivots as there are eigenvalues below s."""
     shifted = sp.csr_array(model.stiffness - between * model.mass)
     dofs = own_dofs(held)

@@ -11,9 +11,10 @@ import xarray as xr
 
 from pipeline.core.artifacts.schema import MODES, conform
 from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress, silent
 from pipeline.core.registry import lookup, suggestion
 from pipeline.structure.fe.model import Interface, Model
-from pipeline.structure.kinds.kind import Kind, Progress, of_mesh, silent
+from pipeline.structure.kinds.kind import Kind, of_mesh
 from pipeline.structure.modes import basis, deficits, eigen, orient
 from pipeline.structure.modes.condition import Condition, Given, check
 from pipeline.structure.modes.select import Wanted

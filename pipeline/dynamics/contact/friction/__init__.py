@@ -1,6 +1,7 @@
-"""Friction laws. To add one: a module here, a line below; the property tests pick it up.
+"""Friction laws. To add one: a module here that is called like the law, and its parameters in core/scene/clearance;
+the property tests pick it up.
 
-Each module has a class with
+Each module has a class, called like its parameters, with
 - ``traction(z, slip, f_n, p) -> (force, loss, stored, z_rate)``: kernel; force [N] on the ball against
   the sliding velocity `slip` [m/s] (vector in the tangent plane), what it takes [W] >= 0, what it holds [J],
   and the rate of its bristles z [m] in the axes of slip (zeros for a law without memory);
@@ -10,9 +11,8 @@ Each module has a class with
 A joint without friction names none.
 """
 
+from pipeline.core.registry import declared
+from pipeline.core.scene.clearance import FRICTIONS
+
 KIND = "friction law"
-NAMES = {
-    "modified-coulomb": "modified_coulomb:ModifiedCoulomb",
-    "ambrosio": "ambrosio:Ambrosio",
-    "lugre": "lugre:LuGre",
-}
+NAMES = declared(FRICTIONS, key="law")

@@ -16,7 +16,7 @@ from pipeline.structure.fe.exchange import files
 from pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
 from pipeline.structure.fe.model import symmetric
-from pipeline.structure.fe.recipe import sources
+from pipeline.structure.fe.recipe_sources import sources
 
 #: length [m], mass [kg] and time [s] of each consistent system
 SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}

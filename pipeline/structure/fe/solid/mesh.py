@@ -11,7 +11,7 @@ import xarray as xr
 from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.core.artifacts.schema import SOLID, conform
 from pipeline.core.errors import InputError
-from pipeline.structure.fe.recipe import sources
+from pipeline.structure.fe.recipe_sources import sources
 from pipeline.structure.fe.solid import geometry as geometries
 from pipeline.structure.fe.solid import imported, ties
 from pipeline.structure.fe.solid.elements import ELEMENTS
@@ -82,7 +82,7 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, An
         where = f"{place} [frames.{name}.on]"
         nodes = ties.chosen(geometry, frame.on, where)
         x, weight = geometry.nodes[nodes], ties.areas(geometry, nodes)
-        ties.check_rank(frame, x, where)
+        ties.check_rank(x, where)
         if frame.tie == "rigid":
             other = taken[nodes].max()
             if other >= 0:

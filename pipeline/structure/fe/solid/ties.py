@@ -20,7 +20,7 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
 from pipeline.structure.fe.solid.elements import on_face
 from pipeline.structure.fe.solid.geometry import Geometry, boundary, boundary_nodes, face_nodes
-from pipeline.structure.fe.solid.recipe import On, TiedFrame
+from pipeline.structure.fe.solid.recipe import On
 
 #: default distance from a surface within which a node lies on it, as a share of the body's size
 TOLERANCE = 1e-6
@@ -85,7 +85,7 @@ def centre(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
     return weight @ x / weight.sum()
 
 
-def check_rank(frame: TiedFrame, x: np.ndarray, where: str) -> None:
+def check_rank(x: np.ndarray, where: str) -> None:
     """InputError when the nodes lie on a line, so that turning about it is not determined."""
     spread = np.linalg.svd(x - x.mean(axis=0), compute_uv=False)
     if len(x) < 3 or spread[1] < 1e-9 * spread[0]:

@@ -16,9 +16,9 @@ from pipeline.core.workflow import cores, schedule
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import Task
-from pipeline.dynamics.compile import compiler_process as companion
-from pipeline.dynamics.compile import functions as fuse
-from pipeline.dynamics.compile.generated import bring, claimed, compiled, take
+from pipeline.dynamics.compile import compiler_process, functions
+from pipeline.dynamics.compile.files import bring, claimed, compiled, take
+from tests.stages.conftest import PATIENCE
 
 SOURCE = """from numba import njit, types
 
@@ -30,7 +30,7 @@ def add(x):
 #: holds the lock of a file, says so, and stays
 HOLDER = """import sys, time
 from pathlib import Path
-from pipeline.dynamics.compile.generated import claimed
+from pipeline.dynamics.compile.files import claimed
 with claimed(Path(sys.argv[1]), wait=True):
     print("held", flush=True)
     time.sleep(600.0)
@@ -61,16 +61,16 @@ def results(files: list[Path]) -> list[int]:
     return [sys.modules[path.stem].add(10) for path in files]
 
 
-def test_a_companion_leaves_the_code_on_disk(files: list[Path]) -> None:
-    with companion.companion(files) as process:
+def test_a_second_process_leaves_the_code_on_disk(files: list[Path]) -> None:
+    with compiler_process.second_process(files) as process:
         assert process is not None
-        assert process.wait(timeout=300.0) == 0
+        assert process.wait(timeout=PATIENCE) == 0
         assert all(compiled(path) for path in files)
         bring(files, nothing)
     assert results(files) == [10, 11, 12]
 
 
-def test_what_a_companion_is_compiling_is_left_to_it(files: list[Path], root: Path) -> None:
+def test_what_a_second_process_is_compiling_is_left_to_it(files: list[Path], root: Path) -> None:
     """And when it dies over it, or is killed, compiled here after all, last."""
     holder = subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(files[0])], cwd=root, stdout=subprocess.PIPE, text=True
@@ -92,12 +92,14 @@ def test_what_a_companion_is_compiling_is_left_to_it(files: list[Path], root: Pa
 
 
 @pytest.mark.parametrize("command", ["raise SystemExit(1)", "import os; os.abort()"])
-def test_a_companion_that_fails_is_not_missed(files: list[Path], monkeypatch: pytest.MonkeyPatch, command: str) -> None:
-    monkeypatch.setattr(companion, "COMMAND", command)
+def test_a_second_process_that_fails_is_not_missed(
+    files: list[Path], monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    monkeypatch.setattr(compiler_process, "COMMAND", command)
     told: list[Path] = []
-    with companion.companion(files) as process:
+    with compiler_process.second_process(files) as process:
         assert process is not None
-        assert process.wait(timeout=300.0) != 0
+        assert process.wait(timeout=PATIENCE) != 0
         bring(files, told.append)
     assert told == files
     assert results(files) == [10, 11, 12]
@@ -105,54 +107,56 @@ def test_a_companion_that_fails_is_not_missed(files: list[Path], monkeypatch: py
 
 def test_a_machine_that_starts_no_process_does_without(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(files[0].parent / "not there"))
-    with companion.companion(files) as process:
+    with compiler_process.second_process(files) as process:
         assert process is None
 
 
-def test_an_interrupt_ends_the_companion(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companion, "COMMAND", "import time; time.sleep(600.0)")
-    with pytest.raises(KeyboardInterrupt), companion.companion(files) as process:
+def test_an_interrupt_ends_the_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiler_process, "COMMAND", "import time; time.sleep(600.0)")
+    with pytest.raises(KeyboardInterrupt), compiler_process.second_process(files) as process:
         raise KeyboardInterrupt
     assert process is not None
     assert process.returncode is not None  # waited for, too: no zombie
 
 
-def test_a_companion_ends_with_its_parent(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_process_ends_with_its_parent(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
     """Also where that was killed and could say nothing: its end of the pipe is closed then."""
-    start = companion.COMMAND.replace("import work\nwork(sys.argv[2:])", "import _follow_parent\n_follow_parent()")
-    monkeypatch.setattr(companion, "COMMAND", start)
-    with companion.companion(files) as process:
+    start = compiler_process.COMMAND.replace(
+        "import work\nwork(sys.argv[2:])", "import _follow_parent\n_follow_parent()"
+    )
+    monkeypatch.setattr(compiler_process, "COMMAND", start)
+    with compiler_process.second_process(files) as process:
         assert process is not None
         assert process.stdin is not None
         process.stdin.close()
-        assert process.wait(timeout=300.0) == 1
+        assert process.wait(timeout=PATIENCE) == 1
 
 
-def test_there_is_one_companion_for_a_folder(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(companion, "COMMAND", "import time; time.sleep(600.0)")
-    with companion.companion(files) as first, companion.companion(files) as second:
+def test_there_is_one_second_process_for_a_folder(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(compiler_process, "COMMAND", "import time; time.sleep(600.0)")
+    with compiler_process.second_process(files) as first, compiler_process.second_process(files) as second:
         assert first is not None
         assert second is None
-    with companion.companion(files) as third:
+    with compiler_process.second_process(files) as third:
         assert third is not None
 
 
-def test_one_file_and_one_core_need_no_companion(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
-    with companion.companion(files[:1]) as process:
+def test_one_file_and_one_core_need_no_second_process(files: list[Path], monkeypatch: pytest.MonkeyPatch) -> None:
+    with compiler_process.second_process(files[:1]) as process:
         assert process is None
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    assert not companion.wanted()
+    assert not compiler_process.wanted()
 
 
-def test_workers_have_no_companion() -> None:
+def test_workers_have_no_second_process() -> None:
     """Each core has a worker already, unless theirs is the only task that can run."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert not pool.submit(companion.wanted).result()
-    assert companion.wanted()
+        assert not pool.submit(compiler_process.wanted).result()
+    assert compiler_process.wanted()
     cores.tell(others_idle=False)
-    assert not companion.wanted()
+    assert not compiler_process.wanted()
     cores.tell(others_idle=True)
-    assert companion.wanted()
+    assert compiler_process.wanted()
 
 
 @pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])
@@ -174,7 +178,7 @@ def test_code_that_cannot_be_kept_is_compiled_all_the_same(tmp_path: Path, monke
     (tmp_path / "file").touch()
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "file" / "kernels"))
     told: list[str] = []
-    path = fuse._file(fuse._folder(told.append), "test", SOURCE.format(k=3))
+    path = functions._file(functions._folder(told.append), "test", SOURCE.format(k=3))
     assert "cannot be kept" in told[0]
     with claimed(path, wait=True):
         assert not take(path, nothing)

@@ -1,4 +1,4 @@
-"""Stages of an explicit Runge-Kutta method, from its coefficients."""
+"""Stages and step of an explicit Runge-Kutta method, from its coefficients."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from collections.abc import Callable
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.method import slope
 from pipeline.dynamics.kernels import kernel
 
 
-@kernel
-def slope(h, i):
-    """Where w holds the slope of stage i."""
-    return h[m.SLOPES] + h[m.NY] * i
+def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[Callable, Callable]:
+    """The kernels stage(h, f, w, n, step, i) and attempt(h, f, w, n, step).
 
-
-def compose(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[Callable, Callable]:
-    """The kernels stage(h, f, w, n, step, i) and attempt(h, f, w, n, step); row 0 is the slope at the start."""
+    A, B, C: Butcher's tableau; stages beyond len(B) serve error estimates and dense output.
+    Row i of SLOPES is the slope of stage i, row 0 that at the start of the step.
+    """
     count = len(B)
 
     @kernel

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.modes import closed_form
-from pipeline.structure.modes.closed_form import Span
+from pipeline.structure.closed_form import frequencies
+from pipeline.structure.closed_form.frequencies import Span
 
 #: of bending, torsion and extension, each two words with a hyphen
 Ends = tuple[str, str, str]
@@ -91,10 +91,10 @@ def _table(rod: Uniform, ends: Ends, families: Sequence[str], *, rotary: bool, s
 def _series(rod: Uniform, ends: Ends, family: str, count: int, *, rotary: bool, shear: bool) -> np.ndarray:
     bending, torsion, extension = ends
     if family == "axial":
-        return closed_form.rod(math.sqrt(rod.youngs_modulus / rod.density), rod.length, extension, count)
+        return frequencies.rod(math.sqrt(rod.youngs_modulus / rod.density), rod.length, extension, count)
     if family == "torsion":
         speed = math.sqrt(rod.shear_modulus * rod.second[0] / (rod.density * rod.rotary[0]))
-        return closed_form.rod(speed, rod.length, torsion, count)
+        return frequencies.rod(speed, rod.length, torsion, count)
     # deflection in y bends about z, and the other way round
     axis, across = (2, 1) if family == "bending_y" else (1, 2)
     kappa = float(rod.shear_coefficient[across]) if shear and rod.shear_coefficient is not None else math.inf
@@ -105,4 +105,4 @@ def _series(rod: Uniform, ends: Ends, family: str, count: int, *, rotary: bool, 
         rotary=rod.density * float(rod.rotary[axis]) if rotary else 0.0,
         shear=kappa * rod.shear_modulus * rod.area,
     )
-    return closed_form.bending(span, bending, count)
+    return frequencies.bending(span, bending, count)

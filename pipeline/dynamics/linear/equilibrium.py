@@ -36,7 +36,7 @@ OVERSHOOT = 0.5
 
 
 @dataclass(frozen=True)
-class Settled:
+class Equilibrium:
     """An equilibrium. residual: largest unbalanced force, moments divided by the mechanism's size [N]."""
 
     at: Tangent
@@ -44,7 +44,7 @@ class Settled:
     iterations: int
 
 
-def settle(bench: Bench, q: np.ndarray) -> Settled:
+def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
     """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
     at = tangent(bench, q)
     best, since = np.inf, 0
@@ -54,10 +54,10 @@ def settle(bench: Bench, q: np.ndarray) -> Settled:
         since = 0 if size < 0.5 * best else since + 1
         best = min(best, size)
         if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):
-            return Settled(at, residual(bench, at), iteration)
+            return Equilibrium(at, residual(bench, at), iteration)
         step = _step(bench, at, BALANCED * largest)
         if float(np.max(np.abs(at.Z @ step) / scales(bench))) <= SHORT:
-            return Settled(at, residual(bench, at), iteration)
+            return Equilibrium(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
     loose = leading(bench, at.Z @ at.unbalanced, at.mass)
     raise SolverError(

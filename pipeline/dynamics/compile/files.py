@@ -1,7 +1,7 @@
 """Generated files, imported: the function of each is compiled as that is done, or fetched from disk.
 
-A file belongs to whoever holds its lock, so that no two processes compile the same. A companion
-(`companion`) imports this module and little else.
+A file belongs to whoever holds its lock, so that no two processes compile the same. The second
+process (`compiler_process`) imports this module and little else.
 """
 
 from __future__ import annotations

@@ -1,0 +1,38 @@
+"""Kutta's method of order 3, with fixed steps.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.dynamics.integrate import hermite
+from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
+from pipeline.dynamics.integrate.runge_kutta import make_stages
+
+STAGES = 3
+A = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [-1.0, 2.0, 0.0]])
+B = np.array([1.0, 4.0, 1.0]) / 6.0
+C = np.array([0.0, 0.5, 1.0])
+
+
+def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
+    """The method's kernels; it has no error estimate."""
+    _, attempt = make_stages(evaluate, A, B, C)
+    return begin_afresh, attempt, None, hermite.make_extend(STAGES), keep_nothing
+
+
+METHOD = Method(
+    traits=INTEGRATORS["kutta3"],
+    slopes=STAGES + 2,
+    last=STAGES,
+    dense=hermite.ROWS,
+    make_kernels=make_kernels,
+    interpolate=hermite.interpolate,
+    gap=0.25,
+    stability=2.512,  # where its stability polynomial 1 + z + z^2/2 + z^3/6 is -1
+)

@@ -1,0 +1,19 @@
+"""``flexclear mass``: mass of the rigid bodies of scenes."""
+
+from __future__ import annotations
+
+import argparse
+
+from stages import run
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print a line for each scene."""
+    for graph in run.graphs(options.scenes):
+        total = sum(body.mass for body in graph.scene.rigid().values())
+        print(f"{graph.scene.name}: {total:.6g} kg")

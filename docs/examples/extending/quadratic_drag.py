@@ -1,0 +1,37 @@
+r"""Drag of a fluid at rest on the origin of a frame: against its velocity, with the square of the speed.
+
+.. math:: F = -c\,|v|\,v, \quad c = \rho\,C_d A/2
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.scene.loads import QuadraticDrag as Declared
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.loads.fields import act, number
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.vectors import at, cross, dot, scale
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k; all of its power is lost."""
+    o = m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
+    v = at(w, o + m.FRAME.velocity)
+    speed = np.sqrt(dot(v, v))
+    force = scale(-number(h, f, k, 0) * speed, v)
+    moment = cross(at(w, o + m.FRAME.origin), force)
+    act(h, w, k, moment, force, 0.0, 0.0, 0.0, 0.0, -dot(force, v))
+
+
+class QuadraticDrag:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str) -> Row:
+        """One number: c [kg/m]."""
+        return Row(frames=(load.frame,), numbers=(load.coefficient,))

@@ -1,0 +1,66 @@
+"""What each integrator is, said once: for scenes, stages, studies and refusals, which must not import its code.
+
+To add one: a module of `pipeline.dynamics.integrate` with a `METHOD` (`pipeline.dynamics.integrate.method`), and a line
+in `INTEGRATORS`. A method with parameters of its own also has a model in `pipeline.core.scene.solver`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+#: of a scene that names none
+DEFAULT = "dop853"
+#: the implicit method for what is stiff
+STIFF = "radau"
+#: what studies of costs compare: decades of tolerances, as far as rounding or patience go, and steps [s]
+TO_1E_9, TO_1E_13 = (tuple(10.0**-k for k in range(3, last + 1)) for last in (9, 13))
+STEPS = (1e-4, 3e-5, 1e-5, 3e-6)
+
+
+@dataclass(frozen=True)
+class Traits:
+    """What is known of a method without its code; none of it may enter compiled code, which is not keyed by it.
+
+    module: of `pipeline.dynamics.integrate`, which holds its METHOD.
+    order: the error of a run falls with this power of the step.
+    implicit: its steps solve equations, by Newton's method.
+    multistep: its steps use slopes of earlier ones, so that it is begun by a one-step method.
+    estimates: it estimates its error, by which steps can be chosen; otherwise a scene must give their length.
+    dissipative: it damps by its order, so that energy is lost long before a run is wrong.
+    retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
+    passes_singular: a step can be laid over a singular pose of the closures; Newton's matrix may turn over in it.
+    hands_over_to: implicit method that goes on where stability limits the steps that it chooses, and that is named as
+        the remedy where steps are given; empty for methods that are stable themselves.
+    tolerances, steps: at which `flexclear cost` runs it; steps in s.
+    """
+
+    module: str
+    order: int
+    implicit: bool = False
+    multistep: bool = False
+    estimates: bool = True
+    dissipative: bool = False
+    retracts: bool = False
+    passes_singular: bool = True
+    hands_over_to: str = ""
+    tolerances: tuple[float, ...] = ()
+    steps: tuple[float, ...] = ()
+
+
+#: by the name that a scene gives it
+INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
+    {
+        "dop853": Traits("dop853", 8, hands_over_to=STIFF, tolerances=TO_1E_13),
+        "dopri5": Traits("dopri5", 5, hands_over_to=STIFF, tolerances=TO_1E_13),
+        "rk4": Traits("rk4", 4, estimates=False, hands_over_to=STIFF, steps=STEPS),
+        "adams-bashforth-moulton": Traits(
+            "adams", 4, multistep=True, estimates=False, hands_over_to=STIFF, steps=STEPS
+        ),
+        "generalized-alpha": Traits(
+            "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, passes_singular=False, steps=STEPS
+        ),
+        "radau": Traits("radau", 5, implicit=True, passes_singular=False, tolerances=TO_1E_9),
+    }
+)

@@ -1,0 +1,12 @@
+"""How work tells how far it has come."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+#: told the done share of the work (None: unknown) and what is being done
+Progress = Callable[[float | None, str], None]
+
+
+def silent(fraction: float | None, text: str) -> None:
+    """A progress callback that says nothing."""

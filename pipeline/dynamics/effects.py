@@ -1,0 +1,124 @@
+"""What each effect of a scene brings: the parts that its machine code is composed of, and the modules that hold them.
+
+Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
+(`core.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family folders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core import integrators
+from pipeline.core.registry import module_of
+
+if TYPE_CHECKING:
+    from pipeline.core.scene.schema import Scene
+
+JOINTS, CONTACTS = "pipeline.dynamics.joints", "pipeline.dynamics.contact"
+NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
+LOADS, LAWS, RECORDS = "pipeline.dynamics.loads", "pipeline.dynamics.drives", "pipeline.dynamics.record"
+INTEGRATORS = "pipeline.dynamics.integrate"
+#: laws of time that are polynomials throughout, or made of others
+WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated"}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
+
+    surfaces, forms, frictions: of contacts.  harmonics: whether a law of time has some.
+    """
+
+    joints: tuple[str, ...]
+    surfaces: tuple[str, ...] = ()
+    forms: tuple[str, ...] = ()
+    frictions: tuple[str, ...] = ()
+    loads: tuple[str, ...] = ()
+    closures: bool = False
+    flexible: bool = False
+    stiffening: bool = False
+    harmonics: bool = False
+
+
+@dataclass(frozen=True)
+class Scheme:
+    """Which stepper is compiled: method, fixed or chosen steps, events located or noticed at step ends."""
+
+    integrator: str
+    fixed: bool = False
+    located: bool = True
+
+
+def scheme_of(solver: Any) -> Scheme:
+    """The scheme that a scene's solver table asks for."""
+    return Scheme(solver.integrator, solver.step is not None, solver.events == "located")
+
+
+@dataclass(frozen=True)
+class Named:
+    """A part that a scene names: its family's package and table there, its name, and where the scene says so."""
+
+    package: str
+    name: str
+    where: str
+    table: str = "NAMES"
+
+    @property
+    def module(self) -> str:
+        """The module that holds the part; InputError when the family has no such name."""
+        return module_of(self.package, self.name, where=self.where, table=self.table)
+
+
+def most_parts(scene: Scene) -> Parts:
+    """All parts that the machine code of a scene may have, as far as the scene alone tells: its code has no more."""
+    contacts, joints = scene.contacts(), import_module(JOINTS)
+    ideal = {joint.type for name, joint in scene.joint.items() if name not in contacts}
+    ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}
+    paths = any(not hasattr(drive, "joint") for drive in scene.drive.values())
+    chained = set(joints.CHAIN) if paths or ideal - set(joints.WHOLE) else set()
+    return Parts(
+        joints=tuple(sorted({"free", *ideal, *chained})),
+        surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
+        forms=tuple(sorted(import_module(FORMS).NAMES)) if contacts else (),
+        frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
+        loads=tuple(sorted({load.type for load in scene.forces().values()})),
+        closures=True,
+        flexible=bool(scene.flexible()),
+        stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
+        harmonics=bool(_laws(scene) - WITHOUT_SINES),
+    )
+
+
+def _laws(scene: Scene) -> set[str]:
+    from pipeline.core.scene.laws import law_types
+
+    return {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
+
+
+def named(scene: Scene) -> Iterator[Named]:
+    """Every part of a family that a scene names."""
+    contacts = scene.contacts()
+    yield Named(INTEGRATORS, scene.solver.integrator, "[solver]")
+    for name, joint in scene.joint.items():
+        yield Named(JOINTS, joint.type, f"[joint.{name}]", "CONTACTS" if name in contacts else "NAMES")
+    for name, contact in contacts.items():
+        yield Named(CONTACTS, contact.type, f"[joint.{name}.normal]")
+        yield Named(NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]")
+        if contact.friction is not None:
+            yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")
+    for law in sorted(_laws(scene)):
+        yield Named(LAWS, law, "law")
+    for name, load in scene.load.items():
+        yield Named(LOADS, load.type, f"[load.{name}]")
+    for name in scene.output.requests():
+        yield Named(RECORDS, name, "[output]")
+
+
+def schemes(scene: Scene) -> list[Scheme]:
+    """The scheme that a scene asks for, and that of the method that takes over where it would crawl."""
+    scheme = scheme_of(scene.solver)
+    heir = integrators.INTEGRATORS[scheme.integrator].hands_over_to
+    return [scheme, *([Scheme(heir)] if heir and not scheme.fixed else [])]

@@ -1,0 +1,51 @@
+"""Sizes of states and errors in units of the tolerance.
+
+Variables stand in groups, such as the components of one velocity. A group's scale is the tolerance times its floor plus
+the length of its vector; the length, not the largest component, which would depend on the axes of a scene.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+
+
+@kernel
+def set_error_scales(h, f, w, y):
+    """Scale of each group from the states at both ends of the step: in Y and from place y of w."""
+    scales, o = h[m.MAGNITUDE], h[m.Y]
+    for g in range(h[m.N_GROUPS]):
+        w[scales + g] = 0.0
+    for c in range(h[m.NY]):
+        g = scales + m.GROUPS.group(h, c)
+        w[g] += 0.5 * (w[y + c] ** 2 + w[o + c] ** 2)
+    for g in range(h[m.N_GROUPS]):
+        w[scales + g] = w[h[m.CONTROL] + m.RTOL] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[scales + g]))
+
+
+@kernel
+def error_scale(h, w, c):
+    """Error of variable c that the tolerance allows."""
+    return w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]
+
+
+@kernel
+def scaled_norm(h, w, a):
+    """Root mean square, in units of the scales, of what w holds for each variable from place a on."""
+    total = 0.0
+    for c in range(h[m.NY]):
+        total += (w[a + c] / error_scale(h, w, c)) ** 2
+    return np.sqrt(total / h[m.NY])
+
+
+@kernel
+def finite(h, w, a):
+    """Whether w holds numbers only, for each variable, from place a on."""
+    result = True
+    for c in range(h[m.NY]):
+        result &= abs(w[a + c]) <= 1e300
+    return result

@@ -1,0 +1,1 @@
+"""What theory says without elements, to stand beside what they say."""

@@ -1,0 +1,184 @@
+"""The examples of docs/extending.md: a module, and one other place, are all that a new part takes.
+
+Each is installed in a copy of the sources, a scene that names it runs there from the command line, and what it gives is
+compared with a closed form. Uncompiled, because the scenes take some hundred evaluations, and compiling takes longer.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from math import exp, sinh
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.optimize import brentq
+
+#: example -> folder that its module is put in
+PLACES = {
+    "kutta3": "pipeline/dynamics/integrate",
+    "pin_in_slot": "pipeline/dynamics/joints",
+    "safaeifar_farshidianfar": "pipeline/dynamics/contact/normal",
+    "smooth_coulomb": "pipeline/dynamics/contact/friction",
+    "quadratic_drag": "pipeline/dynamics/loads",
+    "cycloidal": "pipeline/dynamics/drives",
+    "momentum": "pipeline/dynamics/record",
+    "mass": "stages",
+}
+
+
+def examples(root: Path) -> Path:
+    return root / "docs" / "examples" / "extending"
+
+
+def edited(text: str, hunk: str) -> str:
+    """A text after one hunk of a diff, whose old lines it has once."""
+    lines = [line for line in hunk.splitlines() if line]
+    old = "\n".join(line[1:] for line in lines if line[0] in " -")
+    new = "\n".join(line[1:] for line in lines if line[0] in " +")
+    assert text.count(old) == 1, old
+    return text.replace(old, new)
+
+
+def installed(root: Path, tree: Path, name: str) -> Path:
+    """A copy of the sources with the example in it."""
+    for package in ("pipeline", "stages"):
+        shutil.copytree(root / package, tree / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(examples(root) / f"{name}.py", tree / PLACES[name])
+    head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")
+    place = tree / head.removeprefix("--- ").strip()
+    for hunk in hunks:
+        place.write_text(edited(place.read_text(), hunk))
+    return tree
+
+
+def flexclear(tree: Path, *arguments: str) -> str:
+    own = {"PYTHONPATH": str(tree), "FLEXCLEAR_RESULTS": str(tree / "results"), "NUMBA_DISABLE_JIT": "1"}
+    own["FLEXCLEAR_KERNELS"] = str(tree / "kernels")
+    command = [sys.executable, "-m", "stages", *arguments]
+    done = subprocess.run(command, cwd=tree, env=os.environ | own, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def ran(root: Path, tree: Path, name: str) -> xr.Dataset:
+    """The run of the example's scene in a tree that has the example."""
+    scene, out = examples(root) / f"{name}.toml", tree / "run.nc"
+    flexclear(installed(root, tree, name), "run", str(scene), "--to", "simulate", "--out", str(out))
+    with xr.open_dataset(out) as found:
+        return found.load()
+
+
+def test_an_integrator(root: Path, tmp_path: Path) -> None:
+    """In n steps the state of a linear system is multiplied by the n-th power of the method's stability polynomial."""
+    run = ran(root, tmp_path, "kutta3")
+    step, A = 0.005, np.array([[0.0, 1.0], [-100.0, -2.0]])
+    R = np.eye(2) + step * A + (step * A) @ (step * A) / 2.0 + np.linalg.matrix_power(step * A, 3) / 6.0
+    known = np.array([np.linalg.matrix_power(R, n) @ [0.1, 0.0] for n in range(run.sizes["time"])])
+    assert run.sizes["time"] == 101
+    # rounding of a hundred steps and of the times at which they end; the method's own error is 2e-5 m
+    np.testing.assert_allclose(run["position"].values[:, 0, 2], known[:, 0], rtol=0.0, atol=1e-12)
+
+
+def test_a_joint_with_two_freedoms(root: Path, tmp_path: Path) -> None:
+    """Nothing pushes the mass centre sideways, and the energy gives the speed at each angle below the horizontal."""
+    run = ran(root, tmp_path, "pin_in_slot")
+    mass, arm, inertia, g = 2.0, 0.5, 0.03, 9.81
+    place = run["frame_position"].sel(frame="bob.pin").values
+    centre, omega = run["position"].values[:, 0], run["angular_velocity"].values[:, 0, 2]
+    drop = -centre[:, 1] / arm
+    assert drop.max() > 0.9
+    known = 2.0 * mass * g * arm * drop / (inertia + mass * arm**2 * (1.0 - drop**2))
+    # the run's tolerance is 1e-10; the pose of the start is exact
+    np.testing.assert_allclose(centre[:, 0], arm, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(omega**2, known, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(place[:, 1:], 0.0, rtol=0.0, atol=1e-12)
+
+
+def test_a_normal_law(root: Path, tmp_path: Path) -> None:
+    """The rebound of a free impact under F = K d^n (1 + a d'/v): a (1 + e) + ln((1 - a e)/(1 + a)) = 0."""
+    run = ran(root, tmp_path, "safaeifar_farshidianfar")
+    a = 1.25 * 0.3 / 0.7
+    rebound = brentq(lambda e: a * (1.0 + e) + np.log((1.0 - a * e) / (1.0 + a)), 0.1, 0.99, xtol=1e-15)
+    # the integrator's tolerance is 1e-10
+    assert run["velocity"].values[-1, 0, 2] == pytest.approx(rebound, rel=1e-7)
+
+
+def test_a_friction_law(root: Path, tmp_path: Path) -> None:
+    """I w' = -mu R N tanh(w R/v_s) gives sinh(w R/v_s) = sinh(w0 R/v_s) exp(-mu N R^2 t/(I v_s))."""
+    run = ran(root, tmp_path, "smooth_coulomb")
+    mu, v_s, force, radius, inertia = 0.4, 0.2, 10.0, 0.1, 0.02
+    spin = run["angular_velocity"].sel(body="ball").values[:, 1]
+    decay = mu * force * radius**2 / (inertia * v_s)
+    known = [sinh(3.0 * radius / v_s) * exp(-decay * t) for t in run["time"].values]
+    # the contact is 1e-4 of the radius deep, which is that much of the arm of friction
+    np.testing.assert_allclose(np.sinh(spin * radius / v_s), known, rtol=2e-3)
+    assert known[-1] < 0.7 * known[0]
+
+
+def test_a_load(root: Path, tmp_path: Path) -> None:
+    """Of m v' = -c v^2: v = v0/(1 + c v0 t/m) along the first direction."""
+    run = ran(root, tmp_path, "quadratic_drag")
+    speed = 5.0 / (1.0 + 0.4 * 5.0 * run["time"].values / 2.0)
+    # the integrator's tolerance is 1e-10
+    np.testing.assert_allclose(run["velocity"].values[:, 0], speed[:, None] * [0.6, 0.0, 0.8], rtol=0.0, atol=1e-8)
+    lost = 0.5 * 2.0 * (5.0**2 - speed[-1] ** 2)
+    assert run["dissipated"].values[-1] == pytest.approx(lost, rel=1e-8)
+
+
+def test_a_law_of_time(root: Path, tmp_path: Path) -> None:
+    """A cam's slide accelerates by 2 pi h/T^2 sin(2 pi tau), and the drive pushes with m times that."""
+    run = ran(root, tmp_path, "cycloidal")
+    tau = np.clip((run["time"].values - 0.1) / 0.3, 0.0, 1.0)
+    height = 0.03 * (tau - np.sin(2.0 * np.pi * tau) / (2.0 * np.pi))
+    push = 2.0 * 2.0 * np.pi * 0.03 / 0.3**2 * np.sin(2.0 * np.pi * tau)
+    # prescribed motion is evaluated, not integrated: rounding
+    np.testing.assert_allclose(run["position"].values[:, 0, 2], height, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(run["drive_force"].values[:, 0], push, rtol=0.0, atol=1e-11)
+
+
+def test_a_record_on_request(root: Path, tmp_path: Path) -> None:
+    """Of free fall: m (3, 0, -g t); recorded with its unit."""
+    run = ran(root, tmp_path, "momentum")
+    t = run["time"].values
+    known = 2.0 * np.stack([np.full_like(t, 3.0), np.zeros_like(t), -9.81 * t], axis=1)
+    # the integrator's tolerance is 1e-10
+    np.testing.assert_allclose(run["momentum"].sel(momentum_body="ball").values, known, rtol=0.0, atol=1e-8)
+    assert run["momentum"].attrs["units"] == "kg m s-1"
+
+
+def test_a_command(root: Path, tmp_path: Path) -> None:
+    tree = installed(root, tmp_path, "mass")
+    scene = examples(root) / "smooth_coulomb.toml"
+    shutil.copy(scene, tree / "two.toml")
+    (tree / "two.toml").write_text(scene.read_text().replace("smooth-coulomb", "ambrosio").replace("v_smooth", "v1"))
+    (tree / "two.toml").write_text((tree / "two.toml").read_text().replace("dynamic = 0.4", "dynamic = 0.4, v0 = 0.0"))
+    assert flexclear(tree, "mass", "two.toml").endswith(": 1 kg\n")
+    assert "mass of the rigid bodies" in flexclear(tree, "--help")
+
+
+# The page -----------------------------------------------------------------------------------------------------------
+
+
+def blocks(page: str) -> list[str]:
+    return re.findall(r"^```\w+\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_the_page_shows_what_is_tested(root: Path, name: str) -> None:
+    page = (root / "docs" / "extending.md").read_text()
+    shown = blocks(page)
+    files = sorted(examples(root).glob(f"{name}.*"))
+    assert {path.suffix for path in files} >= {".py", ".diff"}
+    for path in files:
+        assert path.read_text() in shown, f"{path.name} is not on the page, or differs from it"
+    assert f"`{PLACES[name]}/{name}.py`" in page
+
+
+def test_every_example_is_tested(root: Path) -> None:
+    assert {path.stem for path in examples(root).iterdir()} == set(PLACES)

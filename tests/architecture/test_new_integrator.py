@@ -1,0 +1,202 @@
+"""A new integrator is one module and one line: a copy of the project with Heun's method added, used in every place."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
+
+import numpy as np
+
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate import hermite
+from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from pipeline.dynamics.integrate.norms import error_scale
+from pipeline.dynamics.integrate.runge_kutta import make_stages
+from pipeline.dynamics.kernels import kernel
+
+A = np.array([[0.0, 0.0], [1.0, 0.0]])
+B, C = np.array([0.5, 0.5]), np.array([0.0, 1.0])
+
+
+@kernel
+def error(h, f, w, n, step):
+    total = 0.0
+    for c in range(h[m.NY]):
+        total += (0.5 * step * (w[slope(h, 1) + c] - w[slope(h, 0) + c]) / error_scale(h, w, c)) ** 2
+    return np.sqrt(total / h[m.NY])
+
+
+def make_kernels(evaluate, retract):
+    _, attempt = make_stages(evaluate, A, B, C)
+    return begin_afresh, attempt, error, hermite.make_extend(2), keep_nothing
+
+
+METHOD = Method(
+    traits=INTEGRATORS["heun"],
+    slopes=4,
+    last=2,
+    dense=hermite.ROWS,
+    make_kernels=make_kernels,
+    interpolate=hermite.interpolate,
+    error_order=1,
+)
+'''
+LINE = '"heun": Traits("heun_euler", 2, hands_over_to=STIFF, tolerances=TO_1E_9, steps=STEPS),'
+ABOVE = '"dopri5": Traits('
+LIST, FOLDER = Path("pipeline/core/integrators.py"), Path("pipeline/dynamics/integrate")
+#: a quarter of the pendulum's period, IFToMM benchmark A01 [s]
+QUARTER = 2.367841947576237 / 4.0
+
+Command = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture(scope="module")
+def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The project with the module and the line, and two scenes of a pendulum."""
+    folder = tmp_path_factory.mktemp("project")
+    for name in ("pipeline", "stages"):
+        shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / FOLDER / "heun_euler.py").write_text(MODULE)
+    before, above, after = (folder / LIST).read_text().partition(ABOVE)
+    assert above
+    (folder / LIST).write_text(f"{before}{LINE}\n        {above}{after}")
+    scene = (root / "scenes/checks/pendulum.toml").read_text().replace('"10 s"', str(QUARTER))
+    for name, solver in {"new": 'integrator = "heun"\nrtol = 1e-7', "own": "", "none": 'integrator = "hunn"'}.items():
+        (folder / f"{name}.toml").write_text(f"{scene}\n[solver]\n{solver}\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def python(copy: Path) -> Command:
+    """Runs the copy's modules or code, interpreted: what is compiled is the same."""
+    apart = {"FLEXCLEAR_RESULTS": str(copy / "results"), "FLEXCLEAR_KERNELS": str(copy / "kernels")}
+    environment = {**os.environ, **apart, "PYTHONPATH": str(copy), "NUMBA_DISABLE_JIT": "1"}
+
+    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [sys.executable, *arguments], cwd=copy, env=environment, capture_output=True, text=True, check=False
+        )
+
+    return run
+
+
+def asked(python: Command, code: str) -> object:
+    """What code that prints JSON finds in the copy."""
+    done = python("-c", f"import json\n{code}")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def test_the_schema_of_scenes_knows_it(python: Command) -> None:
+    done = python("-m", "stages", "schema")
+    assert done.returncode == 0, done.stderr
+    assert "heun" in json.loads(done.stdout)["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"]
+
+
+def test_a_misspelt_name_is_told_its_name(python: Command) -> None:
+    done = python("-m", "stages", "run", "none.toml", "--to", "simulate")
+    assert done.returncode == 2
+    assert "did you mean 'heun'" in done.stderr
+
+
+def test_a_scene_runs_with_chosen_and_with_fixed_steps(python: Command) -> None:
+    """After a quarter of its period the pendulum hangs straight down."""
+    found = asked(
+        python,
+        """
+from pipeline import dynamics
+from pipeline.core.scene.load import load_scene
+ends = {}
+for name, solver in {"chosen": {"rtol": 1e-6}, "fixed": {"step": 0.004}}.items():
+    scene = load_scene("new.toml", {"solver": {"integrator": "heun", **solver}})
+    run = dynamics.simulate(scene, {}, lambda share, text: None)
+    ends[name] = [run.attrs["method"], *run.position.sel(body="bob").values[-1].tolist()]
+print(json.dumps(ends))
+""",
+    )
+    assert isinstance(found, dict)
+    for method, x, y, _ in found.values():
+        assert method == "heun"
+        # fixed steps of order 2 leave some (0.004 s * 4.4 rad/s)^2 / 10 of a radian, chosen ones less; the height is
+        # off by half of the square of that
+        assert abs(x) < 3e-4
+        assert abs(y + 1.0) < 1e-7
+
+
+def test_refusals_name_it_and_its_remedy(copy: Path, python: Command) -> None:
+    (copy / "short.toml").write_text((copy / "new.toml").read_text() + "evaluations = 40\n")
+    done = python("-m", "stages", "run", "short.toml", "--to", "simulate")
+    assert done.returncode == 3
+    assert "at last by heun" in done.stderr
+    assert "radau where contacts or friction are stiff" in done.stderr
+
+
+def test_a_cost_study_compares_it(python: Command) -> None:
+    found = asked(
+        python,
+        """
+from pipeline.core.scene.load import load_scene
+from stages import cost_design
+designs = cost_design.runs(load_scene("own.toml"), None, ("heun",))
+print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.scene.solver.step] for d in designs]))
+""",
+    )
+    assert isinstance(found, list)
+    mine = [(group, rtol, step) for group, name, rtol, step in found if name == "heun"]
+    assert [rtol for group, rtol, _ in mine if group == "tolerance"] == [10.0**-k for k in range(3, 10)]
+    assert [step for group, _, step in mine if group == "step"] == [1e-4, 3e-5, 1e-5, 3e-6]
+
+
+def test_figures_tell_it_from_all_others(python: Command) -> None:
+    code = "from pipeline.post.cost.work_precision import LOOKS\nprint(json.dumps(LOOKS))"
+    looks = asked(python, code)
+    assert isinstance(looks, dict)
+    assert len({tuple(look) for look in looks.values()}) == len(looks)
+    assert "heun" in looks
+
+
+KEYS = """
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow.fingerprint import Sources
+from pathlib import Path
+from stages import s4_simulate
+sources = Sources(Path.cwd())
+found = {}
+for name in ("new", "own"):
+    modules = s4_simulate.modules(load_scene(f"{name}.toml"))
+    found[name] = sorted(sources.closure(["stages.s4_simulate", *modules]))
+print(json.dumps(found))
+"""
+
+
+def test_keys_hold_its_module_and_what_goes_on_for_it(python: Command) -> None:
+    found = asked(python, KEYS)
+    assert isinstance(found, dict)
+    new, own = (set(found[name]) for name in ("new", "own"))
+    package = "pipeline.dynamics.integrate"
+    assert {f"{package}.heun_euler", f"{package}.radau"} <= new
+    assert f"{package}.heun_euler" not in own
+
+
+def test_it_makes_no_other_integrator_compile_anew(root: Path, python: Command) -> None:
+    code = """
+from pipeline.dynamics.compile.functions import digest
+from pipeline.dynamics.compile.sources import sources
+from pipeline.dynamics.effects import Parts, Scheme
+parts = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
+print(json.dumps({name: digest(text) for name, text in sources(parts, Scheme("dop853")).items()}))
+"""
+    here = subprocess.run(
+        [sys.executable, "-c", f"import json\n{code}"], cwd=root, capture_output=True, text=True, check=True
+    )
+    assert asked(python, code) == json.loads(here.stdout)

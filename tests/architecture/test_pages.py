@@ -1,0 +1,139 @@
+"""The pages are true of the sources: the drawing of the dynamics tower, and every file and module that they name."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from pathlib import Path
+
+import grimp
+import pytest
+
+DYNAMICS = "pipeline.dynamics"
+Arrows = set[tuple[str, str]]
+
+
+def section(root: Path) -> str:
+    page = (root / "docs" / "architecture.md").read_text()
+    return page[page.index("## The engine") :]
+
+
+def drawn(root: Path) -> Arrows:
+    """(who imports, who is imported), as docs/architecture.md draws it."""
+    chart = re.search(r"^```mermaid\n(.*?)^```$", section(root), re.DOTALL | re.MULTILINE)
+    assert chart is not None
+    return set(re.findall(r"^ +(\w+) --> (\w+)$", chart[1], re.MULTILINE))
+
+
+def imports() -> Arrows:
+    """The same, between folders and single modules of the tower, as it is."""
+    graph = grimp.build_graph("pipeline", cache_dir=None)
+    found = set()
+    for module in graph.modules:
+        for other in graph.find_modules_directly_imported_by(module):
+            if module.startswith(f"{DYNAMICS}.") and other.startswith(f"{DYNAMICS}."):
+                found.add((module.split(".")[2], other.split(".")[2]))
+    return {(a, b) for a, b in found if a != b}
+
+
+def below(arrows: Arrows, start: str) -> set[str]:
+    """Everything that arrows lead to."""
+    leads = defaultdict(set)
+    for a, b in arrows:
+        leads[a].add(b)
+    found, waiting = set(), [start]
+    while waiting:
+        for b in leads[waiting.pop()] - found:
+            found.add(b)
+            waiting.append(b)
+    return found
+
+
+def parts(root: Path) -> set[str]:
+    tower = root / "pipeline" / "dynamics"
+    folders = {path.parent.name + "/" for path in tower.glob("*/__init__.py")}
+    return folders | {path.name for path in tower.glob("*.py") if path.name != "__init__.py"}
+
+
+def test_the_drawing_shows_every_part_of_the_tower(root: Path) -> None:
+    rows = re.findall(r"^\| `([\w/.]+)` \|", section(root), re.MULTILINE)
+    assert sorted(rows) == sorted(parts(root))
+    assert {end for arrow in drawn(root) for end in arrow} == {re.sub(r"(/|\.py)$", "", name) for name in rows}
+
+
+def test_every_arrow_of_the_drawing_is_an_import(root: Path) -> None:
+    assert drawn(root) - imports() == set()
+
+
+def test_every_import_follows_the_arrows_of_the_drawing(root: Path) -> None:
+    arrows = drawn(root)
+    assert {(a, b) for a, b in imports() if b not in below(arrows, a)} == set()
+    assert [a for a in {a for a, _ in arrows} if a in below(arrows, a)] == []
+
+
+def test_the_table_stands_in_the_order_of_the_arrows(root: Path) -> None:
+    rows = [re.sub(r"(/|\.py)$", "", name) for name in re.findall(r"^\| `([\w/.]+)` \|", section(root), re.MULTILINE)]
+    assert [(a, b) for a, b in drawn(root) if rows.index(a) > rows.index(b)] == []
+
+
+# Names --------------------------------------------------------------------------------------------------------------
+
+#: what stands in backticks and looks like a file or module of the project, but for names in angles and asterisks
+FILE = re.compile(r"[\w.*<>-]+(/[\w.*<>-]+)+/?|[\w*<>]+\.(py|md|toml|json|jsonl)")
+MODULE = re.compile(r"(pipeline|stages|tests|benchmarks)(\.\w+)+")
+#: folders that names below are told from: `model/tree` is `pipeline/dynamics/model/tree.py`
+FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structure", "pipeline/post", "docs")
+#: first parts of names that are no sources: written by runs, quantities, units, scenes by name, symbols
+ELSEWHERE = {"results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}
+#: files that runs or users make
+MADE = {"run.nc", "cost.json", "timing.nc"}
+
+
+def named(page: str) -> list[str]:
+    text = re.sub(r"^```.*?^```$", "", page, flags=re.DOTALL | re.MULTILINE)
+    return re.findall(r"`([^`\n]+)`", text)
+
+
+def exists(root: Path, name: str) -> bool:
+    """Whether a file, a folder or a module has this name; angles and asterisks stand for any text."""
+    pattern = re.sub(r"<[^>]*>", "*", name).rstrip("/")
+    if (root / "docs/examples/extending" / Path(name).name).is_file():
+        return True  # a module that the reader is to write
+    return any(
+        next(root.joinpath(folder).glob(pattern + ending), None) is not None
+        for folder in FROM
+        for ending in ("", ".py")
+    )
+
+
+def object_exists(root: Path, name: str) -> bool:
+    """Whether a dotted name is a module, or something that a module holds."""
+    if exists(root, name.replace(".", "/")):
+        return True
+    module, _, attribute = name.rpartition(".")
+    files = [root / f"{module.replace('.', '/')}.py", root / module.replace(".", "/") / "__init__.py"]
+    return any(re.search(rf"\b{attribute}\b", path.read_text()) for path in files if path.is_file())
+
+
+def pages(root: Path) -> list[Path]:
+    return [*sorted((root / "docs").glob("*.md")), root / "README.md", root / "CONTRIBUTING.md"]
+
+
+def missing(root: Path, page: str) -> list[str]:
+    found = []
+    for name in named(page):
+        if MODULE.fullmatch(name):
+            found += [] if object_exists(root, name) else [name]
+        elif FILE.fullmatch(name) and name.split("/")[0] not in ELSEWHERE and name not in MADE:
+            found += [] if exists(root, name) else [name]
+    return found
+
+
+def test_every_file_and_module_that_a_page_names_exists(root: Path) -> None:
+    gone = {path.name: names for path in pages(root) if (names := missing(root, path.read_text()))}
+    assert gone == {}
+
+
+@pytest.mark.parametrize("name", ["assembly/tree", "pipeline.dynamics.assembly", "model/trees.py", "tables.py"])
+def test_a_name_that_is_gone_is_noticed(root: Path, name: str) -> None:
+    assert missing(root, f"See `{name}`.") == [name]

@@ -1,0 +1,103 @@
+"""Every part of every family is in the key of the runs that name it, with all that it imports and compiles."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.core.scene.schema import Scene
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.dynamics import effects
+from pipeline.dynamics.compile import functions
+from pipeline.dynamics.compile.sources import modules, sources
+from pipeline.dynamics.effects import Parts, Scheme
+
+BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
+
+
+def families() -> list[tuple[str, str, str]]:
+    """(package, table, name) of every part that a run can name."""
+    tables = {
+        effects.JOINTS: ("NAMES", "CONTACTS"),
+        **dict.fromkeys((effects.NORMAL_LAWS, effects.FRICTION_LAWS, effects.FORMS), ("NAMES",)),
+        **dict.fromkeys((effects.CONTACTS, effects.LOADS, effects.LAWS, effects.INTEGRATORS), ("NAMES",)),
+    }
+    found = [(package, table) for package, names in tables.items() for table in names]
+    return [(package, table, name) for package, table in found for name in getattr(import_module(package), table)]
+
+
+def module_of(package: str, table: str, name: str) -> str:
+    return f"{package}.{getattr(import_module(package), table)[name].partition(':')[0]}"
+
+
+@pytest.mark.parametrize("package, table, name", families())
+def test_a_part_that_is_named_gives_its_module(package: str, table: str, name: str) -> None:
+    assert effects.Named(package, name, "here", table).module == module_of(package, table, name)
+
+
+#: where a part of a family stands among the parts of the code
+CODE = {
+    (effects.JOINTS, "NAMES"): lambda name: Parts((name,), closures=True),
+    (effects.JOINTS, "CONTACTS"): lambda name: Parts(("free",), surfaces=(name,), forms=("elastic",)),
+    (effects.FORMS, "NAMES"): lambda name: Parts(("free",), surfaces=("clearance-spherical",), forms=(name,)),
+    (effects.FRICTION_LAWS, "NAMES"): lambda name: Parts(
+        ("free",), surfaces=("clearance-spherical",), forms=("elastic",), frictions=(name,)
+    ),
+    (effects.LOADS, "NAMES"): lambda name: Parts(("free",), loads=(name,)),
+}
+
+
+#: gravity is a field, not a kernel
+COMPILED = [f for f in families() if f[:2] in CODE and f != (effects.LOADS, "NAMES", "gravity")]
+
+
+@pytest.mark.parametrize("package, table, name", COMPILED)
+def test_what_a_part_compiles_reaches_its_module(package: str, table: str, name: str) -> None:
+    """The digest of a compiled function changes with the sources of its parts."""
+    parts = CODE[package, table](name)
+    reached = {found for text in sources(parts, Scheme("dop853")).values() for found in functions.reached(text)}
+    assert module_of(package, table, name) in reached
+
+
+def scene_with(joint: dict[str, Any], **tables: Any) -> Scene:
+    table = {
+        "title": "parts",
+        "body": {"ground": {"type": "ground", "frames": {"F": {}}}, "ball": BALL},
+        "joint": {"J": {"between": ["ground.F", "ball.F"], **joint}},
+        "time": {"end": 1.0},
+        **tables,
+    }
+    return Scene.model_validate(table)
+
+
+#: types of joints that a scene of one body may have: a fixed one leaves no motion, and paths alone make the other
+JOINTS = [name for name in import_module(effects.JOINTS).NAMES if name not in ("fixed", "rotation-vector")]
+
+
+@pytest.mark.parametrize("name", JOINTS)
+@pytest.mark.parametrize("solver", [{}, {"integrator": "generalized-alpha"}, {"integrator": "rk4", "step": 1e-3}])
+def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, name: str, solver: dict) -> None:
+    """For each type of joint, driven in part where it has several freedoms: a chain of others may take its place."""
+    scene = scene_with({"type": name}, solver=solver)
+    tree = Sources(root)
+    known = tree.closure(["stages.s4_simulate", *modules(scene)]).keys()
+    declared = import_module(module_of(effects.JOINTS, "NAMES", name))
+    part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
+    possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
+    for scheme in effects.schemes(scene):
+        texts = sources(Parts(tuple(sorted(possible)), closures=True), scheme).values()
+        assert {found for text in texts for found in functions.reached(text)} <= set(known)
+
+
+def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
+    """The list of joints that stay one link is right, and the chain's parts are listed."""
+    joints = import_module(effects.JOINTS)
+    for name in joints.NAMES:
+        declared = import_module(module_of(effects.JOINTS, "NAMES", name))
+        part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
+        if len(part.COORDINATES) > 1:
+            assert name not in joints.WHOLE
+            assert {coordinate.part for coordinate in part.COORDINATES} <= set(joints.CHAIN)

@@ -1,0 +1,95 @@
+"""A command that finds everything fresh starts quickly, since it imports nothing that computes or draws."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from stages.families import TREE
+
+from pipeline.core.artifacts.store import Record, Store
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import Task, facts, in_order, key
+from stages import report
+from stages.run import Workplace
+
+#: what such a command may import: its own code, and what checks scenes
+ALLOWED = {"pipeline", "stages", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
+ALLOWED |= {"typing_inspection"}
+#: what takes a tenth of a second or more, and what it brings
+SLOW = {"numpy", "xarray", "pandas", "scipy", "numba", "matplotlib", "pyvista", "skfem", "meshio", "netCDF4"}
+#: the command, and what it has imported at its end
+COMMAND = """import sys
+from stages.__main__ import main
+code = main(sys.argv[1:]) if sys.argv[1:] else 0
+print(*sys.modules, sep="\\n", file=sys.stderr)
+sys.exit(code)"""
+
+
+def imported(*arguments: str, results: Path) -> set[str]:
+    """Top-level names of what a command imports, the standard library left out."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", COMMAND, *arguments],
+        cwd=TREE,
+        env={**os.environ, "FLEXCLEAR_RESULTS": str(results)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    names = {name.partition(".")[0] for name in done.stderr.split()} - set(sys.stdlib_module_names)
+    # the interpreter's own: its configuration, whose name tells the machine, and what its site loads at every start
+    own = subprocess.run(
+        [sys.executable, "-c", "import sys; print(*sys.modules)"], capture_output=True, text=True, check=True
+    )
+    return {name for name in names - set(own.stdout.split()) if not name.startswith(("_sysconfigdata", "__"))}
+
+
+def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[int, Record]:
+    """Records of tasks and all their inputs, by identity: in the store is what their keys ask for, and not a result."""
+    found: dict[int, Record] = {}
+    for task in in_order(list(tasks)):
+        known = facts(task, {name: found[id(above)].digest for name, above in task.inputs.items()}, place.sources)
+        name = key(known)
+        record = place.store.find(task.stage, name)
+        found[id(task)] = record or place.store.put(task.stage, name, {"nc": name.encode()}, known)
+    return found
+
+
+@pytest.fixture(scope="module")
+def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A results folder in which everything that the report shows is up to date."""
+    root = tmp_path_factory.mktemp("fresh")
+    place = Workplace(Store(root), Sources(TREE, root / "cache" / "imports.json"))
+    scenes = report.Scenes()
+    tasks = [*report.figure_tasks(place, scenes), *scenes.graph(report.HEADLINE).of("render").values()]
+    records = stand_in(tasks, place)
+    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in records]
+    stand_in([report.page_task(place, records, graphs)], place)
+    return root
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("report",),
+        ("run", "sps4/csj", "sps4/far_csj_cb"),
+        ("why", "sps4/csj", "sps4/far_csj_cb"),
+        ("cite", "sps4/csj"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_what_is_fresh_needs_no_library_that_computes_or_draws(fresh: Path, command: tuple[str, ...]) -> None:
+    before = {path: path.stat().st_mtime_ns for path in (fresh / "cache").rglob("*.json")}
+    found = imported(*command, results=fresh)
+    assert {path: path.stat().st_mtime_ns for path in (fresh / "cache").rglob("*.json")} == before  # nothing was run
+    assert found & SLOW == set()
+    assert found <= ALLOWED
+
+
+def test_what_needs_a_library_shows_it(fresh: Path) -> None:
+    """The principal moments of a full inertia matrix are eigenvalues: so the test above would see NumPy."""
+    assert "numpy" in imported("why", "checks/bennett", results=fresh)
