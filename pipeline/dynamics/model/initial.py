@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -82,11 +83,7 @@ class Velocities:
 
 def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
     """What is asked of the speeds at the start."""
-    wanted = {
-        n: b
-        for n, b in model.scene.body.items()
-        if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
-    }
+    wanted = _given(model)
     y = y.copy()
     nq, nv = model.numbering.nq, model.numbering.nv
     y[nq : nq + nv] = 0.0
@@ -118,10 +115,9 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     elastic = np.zeros(numbering.nv, dtype=bool)
     for link, first in numbering.flex_c0.items():
         elastic[first : first + numbering.modes[link]] = True
-    asked = velocity_equations(model, motion, y)
-    if not asked.bodies and not elastic.any():
+    if not _given(model) and not elastic.any():
         return y
-    y = y.copy()
+    asked, y = velocity_equations(model, motion, y), y.copy()
     speeds, miss = _least(asked.matrix * ~elastic, asked.target)
     if miss > RIGID * (1.0 + float(np.max(np.abs(asked.target), initial=0.0))):
         speeds, miss = _least(asked.matrix, asked.target)
@@ -134,6 +130,15 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
         )
     y[numbering.nq : numbering.nq + numbering.nv] = speeds
     return y
+
+
+def _given(model: Model) -> dict[str, Any]:
+    """Bodies that are given velocities."""
+    return {
+        n: b
+        for n, b in model.scene.body.items()
+        if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
+    }
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:

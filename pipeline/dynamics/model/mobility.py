@@ -185,7 +185,8 @@ def _singular_start(model: Model, J: np.ndarray, rank: int) -> str:
     return (
         f"at t = {model.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
         f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
-        "give its bodies the velocities of one of these, or start it in another pose of its path"
+        "give its bodies the velocities of one of these, choose one by [start] branch, or start it in another pose of its "
+        "path"
     )
 
 
@@ -242,7 +243,7 @@ def _refuse_contradiction(model: Model, J: np.ndarray, known: np.ndarray, rank: 
         return
     tied = _tied(J, known, rank)
     drives = [name for k, name in enumerate(model.mechanism.drives) if k in tied]
-    moving = [name for name in drives if _moves(model, name)]
+    moving = [name for name in drives if moves(model, name)]
     if not moving:
         return
     raise InputError(
@@ -259,7 +260,8 @@ def _tied(J: np.ndarray, known: np.ndarray, rank: int) -> set[int]:
     return {k for k in range(known.shape[1]) if np.max(np.abs(left[:, k]), initial=0.0) > ZERO}
 
 
-def _moves(model: Model, name: str) -> bool:
+def moves(model: Model, name: str) -> bool:
+    """Whether the law of a drive is not one value all along."""
     first, count = model.arrays.table(m.LAWS)[model.mechanism.drives.index(name)]
     pieces = slice(first, first + count)
     values = model.arrays.table(m.PIECES)["coefficients"][pieces]

@@ -12,8 +12,8 @@ from pipeline.dynamics.run.engine import Engine, observe_with, pieces_at
 CLEAR = 1e-5
 #: first distance in time, as share of the polynomial, its factor from try to try, and how many there are
 NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
-#: where it is looked, in units of the distance, and the weights there of the limit between: exact for cubics
-SIDES, WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([[-1.0, 4.0, 4.0, -1.0]]) / 6.0
+#: where it is looked, in units of the distance, and the weights there of the limit between: exact for quintics
+SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([[1.0, -6.0, 15.0, 15.0, -6.0, 1.0]]) / 20.0
 
 
 def blurred(engine: Engine, row: np.ndarray) -> bool:
@@ -26,8 +26,8 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation) -> dict[str, np
     """Observed fields of such a row, shape (1, width) each; None when there are none.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
-    of both sides, at a distance and at twice that, is but its fourth power from their value.  The states there are those
-    of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold between them.
+    of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states there
+    are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold between them.
     """
     first = 1 + 2 * len(engine.model.mechanism.contacts)
     pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))

@@ -12,6 +12,7 @@ Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +28,8 @@ NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
 LEAST = 0.05
 #: so many must be left
 FEWEST = 6
+#: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
+LED, TURNS = 2, 4
 #: states are closed to this share of the mechanism's size before their slopes are taken
 CLOSELY = 1e-14
 #: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
@@ -62,6 +65,17 @@ class Collocation:
         """Their rates."""
         slope = chebyshev.chebder(self.series) * (2.0 / self.span)
         return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, slope).T)
+
+
+@dataclass(frozen=True)
+class Lead:
+    """What leads out of a singular pose. state: by time [s], roughly.
+
+    turn: by what share of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
+    """
+
+    state: Callable[[float], np.ndarray]
+    turn: float
 
 
 @dataclass(frozen=True)
@@ -114,19 +128,44 @@ class Sampler:
         return self.engine.view(m.SLOPES, self.size).copy()
 
 
-def collocate(sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.ndarray | None) -> Collocation | None:
+def collocate(
+    sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.ndarray | None, lead: Lead | None = None
+) -> Collocation | None:
     """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
 
-    slope: at the start; None in a singular pose, where there is none.
+    slope: at the start; None in a singular pose, where there is none.  lead: what to begin with there; without it the
+    state's own speeds lead.
     """
     began = sampler.evaluations
-    states, samples = _march(sampler, t, y, span, slope)
+    states, samples = _march(sampler, t, y, span, slope, lead)
     used = _far_from_singular(samples)
     if used.sum() < FEWEST:
         return None
-    nodes, states = NODES[used], states[used]
-    size = _sizes(sampler.engine, y, [s.slope for s, far in zip(samples, used, strict=True) if far])
-    slopes = np.array([s.slope for s, far in zip(samples, used, strict=True) if far])
+    found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
+    for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
+        size = _sizes(sampler.engine, y, [s.slope for s in found])
+        iterated = _iterate(sampler, t, y, span, nodes, found, size)
+        if iterated is None:
+            return None
+        found, slopes, left = iterated
+        if lead is None or lead.turn == 0.0:
+            break
+        better = _speeds_at_start(sampler.engine, y, nodes, [s.y for s in found])
+        if not np.max(np.abs(better - y) / size) <= lead.turn:
+            return None
+        y = better
+    series = _series(nodes, slopes, y, span)
+    made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
+    if left > EXACT or _sensitivity(nodes, slopes, span, size) > SENSITIVE or _open(sampler, made, nodes) > EXACT:
+        return None
+    return made
+
+
+def _iterate(
+    sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, found: list[Sample], size: np.ndarray
+) -> tuple[list[Sample], np.ndarray, float] | None:
+    """Picard's iteration from the slopes at the nodes: what there is at its end, the slopes, and what closing changed."""
+    slopes = np.array([s.slope for s in found])
     weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
     for _ in range(ROUNDS):
@@ -138,33 +177,43 @@ def collocate(sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.
         before, states = states, y + span * weights @ slopes
         change = float(np.max(np.abs(states - before) / size))
         if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
-            break
+            return found, slopes, left
         unresolved = _sensitivity(nodes, slopes, span, size)
         if not change <= 10.0 * last or (unresolved > SENSITIVE and unresolved > HELPS * rough):
             return None
         last, rough = change, unresolved
-    else:
-        return None
-    series = _series(nodes, slopes, y, span)
-    made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
-    if left > EXACT or _sensitivity(nodes, slopes, span, size) > SENSITIVE or _open(sampler, made, nodes) > EXACT:
-        return None
-    return made
+    return None
+
+
+def _speeds_at_start(engine: Engine, y: np.ndarray, nodes: np.ndarray, closed: list[np.ndarray]) -> np.ndarray:
+    """The state with the speeds that the branch itself has at the start, from those of closed states on it."""
+    numbering, better = engine.model.numbering, y.copy()
+    speeds = slice(numbering.nq, numbering.nq + numbering.nv)
+    polynomial = np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, len(nodes) - 1), np.array(closed)[:, speeds])
+    better[speeds] = chebyshev.chebval(-1.0, polynomial)
+    return better
 
 
 def _march(
-    sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.ndarray | None
+    sampler: Sampler,
+    t: float,
+    y: np.ndarray,
+    span: float,
+    slope: np.ndarray | None,
+    lead: Lead | None,
 ) -> tuple[np.ndarray, list[Sample]]:
     """States at the nodes and what there is, each predicted by the polynomial through the slopes before it."""
-    flat = np.zeros(len(y))
+    nq, flat = sampler.engine.model.numbering.nq, np.zeros(len(y))
     if slope is None:
         sampler.attempt(t, y)
-        flat[: sampler.engine.model.numbering.nq] = sampler.slope()[: sampler.engine.model.numbering.nq]
+        flat[:nq] = sampler.slope()[:nq]
     nodes, slopes = ([0.0], [slope]) if slope is not None else ([], [])
     states, samples = [], []
     for x in NODES:
-        ahead = _integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes) if nodes else x * flat
-        states.append(y + span * ahead)
+        if slope is None and len(nodes) < LED:
+            states.append(lead.state(t + x * span) if lead is not None else y + x * span * flat)
+        else:
+            states.append(y + span * (_integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes)))
         samples.append(sampler.sample(t + x * span, states[-1]))
         if samples[-1].sound and _share(samples[-1], samples) >= LEAST:
             nodes.append(x)

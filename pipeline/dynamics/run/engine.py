@@ -16,7 +16,8 @@ from pipeline.dynamics.effects import scheme_of
 from pipeline.dynamics.equations import observation as observing
 from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import initial, selection
-from pipeline.dynamics.model.mobility import Mobility, analyse
+from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
@@ -129,6 +130,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     progress(None, mobility.text())
     if mobility.singular_start and not may_depart(model):
         raise SolverError(mobility.singular_start)
+    _check_start(model, mobility)
     scheme = scheme_of(scene.solver)
     entry = functions.entry(model.parts, scheme, lambda text: progress(None, text))
     method = lookup(INTEGRATORS, scene.solver.integrator, where="[solver.integrator]")
@@ -146,20 +148,26 @@ def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
-    links, rows = model.arrays.size(m.N_LINKS), model.arrays.size(m.N_CLOSURE_ROWS)
-
-    def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        _look(engine, state_vector)
-        frames = engine.view(m.LINK_FRAMES.place, m.FRAME.size * links).reshape(links, m.FRAME.size)
-        return frames, engine.view(m.RESIDUAL_RATE, rows).copy()
-
-    y = initial.given_velocities(model, motion, y)
+    y = initial.given_velocities(model, start_motions(engine), y)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.parts.loads:
         y = _start_loads(engine, y)
     _refuse_penetration(engine, y)
     return y, model.mechanism.start_residual
+
+
+def start_motions(engine: Engine) -> initial.Motions:
+    """What speeds at the start mean: twists of the links, and rates at which the loops open."""
+    arrays = engine.model.arrays
+
+    def motion(state_vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        _look(engine, state_vector)
+        links = arrays.size(m.N_LINKS)
+        frames = engine.view(m.LINK_FRAMES.place, m.FRAME.size * links).reshape(links, m.FRAME.size)
+        return frames, engine.view(m.RESIDUAL_RATE, arrays.size(m.N_CLOSURE_ROWS)).copy()
+
+    return motion
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -182,10 +190,23 @@ def _look(engine: Engine, y: np.ndarray) -> None:
 
 
 def may_depart(model: Model) -> bool:
-    """Whether a run may start in a singular pose: bodies are given velocities, and no contact may interfere."""
+    """Whether a run may start in a singular pose: something moves or says which way, and no contact may interfere."""
     bodies = model.scene.body.values()
     given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
-    return not model.mechanism.contacts and any(v is not None and np.any(np.asarray(v) != 0.0) for v in given)
+    moved = any(v is not None and np.any(np.asarray(v) != 0.0) for v in given) or model.scene.start is not None
+    return not model.mechanism.contacts and (moved or any(moves(model, name) for name in model.mechanism.drives))
+
+
+def _check_start(model: Model, mobility: Mobility) -> None:
+    """InputError for a choice between branches where there is none, or by a coordinate that is not there."""
+    if model.scene.start is None:
+        return
+    for choice in model.scene.start.branch:
+        coordinate_of(model.scene, choice.joint, choice.coordinate, "[start.branch]")
+    if not mobility.singular_start:
+        raise InputError(
+            "[start.branch]", "the mechanism does not start in a change point: there is nothing to choose", "remove it"
+        )
 
 
 def _start_loads(engine: Engine, y: np.ndarray) -> np.ndarray:

@@ -165,19 +165,16 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
 
 
 def _depart(engine: Engine, run: _Run) -> None:
-    """Lay the way out of a singular start, and choose the closure rows at its end."""
-    n, control, first = run.n, engine.view(m.CONTROL, m.N_CONTROLS), 1
-    way = depart(engine, run.rows[0, first:])
-    passed = run.outputs[(run.outputs > engine.start) & (run.outputs < engine.start + way.span)]
-    times = np.concatenate([[engine.start], passed, [engine.start + way.span]])
-    run.rows[: len(times), 0] = times
-    run.rows[: len(times), first:] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
-    n[m.N_RECORDED], n[m.NEXT_OUTPUT] = len(times), 1 + len(passed)
-    n[m.EVALUATIONS] += way.evaluations
-    control[m.TIME] = times[-1]
-    ratio = singular.select_rows(engine, way.y, float(times[-1]))
-    engine.view(m.Y, len(way.y))[:] = way.y
-    engine.view(m.PIVOT, m.PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
+    control, first = engine.view(m.CONTROL, m.N_CONTROLS), 1 + 2 * engine.model.arrays.size(m.N_CONTACTS)
+    engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
+    way = depart(engine, run.rows[0, first:].copy())
+    run.rows[0, first:] = way.state
+    engine.view(m.Y, len(way.state))[:] = way.state
+    engine.view(m.COLLOCATION, way.motion.series.size)[:] = way.motion.series.ravel()
+    engine.view(m.PIVOT, m.PIVOT_SIZE)[:] = 1.0, 0.0
+    control[m.COLLOCATED] = way.motion.span
+    run.collocations.append(way.motion)
     run.selections[:] = [(engine.start, engine.kept.copy())]
 
 
