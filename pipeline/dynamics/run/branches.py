@@ -24,20 +24,25 @@ WAY, ZERO = 1e-2, 1e-6
 SILENT = 1e-3
 #: most directions among which branches are looked for, starts of the search for each, its steps, and what is the same
 MOST, STARTS, STEPS, SAME = 6, 60, 40, 1e-3
+#: share of the time since the start over which a rate is taken
+A_LITTLE = 1e-4
 #: halvings of the time in which the drives go the way
 HALVINGS = 60
 
 
 @dataclass(frozen=True)
 class Direction:
-    """A way out of the pose. start: the state there.  way: change of the state after a unit of progress.
+    """A way out of the pose. begin: time of the start [s].  start: the state there.  way: change of the state after a unit of progress.
 
+    speeds: change of the state at a unit of the progress's rate.
     progress: of the motion by time [s]; reaching: how long until it has gone so far, in units of the coordinates.
     at_speed: whether it begins with a speed, not from rest.
     """
 
+    begin: float
     start: np.ndarray
     way: np.ndarray
+    speeds: np.ndarray
     progress: Callable[[float], float]
     reaching: Callable[[float], float]
     at_speed: bool
@@ -45,7 +50,12 @@ class Direction:
 
     def state(self, t: float) -> np.ndarray:
         """State at a time, roughly."""
-        return np.asarray(self.start + self.progress(t) * self.way)
+        progress = self.progress(t)
+        if self.at_speed or t == self.begin:
+            return np.asarray(self.start + progress * self.way)
+        back = A_LITTLE * (t - self.begin)
+        rate = (progress - self.progress(t - back)) / back
+        return np.asarray(self.start + progress * self.way + rate * self.speeds)
 
 
 def by_speeds(engine: Engine, y: np.ndarray) -> Direction:
@@ -60,9 +70,11 @@ def by_speeds(engine: Engine, y: np.ndarray) -> Direction:
 def _steady(engine: Engine, y: np.ndarray, rate: np.ndarray) -> Direction:
     nq = engine.model.numbering.nq
     fastest = float(np.max(np.abs(rate[:nq]) / engine.floors[:nq], initial=0.0))
+    still = np.zeros(len(y))
     return Direction(
-        y, rate, lambda t: t - engine.start, lambda size: size / fastest if fastest > 0.0 else np.inf, True, fastest > 0.0
-    )
+        engine.start, y, rate, still, lambda t: t - engine.start, lambda size: size / fastest if fastest > 0.0 else np.inf, True,
+        fastest > 0.0,
+    )  # fmt: skip
 
 
 def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
@@ -85,14 +97,18 @@ class _Pose:
         self.units = engine.floors[self.nq : self.nq + self.nv]
         rows = engine.model.arrays.size(m.N_CLOSURE_ROWS)
         engine.keep(np.ones(rows, dtype=bool))
-        along = engine.model.arrays.table(m.CLOSURE_ROWS, engine.h)["kind"] == 0
-        self.scale = np.where(along, 1.0 / engine.model.mechanism.length, 1.0)
+        self.scale = self._row_scale()
         self.asked = initial.velocity_equations(engine.model, start_motions(engine), self.rest)
         self.J = self.asked.matrix[self.asked.told :] * self.scale[:, None] * self.units
         U, values, _ = np.linalg.svd(self.J)
         rank = int(np.sum(values > ZERO * values[0])) if len(values) else 0
         self.left = U[:, rank:]
         self.rates = np.array([self._rate(k) for k in range(self.nv)]).reshape(self.nv, self.nq)
+
+    def _row_scale(self) -> np.ndarray:
+        """Per row of the closures, in their present order: lengths in units of the mechanism's size."""
+        along = self.engine.model.arrays.table(m.CLOSURE_ROWS, self.engine.h)["kind"] == 0
+        return np.where(along, 1.0 / self.engine.model.mechanism.length, 1.0)
 
     def _rate(self, k: int) -> np.ndarray:
         """Rates of the positions at a unit of speed k."""
@@ -110,7 +126,7 @@ class _Pose:
     def residual(self, step: np.ndarray, t: float) -> np.ndarray:
         """Residuals of all closures after a displacement, at a time."""
         self.engine.attempt(self.moved(step), t)
-        return self.engine.view(m.RESIDUAL, len(self.scale)) * self.scale
+        return self.engine.view(m.RESIDUAL, len(self.scale)) * self._row_scale()
 
     def directions(self) -> list[Direction]:
         """By speeds that are asked for, by where the drives go from rest, or by forces from rest."""
@@ -171,7 +187,9 @@ class _Pose:
                 span *= 0.8
             return span
 
-        return Direction(self.rest, self._slope(step), progress, reaching, at_speed=False)
+        return Direction(
+            self.engine.start, self.rest, self._slope(step), self._with(step) - self.rest, progress, reaching, False
+        )
 
     def _fall(self, step: np.ndarray) -> list[Direction]:
         """From rest under the forces, if they push this way along the branch."""
@@ -185,8 +203,8 @@ class _Pose:
         size = float(np.max(np.abs(step)))
         return [
             Direction(
-                self.rest, self._slope(step), lambda at: 0.5 * push * (at - t) ** 2,
-                lambda wanted: float(np.sqrt(2.0 * wanted / (push * size))), at_speed=False,
+                t, self.rest, self._slope(step), self._with(step) - self.rest, lambda at: 0.5 * push * (at - t) ** 2,
+                lambda wanted: float(np.sqrt(2.0 * wanted / (push * size))), False,
             )
         ]  # fmt: skip
 

@@ -37,6 +37,8 @@ ROUNDS, HELPS, ROUNDING, NOISE = 25, 0.3, 1e-13, 1e-10
 #: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size; and how much its
 #: end may change without one of the points, which is at least ten times what it is off
 EXACT, SENSITIVE = 1e-10, 1e-9
+#: all of that may be so much more out of a pose in which the motion begins at rest: it is long near the pose then
+SLOWLY = 100.0
 
 
 @dataclass(frozen=True)
@@ -142,9 +144,10 @@ def collocate(
     if used.sum() < FEWEST:
         return None
     found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
+    blur = SLOWLY if lead is not None and lead.turn == 0.0 else 1.0
     for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
         size = _sizes(sampler.engine, y, [s.slope for s in found])
-        iterated = _iterate(sampler, t, y, span, nodes, found, size)
+        iterated = _iterate(sampler, t, y, span, nodes, found, blur * size)
         if iterated is None:
             return None
         found, slopes, left = iterated
@@ -156,7 +159,8 @@ def collocate(
         y = better
     series = _series(nodes, slopes, y, span)
     made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
-    if left > EXACT or _sensitivity(nodes, slopes, span, size) > SENSITIVE or _open(sampler, made, nodes) > EXACT:
+    size = blur * size
+    if left > EXACT or _sensitivity(nodes, slopes, span, size) > SENSITIVE or _open(sampler, made, nodes) > blur * EXACT:
         return None
     return made
 

@@ -27,8 +27,9 @@ FIRST, HALVINGS = 0.3, 9
 SAME = 1e-6
 #: directions that were looked for are good to some hundredths
 ANY = 0.5
-#: changes of a coordinate on two branches that differ by less than this share are alike
-ALIKE = 1e-6
+#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this share are
+#: alike
+ALIKE = 0.05
 
 
 @dataclass(frozen=True)
@@ -52,17 +53,17 @@ def depart(engine: Engine, y: np.ndarray) -> Departure:
     choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
     speeds = slice(engine.model.numbering.nq, engine.model.numbering.nq + engine.model.numbering.nv)
     if np.any(y[speeds] != 0.0) and not choices:
-        found = [_along(engine, y, branches.by_speeds(engine, y), SAME)]
+        found, turn = [branches.by_speeds(engine, y)], SAME
     else:
-        found = [_along(engine, y, way, ANY) for way in branches.directions(engine, y)]
-    ways = _chosen(engine, [way for way in found if way is not None], choices)
-    if not ways:
+        found, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
+    way = _along(engine, found[0], turn) if found else None
+    if way is None:
         raise SolverError(engine.mobility.singular_start)
-    engine.keep(ways[0].kept)
-    return ways[0]
+    engine.keep(way.kept)
+    return way
 
 
-def _along(engine: Engine, y: np.ndarray, way: Direction, turn: float) -> Departure | None:
+def _along(engine: Engine, way: Direction, turn: float) -> Departure | None:
     """The motion in a direction; None when there is none, or when its speeds at the start differ by more than `turn`."""
     if not way.moves:
         return None
@@ -83,10 +84,11 @@ def _along(engine: Engine, y: np.ndarray, way: Direction, turn: float) -> Depart
 # Which of them -------------------------------------------------------------------------------------------------------
 
 
-def _chosen(engine: Engine, ways: list[Departure], choices: tuple[Branch, ...]) -> list[Departure]:
+def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) -> list[Direction]:
     """The ways that the choices leave; an error unless there is one at most."""
     if len(ways) > 1:
-        changes = [_changes(engine, way, min(way.motion.end for way in ways)) for way in ways]
+        until = engine.start + min(way.reaching(branches.WAY) for way in ways)
+        changes = [_changes(engine, way, until) for way in ways]
         for number, choice in enumerate(choices):
             place = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
             joint, k, _ = coordinate_of(engine.model.scene, choice.joint, choice.coordinate, place)
@@ -99,12 +101,11 @@ def _chosen(engine: Engine, ways: list[Departure], choices: tuple[Branch, ...]) 
     return ways
 
 
-def _changes(engine: Engine, way: Departure, until: float) -> dict[str, float]:
-    """Change of every joint coordinate up to a time on a way."""
-    engine.keep(way.kept)
-    times = np.array([way.motion.start, until])
+def _changes(engine: Engine, way: Direction, until: float) -> dict[str, float]:
+    """Change of every joint coordinate up to a time, roughly."""
+    times = np.array([engine.start, until])
     contacts = np.zeros((2, 2 * engine.model.arrays.size(m.N_CONTACTS)))
-    seen = observe(engine, np.column_stack([times, contacts, way.motion.states(times)]))
+    seen = observe(engine, np.column_stack([times, contacts, [way.state(t) for t in times]]))
     return {name: float(np.diff(series[0])[0]) for name, series in joint_coordinates(engine.model, seen).items()}
 
 
