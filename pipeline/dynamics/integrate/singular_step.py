@@ -72,14 +72,22 @@ def note(h, w):
 
 
 @kernel
+def left(h, w):
+    """Least share that a row has of the most that it had, in what has been noted."""
+    least = 1.0
+    for r in range(h[m.N_KEPT_ROWS]):
+        if w[now(h, r)] < least * w[most(h, r)]:
+            least = w[now(h, r)] / w[most(h, r)]
+    return least
+
+
+@kernel
 def stand(h, w, t):
     """Take what has been noted at time t for the start of the next step."""
-    c, left = h[m.CONTROL], 1.0
     for r in range(h[m.N_KEPT_ROWS]):
         w[past(h, r)] = w[now(h, r)]
         w[most(h, r)] = max(w[most(h, r)], w[now(h, r)])
-        left = min(left, w[now(h, r)] / w[most(h, r)])
-    w[c + m.PAST_TIME], w[c + m.LEFT] = t, left
+    w[h[m.CONTROL] + m.PAST_TIME], w[h[m.CONTROL] + m.LEFT] = t, left(h, w)
 
 
 @kernel
@@ -123,9 +131,11 @@ def make_foresee(evaluate: Callable) -> Callable:
         which, rough = soonest(h, w, span)
         value, before = w[now(h, max(which, 0))], w[past(h, max(which, 0))]
         stand(h, w, t)
-        w[c + m.PASS_TIME] = NEVER
         blind = 0.0 < w[c + m.SIGMA] < np.sqrt(BLIND)
         w[c + m.BLIND_STEPS] = w[c + m.BLIND_STEPS] + 1.0 if blind else 0.0
+        if w[c + m.PASS_TIME] < t and w[c + m.MOST_REACH] == 0.0:
+            w[c + m.BLIND_STEPS] = NEVER  # a pose that no polynomial leads over has been stepped over
+        w[c + m.PASS_TIME] = NEVER
         if which < 0:
             if w[c + m.LEFT] > LOW:
                 w[c + m.MOST_REACH] = NEVER
@@ -240,9 +250,10 @@ def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method
             n[m.EVALUATIONS] += max(used, 0)
         if used >= 0:
             note(h, w)
+            w[h[m.CONTROL] + m.LEFT] = left(h, w)
         else:
             attempt(h, f, w, n, step)
-            n[m.EVALUATION] = m.OK
+            n[m.EVALUATION], w[h[m.CONTROL] + m.LEFT] = m.OK, 0.0
 
     return arrive
 

@@ -37,7 +37,7 @@ class Mobility:
 
     rank: independent closure rows of `rows`; those of poses nearby where the start is singular.
     redundant_joints: joints whose reaction the equations of motion of rigid bodies do not determine.
-    singular_start: of a start in a singular pose, why it cannot go on by itself, in words.
+    singular_start: of a start in a singular pose, where it is and why it cannot go on by itself, in words.
     """
 
     coordinates: int
@@ -55,6 +55,14 @@ class Mobility:
     def redundant(self) -> int:
         """Closure rows that follow from the others."""
         return self.rows - self.rank
+
+    @property
+    def start_refusal(self) -> str:
+        """The same with what helps."""
+        return (
+            f"{self.singular_start}: give its bodies the velocities of one of these, choose one by [start] branch if "
+            "drives or forces move it, or start it in another pose of its path"
+        )
 
     def text(self) -> str:
         """In words, for the user."""
@@ -184,9 +192,7 @@ def _singular_start(model: Model, J: np.ndarray, rank: int) -> str:
     ratio = values[0] / max(values[min(rank, len(values) - 1)], 1e-16 * values[0])
     return (
         f"at t = {model.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
-        f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
-        "give its bodies the velocities of one of these, choose one by [start] branch, or start it in another pose of its "
-        "path"
+        f"loops (closed at joints {', '.join(names)}) can go on in several ways (condition number {ratio:.3g})"
     )
 
 

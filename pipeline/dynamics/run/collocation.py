@@ -24,8 +24,9 @@ from pipeline.dynamics.run.engine import Engine, observe_with
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
 NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
-#: points where a closure row has less than this share of the independence that it has at the best one are left out
-LEAST = 0.05
+#: points where a closure row has less than this share of the independence that it has at the best one are left out; or
+#: less than the second where the first would leave out more than MANY: a slow motion is long near the pose
+LEAST, SLOW_LEAST, MANY = 0.05, 0.005, 2
 #: so many must be left
 FEWEST = 6
 #: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
@@ -140,7 +141,9 @@ def collocate(
     """
     began = sampler.evaluations
     states, samples = _march(sampler, t, y, span, slope, lead)
-    used = _far_from_singular(samples)
+    used = _far_from_singular(samples, LEAST)
+    if slope is not None and used.sum() < POINTS - MANY:
+        used = _far_from_singular(samples, SLOW_LEAST)
     if used.sum() < FEWEST:
         return None
     found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
@@ -233,11 +236,11 @@ def _share(sample: Sample, samples: list[Sample]) -> float:
     return float(np.min(sample.independence / best))
 
 
-def _far_from_singular(samples: list[Sample]) -> np.ndarray:
+def _far_from_singular(samples: list[Sample], least: float) -> np.ndarray:
     """Which samples may be used."""
     if not any(s.sound for s in samples):
         return np.zeros(len(samples), dtype=bool)
-    return np.array([s.sound and _share(s, samples) >= LEAST for s in samples])
+    return np.array([s.sound and _share(s, samples) >= least for s in samples])
 
 
 def _sizes(engine: Engine, y: np.ndarray, slopes: list[np.ndarray]) -> np.ndarray:

@@ -129,7 +129,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     scene, mobility = model.scene, analyse(model)
     progress(None, mobility.text())
     if mobility.singular_start and not may_depart(model):
-        raise SolverError(mobility.singular_start)
+        raise SolverError(mobility.start_refusal)
     _check_start(model, mobility)
     scheme = scheme_of(scene.solver)
     entry = functions.entry(model.parts, scheme, lambda text: progress(None, text))

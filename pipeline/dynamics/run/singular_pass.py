@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,16 +12,23 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.collocation import Collocation, Sampler, collocate
+from pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
 from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.reach import beyond_reach
 
 #: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
 #: then half of that, and so on
 REACH, HALVINGS = 0.3, 10
+#: speeds in a pose that a polynomial led to may be off by this share of the fastest
+TURN = 1e-6
+#: where no polynomial was found and a row has less than this share left, it is asked whether a loop's reach ends
+OBVIOUS = 0.05
 #: what is left of a segment after the polynomial, in shares of its length, that belongs to it
 REMAINDER = 1e-3
 #: looks at a polynomial for the poses that it passes; singular values below this share of the largest vanish there
 LOOKS, VANISHED = 64, 1e-6
+#: shares of the polynomial to which a pose is found, and at which it is looked at from both sides
+NEAR, NEARLY = 1e-7, 1e-4
 #: two looks that find a pose at times which differ by less than this share of the polynomial have found the same one
 SAME = 1e-6
 #: a loop whose speeds in the pose are below this share of those beside it is at rest
@@ -55,8 +63,11 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     engine.n[m.EVALUATIONS] += sampler.evaluations
     control[m.REACH] = control[m.MOST_REACH] = reach
     if made is None:
+        told = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
+        if told:
+            raise SolverError(told)
         return None, ()
-    engine.view(m.Y, len(y))[:] = y
+    engine.view(m.Y, len(y))[:] = made.states(np.array([t]))[0]
     engine.view(m.COLLOCATION, made.series.size)[:] = made.series.ravel()
     control[m.COLLOCATED] = made.span
     return made, passes
@@ -88,9 +99,13 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
 
 def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
     """A polynomial out of a pose, or over one that has come too near to be foreseen, by the motion's own scale."""
-    fastest = _fastest(sampler, t, y)
+    nq = sampler.engine.model.numbering.nq
+    sampler.attempt(t, y)
+    rate = np.append(sampler.slope()[:nq], np.zeros(sampler.size - nq))
+    fastest = float(np.max(np.abs(rate / sampler.engine.floors), initial=0.0))
+    lead = Lead(lambda at: y + (at - t) * rate, TURN)
     for k in range(HALVINGS if fastest > 0.0 else 0):
-        made = collocate(sampler, t, y, _within(sampler, t, REACH / fastest * 0.5**k), None)
+        made = collocate(sampler, t, y, _within(sampler, t, REACH / fastest * 0.5**k), None, lead)
         if made is not None:
             return made
     return None
@@ -100,13 +115,6 @@ def _within(sampler: Sampler, t: float, span: float) -> float:
     """The span, or what is left of the segment."""
     left = float(sampler.engine.view(m.CONTROL, m.N_CONTROLS)[m.END]) - t
     return left if (1.0 + REMAINDER) * span >= left else span
-
-
-def _fastest(sampler: Sampler, t: float, y: np.ndarray) -> float:
-    """Largest rate of a position, in units of its floor [1/s]."""
-    nq = sampler.engine.model.numbering.nq
-    sampler.attempt(t, y)
-    return float(np.max(np.abs(sampler.slope()[:nq] / sampler.engine.floors[:nq]), initial=0.0))
 
 
 # What passes --------------------------------------------------------------------------------------------------------
@@ -127,11 +135,18 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
         bracket = (times[max(k - 1, 0)], times[min(k + 1, LOOKS)])
-        t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": 1e-9 * made.span}).x)
-        one = _pass(sampler, made, min((t, *bracket), key=least))
+        t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": NEAR * made.span}).x)
+        one = _pass(sampler, made, _between(least, min((t, *bracket), key=least), NEARLY * made.span, bracket))
         if one is not None and not (found and one.time - found[-1].time < SAME * made.span):
             found.append(one)
     return tuple(found)
+
+
+def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
+    """Where straight lines on both sides meet at zero: in the pose itself nothing can be told."""
+    before, after = least(t - aside), least(t + aside)
+    share = before / (before + after) if before + after > 0.0 else 0.5
+    return float(np.clip(t - aside + 2.0 * aside * share, *bracket))
 
 
 def _independence(sampler: Sampler, made: Collocation, t: float) -> np.ndarray:

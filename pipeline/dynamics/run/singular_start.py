@@ -58,7 +58,7 @@ def depart(engine: Engine, y: np.ndarray) -> Departure:
         found, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
     way = _along(engine, found[0], turn) if found else None
     if way is None:
-        raise SolverError(engine.mobility.singular_start)
+        raise SolverError(engine.mobility.start_refusal)
     engine.keep(way.kept)
     return way
 
@@ -123,5 +123,6 @@ def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple
             "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as one more of a list"
         )
     raise SolverError(
-        f"{engine.mobility.singular_start}; here are {ways}: choose by [start] branch = {{ {written} }}, or sign = -1"
+        f"{engine.mobility.singular_start}, here in {ways}: choose by [start] branch = {{ {written} }} or sign = -1, or "
+        "give the bodies velocities"
     )

@@ -14,7 +14,7 @@ from pipeline.dynamics.run import refusal, singular
 from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, Progress, overlapping
 from pipeline.dynamics.run.handover import Handover, StiffError, hand_over, take_over
-from pipeline.dynamics.run.singular_pass import Pass, lay_over
+from pipeline.dynamics.run.singular_pass import SAME, Pass, lay_over
 from pipeline.dynamics.run.singular_start import depart
 
 #: evaluations between two looks at the clock and the keyboard
@@ -221,10 +221,10 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
             if singular.improve(engine, float(t)):
                 run.selections.append((float(t), engine.kept.copy()))
             elif status != m.WORN_ROWS and not _rescued(engine, run):
-                raise SolverError(refusal.text(engine))
+                raise SolverError(refusal.text(engine, run.rows[: n[m.N_RECORDED]]))
         elif status != m.PAUSED:
             if not _rescued(engine, run):
-                raise SolverError(refusal.text(engine))
+                raise SolverError(refusal.text(engine, run.rows[: n[m.N_RECORDED]]))
         elif _crawls(engine, run):
             left = hand_over(engine, run.rows, run.events, run.selections)
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", left)
@@ -244,7 +244,8 @@ def _pass_over(engine: Engine, run: _Run) -> bool:
     made, passes = lay_over(engine)
     if made is not None:
         run.collocations.append(made)
-        run.passes += passes
+        known = run.passes[-1].time if run.passes else -np.inf
+        run.passes += [p for p in passes if p.time - known > SAME * made.span]
     return made is not None
 
 
@@ -252,7 +253,7 @@ def _rescued(engine: Engine, run: _Run) -> bool:
     """Whether a stepper that cannot go on has got a polynomial: the singular pose ahead may be what stopped it."""
     control, status = engine.view(m.CONTROL, m.N_CONTROLS), run.n[m.STATUS]
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
-    if status not in STOPPED or not engine.model.kinds.closures or not ahead or control[m.MOST_REACH] == 0.0:
+    if status not in STOPPED or not engine.model.mechanism.closures or not ahead or control[m.MOST_REACH] == 0.0:
         return False
     return _pass_over(engine, run)
 
