@@ -237,9 +237,9 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 # rejection), length of fixed steps, the method's parameter, largest rate of a closure before projection, largest rate
 # of the equations that a step met;
 # then what `singular_step` keeps: independence of the closure rows at the end of the step, time of its start, time of
-# the next singular pose, how far before it the stepper stops, the most that this may be (0: it does not stop), length of
-# the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has left
-# of the most that it had, steps in a row that ended blindly near a pose;
+# the next singular pose, how far before it the stepper stops, the most that this may be (0: it does not stop), length
+# of the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has
+# left of the most that it had, steps in a row that ended blindly near a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # length of the last first step with a contact closed, whether the next accepted step is the first of a segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)

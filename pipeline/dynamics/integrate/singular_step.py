@@ -30,7 +30,7 @@ STEPS_AHEAD, LOW = 4.0, 0.05
 #: half of its own length: near enough for one polynomial, so far that rounding is blown up little
 FROM, HALF = 0.3, 0.5
 #: a row that has less than this share left cannot be stepped from, foreseen or not
-TOO_LITTLE = 1e-3
+TOO_LITTLE = 2e-4
 #: steps up to there end this share of the way before it short; the time of the pose is known better from nearer
 MARGIN, NEARER = 0.1, 0.7
 #: share of a step over which a slope is taken: the state there comes from the slope at the end

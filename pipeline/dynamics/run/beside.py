@@ -26,8 +26,9 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation) -> dict[str, np
     """Observed fields of such a row, shape (1, width) each; None when there are none.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
-    of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states there
-    are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold between them.
+    of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states
+    there are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold
+    between them.
     """
     first = 1 + 2 * len(engine.model.mechanism.contacts)
     pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))

@@ -32,8 +32,9 @@ HALVINGS = 60
 
 @dataclass(frozen=True)
 class Direction:
-    """A way out of the pose. begin: time of the start [s].  start: the state there.  way: change of the state after a unit of progress.
+    """A way out of the pose. begin: time of the start [s].  start: the state there.
 
+    way: change of the state after a unit of progress.
     speeds: change of the state at a unit of the progress's rate.
     progress: of the motion by time [s]; reaching: how long until it has gone so far, in units of the coordinates.
     at_speed: whether it begins with a speed, not from rest.
@@ -71,10 +72,11 @@ def _steady(engine: Engine, y: np.ndarray, rate: np.ndarray) -> Direction:
     nq = engine.model.numbering.nq
     fastest = float(np.max(np.abs(rate[:nq]) / engine.floors[:nq], initial=0.0))
     still = np.zeros(len(y))
-    return Direction(
-        engine.start, y, rate, still, lambda t: t - engine.start, lambda size: size / fastest if fastest > 0.0 else np.inf, True,
-        fastest > 0.0,
-    )  # fmt: skip
+
+    def reaching(size: float) -> float:
+        return size / fastest if fastest > 0.0 else np.inf
+
+    return Direction(engine.start, y, rate, still, lambda t: t - engine.start, reaching, True, fastest > 0.0)
 
 
 def directions(engine: Engine, y: np.ndarray) -> list[Direction]:

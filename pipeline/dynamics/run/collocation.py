@@ -1,4 +1,4 @@
-"""The motion over, out of or into a singular pose: a polynomial whose slopes are those of the equations at closed states.
+"""The motion over a singular pose, or out of one: a polynomial with the slopes of the equations at closed states.
 
 In the pose the equations have no unique solution, and beside it what a method errs is blown up, so that no method's
 stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
@@ -34,12 +34,17 @@ LED, TURNS = 2, 4
 #: states are closed to this share of the mechanism's size before their slopes are taken
 CLOSELY = 1e-14
 #: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
-ROUNDS, HELPS, ROUNDING, NOISE = 25, 0.3, 1e-13, 1e-10
+ROUNDS, HELPS, ROUNDING, NOISE = 40, 0.3, 1e-13, 1e-10
+#: iterations are given up when one is so much worse than the last, and, after so many, when what the points leave
+#: unresolved does not fall
+WORSE, EARLY = 10.0, 6
 #: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size; and how much its
 #: end may change without one of the points, which is at least ten times what it is off
 EXACT, SENSITIVE = 1e-10, 1e-9
 #: all of that may be so much more out of a pose in which the motion begins at rest: it is long near the pose then
 SLOWLY = 100.0
+#: and where the polynomial is so short that a row has less than this share left at its ends, by the square of that
+NEAR = 0.01
 
 
 @dataclass(frozen=True)
@@ -64,11 +69,6 @@ class Collocation:
         """States at times [s], shape (len(times), n)."""
         return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, self.series).T)
 
-    def rates(self, times: np.ndarray) -> np.ndarray:
-        """Their rates."""
-        slope = chebyshev.chebder(self.series) * (2.0 / self.span)
-        return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, slope).T)
-
 
 @dataclass(frozen=True)
 class Lead:
@@ -92,7 +92,7 @@ class Sample:
 
 
 class Sampler:
-    """Evaluates closed states of an engine with the laws and contacts that are in force; leaves the engine as it was."""
+    """Evaluates closed states with the laws and contacts in force; `restore` leaves the engine as it was."""
 
     def __init__(self, engine: Engine) -> None:
         n, arrays = engine.n, engine.model.arrays
@@ -132,12 +132,18 @@ class Sampler:
 
 
 def collocate(
-    sampler: Sampler, t: float, y: np.ndarray, span: float, slope: np.ndarray | None, lead: Lead | None = None
+    sampler: Sampler,
+    t: float,
+    y: np.ndarray,
+    span: float,
+    slope: np.ndarray | None,
+    lead: Lead | None = None,
+    share: float = 1.0,
 ) -> Collocation | None:
     """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
 
     slope: at the start; None in a singular pose, where there is none.  lead: what to begin with there; without it the
-    state's own speeds lead.
+    state's own speeds lead.  share: what a closure row has left of its most at the ends; rounding follows its square.
     """
     began = sampler.evaluations
     states, samples = _march(sampler, t, y, span, slope, lead)
@@ -147,7 +153,7 @@ def collocate(
     if used.sum() < FEWEST:
         return None
     found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
-    blur = SLOWLY if lead is not None and lead.turn == 0.0 else 1.0
+    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / share) ** 2)
     for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
         size = _sizes(sampler.engine, y, [s.slope for s in found])
         iterated = _iterate(sampler, t, y, span, nodes, found, blur * size)
@@ -162,20 +168,19 @@ def collocate(
         y = better
     series = _series(nodes, slopes, y, span)
     made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
-    size = blur * size
-    if left > EXACT or _sensitivity(nodes, slopes, span, size) > SENSITIVE or _open(sampler, made, nodes) > blur * EXACT:
-        return None
-    return made
+    unresolved = _sensitivity(nodes, slopes, span, blur * size)
+    sound = left <= EXACT and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * EXACT
+    return made if sound else None
 
 
 def _iterate(
     sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, found: list[Sample], size: np.ndarray
 ) -> tuple[list[Sample], np.ndarray, float] | None:
-    """Picard's iteration from the slopes at the nodes: what there is at its end, the slopes, and what closing changed."""
+    """Picard's iteration from the slopes at the nodes: what is there at last, its slopes, what closing changed."""
     slopes = np.array([s.slope for s in found])
     weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
-    for _ in range(ROUNDS):
+    for k in range(ROUNDS):
         found = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
         if not all(s.sound for s in found):
             return None
@@ -186,7 +191,7 @@ def _iterate(
         if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
             return found, slopes, left
         unresolved = _sensitivity(nodes, slopes, span, size)
-        if not change <= 10.0 * last or (unresolved > SENSITIVE and unresolved > HELPS * rough):
+        if not change <= WORSE * last or (k >= EARLY and unresolved > SENSITIVE and unresolved > HELPS * rough):
             return None
         last, rough = change, unresolved
     return None

@@ -75,7 +75,7 @@ def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
 
 
 def dimensionless(engine: Engine, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobian (kept rows, nv) with lengths in units of the mechanism's size: the same in any unit of length."""
+    """Closure Jacobian (kept rows, nv) with lengths in units of the mechanism's size, whatever that is written in."""
     numbering = engine.model.numbering
     along = built_rows(engine.model, engine.h) == 0
     units = np.where(along, 1.0 / engine.model.mechanism.length, 1.0)

@@ -19,10 +19,12 @@ from pipeline.dynamics.run.reach import beyond_reach
 #: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
 #: then half of that, and so on
 REACH, HALVINGS = 0.3, 10
+#: least share of a row with which a polynomial may begin: where other motions are fast it must be short
+NEAREST = 3e-4
 #: speeds in a pose that a polynomial led to may be off by this share of the fastest
 TURN = 1e-6
 #: where no polynomial was found and a row has less than this share left, it is asked whether a loop's reach ends
-OBVIOUS = 0.05
+OBVIOUS = 0.02
 #: what is left of a segment after the polynomial, in shares of its length, that belongs to it
 REMAINDER = 1e-3
 #: looks at a polynomial for the poses that it passes; singular values below this share of the largest vanish there
@@ -88,9 +90,9 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
     """
     control = sampler.engine.view(m.CONTROL, m.N_CONTROLS)
     ahead, reach, share = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
-    nearest = 2.0 * TOO_LITTLE / share * ahead
+    nearest = NEAREST / share * ahead
     while reach >= max(ahead, nearest):
-        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope)
+        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, share=share * reach / ahead)
         if made is not None:
             return made, reach
         reach *= 0.5

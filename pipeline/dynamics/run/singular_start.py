@@ -1,8 +1,8 @@
 """Out of a singular pose in which a run starts, along one of the branches that cross there.
 
-Velocities that are given choose the branch; where they, and the drives, leave a choice, the scene's `[start] branch` does.
-Each branch has a motion out of the pose, a polynomial with closed states (`collocation`). Velocities that belong to no
-branch show in that there is none, however short the way.
+Velocities that are given choose the branch; where they, and the drives, leave a choice, `[start] branch` of the scene
+does. Each branch has a motion out of the pose, a polynomial with closed states (`collocation`). Velocities that belong
+to no branch show in that there is none, however short the way.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def depart(engine: Engine, y: np.ndarray) -> Departure:
 
 
 def _along(engine: Engine, way: Direction, turn: float) -> Departure | None:
-    """The motion in a direction; None when there is none, or when its speeds at the start differ by more than `turn`."""
+    """The motion in a direction; None when there is none, or none whose start differs by `turn` at most."""
     if not way.moves:
         return None
     engine.view(m.CONTROL, m.N_CONTROLS)[m.END] = engine.breaks[1]
@@ -123,6 +123,6 @@ def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple
             "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as one more of a list"
         )
     raise SolverError(
-        f"{engine.mobility.singular_start}, here in {ways}: choose by [start] branch = {{ {written} }} or sign = -1, or "
-        "give the bodies velocities"
+        f"{engine.mobility.singular_start}, here in {ways}: choose by [start] branch = {{ {written} }} or sign = -1, "
+        "or give the bodies velocities"
     )

@@ -44,7 +44,8 @@ class Trajectory:
     selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
-    collocations: polynomial motions that the run followed, over singular poses and out of them; passes: what was passed.
+    collocations: polynomial motions that the run followed, over singular poses and out of them.
+    passes: the poses that were passed.
     """
 
     rows: np.ndarray
