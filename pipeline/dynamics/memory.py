@@ -10,7 +10,8 @@ are, what is joined to what, every number, stands in four flat arrays that every
 
 Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the place in w where a stretch begins,
 ``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the place of row i of a
-table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.
+table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row. ``m.CONTROL.time(h)`` is the place
+in w of a field of which there is one.
 
 Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
 
@@ -60,6 +61,14 @@ def _field_reader(place: int, size: int, field: int) -> Callable[[Any, Any], Any
     return read
 
 
+def _field_place(place: int, field: int) -> Callable[[Any], Any]:
+    @kernel
+    def where(h):
+        return h[place] + field
+
+    return where
+
+
 def _fields(declared: str) -> tuple[dict[str, int], int]:
     """Where the fields of a row begin ("name" or "name:length"), and how long a row is."""
     begins, end = dict[str, int](), 0
@@ -82,14 +91,15 @@ def _table(array: str, declared: str, fields: Callable[[int, int, int], Any]) ->
     (place,), (begins, size) = _places(1), _fields(declared)
     make: Any = namedtuple
     kind = make("Table", ["place", "size", "row", *begins])
-    found = kind(place, size, _row_reader(place, size), *(fields(place, size, begin) for begin in begins.values()))
-    TABLES[array].append(found)
+    table = kind(place, size, _row_reader(place, size), *(fields(place, size, begin) for begin in begins.values()))
+    TABLES[array].append(table)
+    _ROWS[place] = _named_fields(begins, size, np.int64 if array == "h" else np.float64)
+    return table
+
+
+def _named_fields(begins: dict[str, int], size: int, number: Any) -> np.dtype[Any]:
     widths = np.diff([*begins.values(), size])
-    number = np.int64 if array == "h" else np.float64
-    _ROWS[place] = np.dtype(
-        [(name, number, (int(k),) if k > 1 else ()) for name, k in zip(begins, widths, strict=True)]
-    )
-    return found
+    return np.dtype([(name, number, (int(k),) if k > 1 else ()) for name, k in zip(begins, widths, strict=True)])
 
 
 def wiring(declared: str) -> Any:
@@ -105,6 +115,15 @@ def numbers(declared: str) -> Any:
 def work(declared: str) -> Any:
     """A table in w, otherwise like `numbers`."""
     return _table("w", declared, lambda place, size, begin: begin)
+
+
+def single(declared: str) -> Any:
+    """One record in w: its `place` in the header, its `size`, and for each field field(h), where w holds it."""
+    (place,), (begins, size) = _places(1), _fields(declared)
+    make: Any = namedtuple
+    kind = make("Single", ["place", "size", *begins])
+    _ROWS[place] = _named_fields(begins, size, np.float64)
+    return kind(place, size, *(_field_place(place, begin) for begin in begins.values()))
 
 
 def named(table: Any, entries: np.ndarray) -> np.ndarray:
@@ -216,7 +235,21 @@ MAGNITUDE, CORRECTION, LATCHED = _places(3)
 WATCH = work(
     "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1"
 )
-CONTROL = next(_place)
+#: the stepper's floats. time, step, end: where the present step starts, its length, end of the segment; rtol: relative
+#: tolerance; span, length: of the run, of the mechanism; drift, rate_drift: largest violation of a closure, and of its
+#: rate, before projection; last_norm: error norm of the last accepted step; most_growth: largest growth of the next (1
+#: after a rejection); fixed: length of fixed steps, or 0; parameter: of the method; steepest: largest rate of the
+#: equations that a step met.
+#: Then what `singular_step` keeps. sigma, past_sigma: independence of the closure rows at the end of the step and at
+#: its start, past_time; pass_time: of the next singular pose; straddling: whether the present step is laid over it;
+#: blind_steps: steps in a row that ended blindly near one.
+#: Then what `adaptive` keeps. rejected_step, rejected_norm: of the step rejected last (0: none since the last accepted
+#: one); touched_step: the last first step with a contact closed; first: whether the next is the first of a segment
+CONTROL = single(
+    "time step end rtol span length drift last_norm most_growth fixed parameter rate_drift steepest "
+    "sigma past_sigma past_time pass_time straddling blind_steps "
+    "rejected_step rejected_norm touched_step first"
+)
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
@@ -226,19 +259,6 @@ DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
 DAMPING_LOSS, FRICTION_LOSS, IMPULSE, PER_CONTACT = range(4)
 # what an evaluation reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
-
-# Control floats, from w[h[CONTROL]] on -------------------------------------------------------------------------------
-# time, next step, end of the segment, relative tolerance, length of the run, size of the mechanism, largest violation
-# of a closure before projection, error norm of the last accepted step, largest growth of the next (1 after a
-# rejection), length of fixed steps, the method's parameter, largest rate of a closure before projection, largest rate
-# of the equations that a step met;
-# then what `singular_step` keeps: independence of the closure rows at the end of the step and at its start, its start,
-# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one;
-# then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
-# length of the last first step with a contact closed, whether the next accepted step is the first of a segment
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS = range(13, 19)
-REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state

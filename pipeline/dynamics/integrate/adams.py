@@ -73,7 +73,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             ahead = 55.0 * w[now + c] - 59.0 * w[one + c]
             ahead += 37.0 * w[two + c] - 9.0 * w[three + c]
             w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], predicted)
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + step, h[m.Y_STAGE], predicted)
         n[m.EVALUATIONS] += 1
         for c in range(size):
             ahead = 9.0 * w[predicted + c] + 19.0 * w[now + c]

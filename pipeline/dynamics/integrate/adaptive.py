@@ -43,9 +43,9 @@ def make_step_control(
     @kernel
     def first_step(h, f, w, n):
         """Slope at the start of a segment, and a first step; False when the equations have no solution here."""
-        c, y, slope = h[m.CONTROL], h[m.Y], h[m.SLOPES]
+        y, slope = h[m.Y], h[m.SLOPES]
         other = slope + h[m.NY]
-        evaluate(h, f, w, n, w[c + m.TIME], y, slope)
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)], y, slope)
         n[m.EVALUATIONS] += 2
         if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
             n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
@@ -53,24 +53,24 @@ def make_step_control(
         watch_start(h, w)
         set_error_scales(h, f, w, y)
         size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
-        step = 1e-6 * w[c + m.SPAN]
+        step = 1e-6 * w[m.CONTROL.span(h)]
         if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
-            step = min(0.01 * size / steepness, 0.01 * w[c + m.SPAN])
-        step = min(step, w[c + m.END] - w[c + m.TIME])
+            step = min(0.01 * size / steepness, 0.01 * w[m.CONTROL.span(h)])
+        step = min(step, w[m.CONTROL.end(h)] - w[m.CONTROL.time(h)])
         for k in range(h[m.NY]):
             w[h[m.Y_STAGE] + k] = w[y + k] + step * w[slope + k]
-        evaluate(h, f, w, n, w[c + m.TIME] + step, h[m.Y_STAGE], other)
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + step, h[m.Y_STAGE], other)
         if n[m.EVALUATION] == m.OK:
             for k in range(h[m.NY]):
                 w[other + k] -= w[slope + k]
             steepness = max(steepness, scaled_norm(h, w, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        if any_closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
-            step = min(step, w[c + m.TOUCHED_STEP])
-        w[c + m.STEP] = step
-        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 1.0, 0.0
-        w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = LEAST_NORM, GROW
+        if any_closed(h, n) and w[m.CONTROL.touched_step(h)] > 0.0:
+            step = min(step, w[m.CONTROL.touched_step(h)])
+        w[m.CONTROL.step(h)] = step
+        w[m.CONTROL.first(h)], w[m.CONTROL.rejected_step(h)] = 1.0, 0.0
+        w[m.CONTROL.last_norm(h)], w[m.CONTROL.most_growth(h)] = LEAST_NORM, GROW
         n[m.FRESH] = 0
         begin(h, f, w, n)
         return True
@@ -90,8 +90,7 @@ def make_step_control(
 
         Where a contact begins or friction turns, the solution has less derivatives than the method asks for.
         """
-        c = h[m.CONTROL]
-        longer, worse = w[c + m.REJECTED_STEP], w[c + m.REJECTED_NORM]
+        longer, worse = w[m.CONTROL.rejected_step(h)], w[m.CONTROL.rejected_norm(h)]
         if longer == 0.0 or worse >= FAILED:
             return 1.0 * order
         if norm >= worse:
@@ -101,28 +100,26 @@ def make_step_control(
     @kernel
     def after_rejection(h, w, n, step, norm):
         """Try again with a shorter step."""
-        c = h[m.CONTROL]
-        w[c + m.STEP] = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(h, w, step, norm)))
-        w[c + m.REJECTED_STEP], w[c + m.REJECTED_NORM] = step, norm
-        w[c + m.MOST_GROWTH] = 1.0
+        w[m.CONTROL.step(h)] = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(h, w, step, norm)))
+        w[m.CONTROL.rejected_step(h)], w[m.CONTROL.rejected_norm(h)] = step, norm
+        w[m.CONTROL.most_growth(h)] = 1.0
         return True
 
     @kernel
     def next_step(h, w, n, step, norm):
         """Length of the step after the one that has just been accepted."""
-        c = h[m.CONTROL]
-        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
-            w[c + m.TOUCHED_STEP] = step
-        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
+        if w[m.CONTROL.first(h)] > 0.0 and any_closed(h, n):
+            w[m.CONTROL.touched_step(h)] = step
+        w[m.CONTROL.first(h)], w[m.CONTROL.rejected_step(h)] = 0.0, 0.0
         norm = max(norm, LEAST_NORM)
-        growth = SAFETY * norm**remembering * w[c + m.LAST_NORM] ** MEMORY
-        growth = min(w[c + m.MOST_GROWTH], max(SHRINK, growth))
-        w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = norm, GROW
+        growth = SAFETY * norm**remembering * w[m.CONTROL.last_norm(h)] ** MEMORY
+        growth = min(w[m.CONTROL.most_growth(h)], max(SHRINK, growth))
+        w[m.CONTROL.last_norm(h)], w[m.CONTROL.most_growth(h)] = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 
     @kernel
     def choose_step(h, w, t):
         """Length of the step to try from t: as planned, unless a singular pose is ahead."""
-        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, STRETCH)
+        return steer(h, w, t, w[m.CONTROL.step(h)], gap, STRETCH)
 
     return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)

@@ -118,7 +118,7 @@ def clearance(h, f, c):
 @kernel
 def zero_gap(h, f, w, c):
     """Size [m] below which the gap of contact c is zero."""
-    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[m.CONTROL] + m.LENGTH]
+    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[m.CONTROL.length(h)]
 
 
 @kernel
@@ -292,8 +292,8 @@ def give_up(n, status, c):
 @kernel
 def stepped_over(h, f, w, n, c):
     """Whether contact c, about to change its mode where a step starts, has begun long before."""
-    o, gap = h[m.CONTROL], w[m.TOUCH.row(h, c) + m.TOUCH.gap]
-    deep = DEEP * clearance(h, f, c) + ERRORS * w[o + m.RTOL] * w[o + m.LENGTH]
+    gap = w[m.TOUCH.row(h, c) + m.TOUCH.gap]
+    deep = DEEP * clearance(h, f, c) + ERRORS * w[m.CONTROL.rtol(h)] * w[m.CONTROL.length(h)]
     return gap < -deep and n[n[m.MODE] + c] == 0
 
 
@@ -308,7 +308,7 @@ def make_resolve_events(
     def evaluate_at(h, f, w, n, step, theta):
         """Evaluate the dense output at a share of the step."""
         interpolate(h, w, theta, h[m.Y_STAGE])
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE], slope(h, spare))
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + theta * step, h[m.Y_STAGE], slope(h, spare))
         n[m.EVALUATIONS] += 1
 
     follow_contacts = make_follow_contacts(evaluate, evaluate_at, extend, method, regimes)
@@ -320,9 +320,9 @@ def make_resolve_events(
         n[m.EVALUATIONS] += 1
         if not attempt(h, f, w, n, step):
             return False
-        t, final = w[h[m.CONTROL] + m.TIME] + step, slope(h, last)
+        t, final = w[m.CONTROL.time(h)] + step, slope(h, last)
         evaluate(h, f, w, n, t, h[m.Y_NEW], final)
-        used = project(h, f, w, n, t, h[m.Y_NEW], final, 1e-3 * w[h[m.CONTROL] + m.RTOL] * w[h[m.CONTROL] + m.LENGTH])
+        used = project(h, f, w, n, t, h[m.Y_NEW], final, 1e-3 * w[m.CONTROL.rtol(h)] * w[m.CONTROL.length(h)])
         n[m.EVALUATIONS] += max(used, 0)
         return used >= 0
 
@@ -359,7 +359,7 @@ def make_resolve_events(
     def change_at_start(h, f, w, n, c, events):
         """A mode change where the step starts: no step is made."""
         n[m.IMMEDIATE] += 1
-        t = w[h[m.CONTROL] + m.TIME]
+        t = w[m.CONTROL.time(h)]
         for k in range(h[m.NY]):
             w[h[m.Y_NEW] + k] = w[h[m.Y] + k]
         evaluate(h, f, w, n, t, h[m.Y_NEW], slope(h, last))
@@ -372,7 +372,7 @@ def make_resolve_events(
 
     @kernel
     def resolve_events(h, f, w, n, step, t_new, events):
-        t = w[h[m.CONTROL] + m.TIME]
+        t = w[m.CONTROL.time(h)]
         for shortened in range(MOST_SHORTENED + 1):
             watch_end(h, w)
             which, first, ready = first_change(h, f, w, n, step)

@@ -104,7 +104,7 @@ def make_follow_contacts(
         final = slope(h, last)
         for k in range(h[m.NY]):
             w[h[m.Y_STAGE] + k] = w[h[m.Y_NEW] + k] - BACK * step * w[final + k]
-        t = w[h[m.CONTROL] + m.TIME] + (1.0 - BACK) * step
+        t = w[m.CONTROL.time(h)] + (1.0 - BACK) * step
         evaluate(h, f, w, n, t, h[m.Y_STAGE], slope(h, spare))
         n[m.EVALUATIONS] += 1
         for c in range(h[m.N_CONTACTS]):
@@ -156,7 +156,7 @@ def make_follow_contacts(
         o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
         rate, before, after = now + m.TOUCH.rate, w[o + m.WATCH.rate0], w[o + m.WATCH.rate1]
         theta = locate_level(h, f, w, n, step, rate, 0.0, 0.0, 1.0, before, after)
-        event = events[add_event(events, n, c, m.COMPRESSION, w[h[m.CONTROL] + m.TIME] + theta * step)]
+        event = events[add_event(events, n, c, m.COMPRESSION, w[m.CONTROL.time(h)] + theta * step)]
         event[m.EVENT.speed], event[m.EVENT.peak_depth] = 0.0, -w[now + m.TOUCH.gap]
         event[m.EVENT.peak_force] = w[now + m.TOUCH.normal_force]
         begun = events[int(w[o + m.WATCH.event_row])]
@@ -169,7 +169,7 @@ def make_follow_contacts(
         slip = m.TOUCH.row(h, c) + m.TOUCH.slip
         theta = locate_level(h, f, w, n, step, slip, stick_speed(h, f, c), a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
-        add_event(events, n, c, kind, w[h[m.CONTROL] + m.TIME] + theta * step)
+        add_event(events, n, c, kind, w[m.CONTROL.time(h)] + theta * step)
 
     @kernel
     def record_regimes(h, f, w, n, step, c, events):

@@ -92,7 +92,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         """A step with the slope at its end, which the error estimate needs."""
         if not advance(h, f, w, n, step):
             return False
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], slope(h, STAGES))
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + step, h[m.Y_NEW], slope(h, STAGES))
         n[m.EVALUATIONS] += 1
         return n[m.EVALUATION] == m.OK
 

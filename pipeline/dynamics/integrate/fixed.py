@@ -23,14 +23,14 @@ def make_step_control(
     @kernel
     def first_step(h, f, w, n):
         """Slope at the start of a segment; False when the equations have no solution here."""
-        c, slope = h[m.CONTROL], h[m.SLOPES]
-        evaluate(h, f, w, n, w[c + m.TIME], h[m.Y], slope)
+        slope = h[m.SLOPES]
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)], h[m.Y], slope)
         n[m.EVALUATIONS] += 1
         if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
             n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
             return False
         watch_start(h, w)
-        w[c + m.STEP] = w[c + m.FIXED]
+        w[m.CONTROL.step(h)] = w[m.CONTROL.fixed(h)]
         n[m.FRESH] = 0
         begin(h, f, w, n)
         return True
@@ -58,12 +58,12 @@ def make_step_control(
     @kernel
     def next_step(h, w, n, step, norm):
         """All steps are alike."""
-        return w[h[m.CONTROL] + m.FIXED]
+        return w[m.CONTROL.fixed(h)]
 
     @kernel
     def choose_step(h, w, t):
         """Length of the step to try from t: as given, unless a singular pose is ahead."""
-        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, 1.0)
+        return steer(h, w, t, w[m.CONTROL.step(h)], gap, 1.0)
 
     error_norm = no_error if method.stability is None else no_error_with_scales
     return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)

@@ -99,7 +99,7 @@ def parameter(solver: Any) -> float:
 @kernel
 def coefficients(h, w):
     """alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
-    r = w[h[m.CONTROL] + m.PARAMETER]
+    r = w[m.CONTROL.parameter(h)]
     alpha_m, alpha_f = (2.0 * r - 1.0) / (r + 1.0), r / (r + 1.0)
     gamma = 0.5 - alpha_m + alpha_f
     return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
@@ -200,11 +200,11 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     def begin(h, f, w, n):
         """Accelerations at their own time, from a look ahead along the tangent."""
         alpha_m, alpha_f, _, _ = coefficients(h, w)
-        o, size, first, step = h[m.MEMORY], h[m.NY], slope(h, 0), w[h[m.CONTROL] + m.STEP]
+        o, size, first, step = h[m.MEMORY], h[m.NY], slope(h, 0), w[m.CONTROL.step(h)]
         ahead = slope(h, ITERATE)
         for c in range(size):
             w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step * w[first + c]
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], ahead)
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + step, h[m.Y_STAGE], ahead)
         n[m.EVALUATIONS] += 1
         seen = n[m.EVALUATION] == m.OK and finite(h, w, ahead)
         for c in range(size):
@@ -251,7 +251,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
         alpha_m, alpha_f, _, _ = coefficients(h, w)
         nq, old, start, end = h[m.NQ], vector(h, RESCALED), slope(h, 0), slope(h, ITERATE)
         place_end(h, w, step, h[m.Y_NEW])
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], end)
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + step, h[m.Y_NEW], end)
         n[m.EVALUATIONS] += 1
         for i in range(n_rates(h)):
             first, last = w[start + nq + i], w[end + nq + i]
@@ -273,7 +273,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             for i in range(n_rates(h)):
                 w[vector(h, NEW) + i] += w[left + i]
             norm = rates_norm(h, w, step, left)
-            verdict = converged(k, norm, last_norm, w[h[m.CONTROL] + m.RTOL])
+            verdict = converged(k, norm, last_norm, w[m.CONTROL.rtol(h)])
             if verdict != 0:
                 return k + 1 if verdict > 0 else 0
             last_norm = norm
@@ -298,7 +298,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
     @kernel
     def iterate_damped(h, f, w, n, step):
         """Damped Newton iterations with a new matrix each: for friction that saturates within a step."""
-        t, enough = w[h[m.CONTROL] + m.TIME] + step, limit(w[h[m.CONTROL] + m.RTOL])
+        t, enough = w[m.CONTROL.time(h)] + step, limit(w[m.CONTROL.rtol(h)])
         correction = vector(h, CORRECTION)
         if not residual(h, f, w, n, step):
             return False
@@ -326,7 +326,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
         o = h[m.MEMORY]
         for _ in range(2):
             fresh = w[o + JACOBIAN_HOLDS] == 0.0
-            if fresh and not jacobian(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], slope(h, 0)):
+            if fresh and not jacobian(h, f, w, n, w[m.CONTROL.time(h)], h[m.Y], slope(h, 0)):
                 return False
             if w[o + FACTORED_STEP] != step and not factorise(h, w, step):
                 return False
@@ -338,7 +338,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             w[o + JACOBIAN_HOLDS] = 0.0
             if fresh:
                 break
-        if w[h[m.CONTROL] + m.FIXED] > 0.0:
+        if w[m.CONTROL.fixed(h)] > 0.0:
             predict(h, w, step)
             return iterate_damped(h, f, w, n, step)
         return False

@@ -24,7 +24,7 @@ def set_error_scales(h, f, w, y):
         g = scales + m.GROUPS.group(h, c)
         w[g] += 0.5 * (w[y + c] ** 2 + w[o + c] ** 2)
     for g in range(h[m.N_GROUPS]):
-        w[scales + g] = w[h[m.CONTROL] + m.RTOL] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[scales + g]))
+        w[scales + g] = w[m.CONTROL.rtol(h)] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[scales + g]))
 
 
 @kernel

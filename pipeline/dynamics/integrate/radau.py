@@ -264,7 +264,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             y = w[h[m.Y] + k]
             w[h[m.Y_STAGE] + k] = y + PERTURBATION * (f[m.FLOORS.row(h, m.GROUPS.group(h, k))] + abs(y))
             change = w[h[m.Y_STAGE] + k] - y
-            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
+            evaluate(h, f, w, n, w[m.CONTROL.time(h)], h[m.Y_STAGE], near)
             n[m.EVALUATIONS] += 1
             if n[m.EVALUATION] != m.OK:
                 return False
@@ -284,7 +284,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             for i in range(3):
                 for c in range(size):
                     w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + w[stage_vector(h, Z, i) + c]
-                t = w[h[m.CONTROL] + m.TIME] + C[i] * step
+                t = w[m.CONTROL.time(h)] + C[i] * step
                 evaluate(h, f, w, n, t, h[m.Y_STAGE], slope(h, i + 1))
                 n[m.EVALUATIONS] += 1
                 if n[m.EVALUATION] != m.OK:
@@ -294,7 +294,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             solve_complex(h, w, stage_vector(h, CORRECTION, 1), stage_vector(h, CORRECTION, 2))
             norm = correct(h, w)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = converged(k, norm, last_norm, w[h[m.CONTROL] + m.RTOL])
+            verdict = converged(k, norm, last_norm, w[m.CONTROL.rtol(h)])
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm
@@ -330,7 +330,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         if norm > 1.0:
             for c in range(h[m.NY]):
                 w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + w[out + c]
-            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
+            evaluate(h, f, w, n, w[m.CONTROL.time(h)], h[m.Y_STAGE], near)
             n[m.EVALUATIONS] += 1
             if n[m.EVALUATION] == m.OK and finite(h, w, near):
                 norm = estimate(h, w, step, near)

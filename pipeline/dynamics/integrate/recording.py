@@ -50,7 +50,7 @@ def make_record_outputs(extend: Callable, interpolate: Callable) -> Callable:
     @kernel
     def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
         """Snapshots at the output times up to t_end, from the dense output, which may be ready."""
-        t = w[h[m.CONTROL] + m.TIME]
+        t = w[m.CONTROL.time(h)]
         while n[m.NEXT_OUTPUT] < outputs.shape[0] and outputs[n[m.NEXT_OUTPUT]] <= t_end:
             t_output = outputs[n[m.NEXT_OUTPUT]]
             if t_output > t:

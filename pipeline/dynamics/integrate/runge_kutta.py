@@ -31,7 +31,7 @@ def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray)
                 k = slope(h, j)
                 for c in range(size):
                     w[stage_y + c] += weight * w[k + c]
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + C[i] * step, stage_y, slope(h, i))
+        evaluate(h, f, w, n, w[m.CONTROL.time(h)] + C[i] * step, stage_y, slope(h, i))
         n[m.EVALUATIONS] += 1
 
     @kernel

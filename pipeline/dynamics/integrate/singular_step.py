@@ -35,17 +35,16 @@ A_LITTLE = 1e-4
 @kernel
 def note(h, w):
     """Remember how independent the closure rows are in the state just evaluated."""
-    w[h[m.CONTROL] + m.SIGMA] = np.sqrt(max(w[h[m.PIVOT] + m.LAST_PIVOT], 0.0))
+    w[m.CONTROL.sigma(h)] = np.sqrt(max(w[h[m.PIVOT] + m.LAST_PIVOT], 0.0))
 
 
 @kernel
 def forget(h, w, t):
     """Begin anew at time t, with no singular pose in sight."""
-    c = h[m.CONTROL]
-    w[c + m.PAST_SIGMA], w[c + m.PAST_TIME] = w[c + m.SIGMA], t
-    w[c + m.PASS_TIME], w[c + m.STRADDLING] = NEVER, 0.0
-    blind = w[c + m.SIGMA] > 0.0 and w[c + m.SIGMA] ** 2 < BLIND
-    w[c + m.BLIND_STEPS] = w[c + m.BLIND_STEPS] + 1.0 if blind else 0.0
+    w[m.CONTROL.past_sigma(h)], w[m.CONTROL.past_time(h)] = w[m.CONTROL.sigma(h)], t
+    w[m.CONTROL.pass_time(h)], w[m.CONTROL.straddling(h)] = NEVER, 0.0
+    blind = w[m.CONTROL.sigma(h)] > 0.0 and w[m.CONTROL.sigma(h)] ** 2 < BLIND
+    w[m.CONTROL.blind_steps(h)] = w[m.CONTROL.blind_steps(h)] + 1.0 if blind else 0.0
 
 
 @kernel
@@ -66,14 +65,13 @@ def compose(evaluate: Callable) -> Callable:
 
         Roughly from both ends; when that is near, from the slope at t, by one evaluation a little earlier.
         """
-        c = h[m.CONTROL]
-        sigma, past, span = w[c + m.SIGMA], w[c + m.PAST_SIGMA], t - w[c + m.PAST_TIME]
-        straddled = w[c + m.STRADDLING] > 0.0
+        sigma, past, span = w[m.CONTROL.sigma(h)], w[m.CONTROL.past_sigma(h)], t - w[m.CONTROL.past_time(h)]
+        straddled = w[m.CONTROL.straddling(h)] > 0.0
         forget(h, w, t)
         if straddled or not sigma < past:
             return
         rough = sigma * span / (past - sigma)
-        if rough > CLOSELY * max(span, w[c + m.STEP]):
+        if rough > CLOSELY * max(span, w[m.CONTROL.step(h)]):
             return
         back = A_LITTLE * min(span, rough)
         for k in range(h[m.NY]):
@@ -81,10 +79,10 @@ def compose(evaluate: Callable) -> Callable:
         evaluate(h, f, w, n, t - back, h[m.Y_STAGE], h[m.Y_NEW])
         n[m.EVALUATIONS] += 1
         note(h, w)
-        fall = w[c + m.SIGMA] - sigma
-        w[c + m.SIGMA] = sigma
+        fall = w[m.CONTROL.sigma(h)] - sigma
+        w[m.CONTROL.sigma(h)] = sigma
         if n[m.EVALUATION] == m.OK and fall > 0.0:
-            w[c + m.PASS_TIME] = t + zero_ahead(sigma, fall / back, past, span)
+            w[m.CONTROL.pass_time(h)] = t + zero_ahead(sigma, fall / back, past, span)
 
     return foresee
 
@@ -95,11 +93,10 @@ def steer(h, w, t, step, gap, stretch):
 
     stretch: how much longer than `step` it may be for that.
     """
-    c = h[m.CONTROL]
-    ahead = w[c + m.PASS_TIME] - t
-    w[c + m.STRADDLING] = 0.0
+    ahead = w[m.CONTROL.pass_time(h)] - t
+    w[m.CONTROL.straddling(h)] = 0.0
     if ahead <= stretch * gap * step:
-        w[c + m.STRADDLING] = 1.0
+        w[m.CONTROL.straddling(h)] = 1.0
         return ahead / gap
     return min(step, max(ahead - MARGIN * gap * step, 0.0))
 
@@ -107,7 +104,7 @@ def steer(h, w, t, step, gap, stretch):
 @kernel
 def plan(h, w, step, following):
     """The step to try next; one that was cut short for a singular pose says little about how long it may be."""
-    planned = h[m.CONTROL] + m.STEP
+    planned = m.CONTROL.step(h)
     least = w[planned] if step < CUT * w[planned] else 0.0
     w[planned] = max(following, least)
 
@@ -115,10 +112,10 @@ def plan(h, w, step, following):
 @kernel
 def allowed(h, w):
     """Largest error norm with which the present step is accepted."""
-    return BLURRED if w[h[m.CONTROL] + m.STRADDLING] > 0.0 else 1.0
+    return BLURRED if w[m.CONTROL.straddling(h)] > 0.0 else 1.0
 
 
 @kernel
 def near(h, w, t):
     """Whether a singular pose is so near that the closures must be closed to rounding."""
-    return w[h[m.CONTROL] + m.PASS_TIME] - t < CLOSELY * w[h[m.CONTROL] + m.STEP]
+    return w[m.CONTROL.pass_time(h)] - t < CLOSELY * w[m.CONTROL.step(h)]

@@ -82,14 +82,14 @@ def make_advance(
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
         """Whether to return now, with the reason in n[STATUS]."""
-        c, waiting = h[m.CONTROL], outputs.shape[0] - n[m.NEXT_OUTPUT]
-        if w[c + m.TIME] >= w[c + m.END]:
+        waiting = outputs.shape[0] - n[m.NEXT_OUTPUT]
+        if w[m.CONTROL.time(h)] >= w[m.CONTROL.end(h)]:
             n[m.STATUS] = m.SEGMENT_END
         elif n[m.EVALUATIONS] >= n[m.CAP]:
             n[m.STATUS] = m.CAP_REACHED
         elif n[m.EVALUATIONS] >= n[m.BUDGET]:
             n[m.STATUS] = m.PAUSED
-        elif w[c + m.BLIND_STEPS] > MOST_BLIND:
+        elif w[m.CONTROL.blind_steps(h)] > MOST_BLIND:
             n[m.STATUS] = m.AT_SINGULAR
         elif w[h[m.PIVOT] + m.LAST_PIVOT] < w[h[m.PIVOT] + m.WANTED_PIVOT]:
             n[m.STATUS] = m.WORN_ROWS
@@ -105,7 +105,7 @@ def make_advance(
     @kernel
     def finish(h, f, w, n, t_new):
         """Slope at Y_NEW with the loops closed; False when they cannot be."""
-        c, slope = h[m.CONTROL], h[m.SLOPES] + h[m.NY] * last
+        slope = h[m.SLOPES] + h[m.NY] * last
         if not ends:
             evaluate(h, f, w, n, t_new, h[m.Y_NEW], slope)
             n[m.EVALUATIONS] += 1
@@ -114,10 +114,12 @@ def make_advance(
         if not (finite(h, w, slope) and finite(h, w, h[m.Y_NEW])):
             n[m.EVALUATION] = m.NOT_FINITE
             return False
-        w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
-        w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS]))
-        share = TIGHTLY if near(h, w, t_new) else w[c + m.RTOL]
-        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, share * w[c + m.LENGTH])
+        w[m.CONTROL.drift(h)] = max(w[m.CONTROL.drift(h)], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
+        w[m.CONTROL.rate_drift(h)] = max(
+            w[m.CONTROL.rate_drift(h)], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS])
+        )
+        share = TIGHTLY if near(h, w, t_new) else w[m.CONTROL.rtol(h)]
+        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, share * w[m.CONTROL.length(h)])
         note(h, w)
         if used > 0:
             n[m.EVALUATIONS] += used
@@ -149,31 +151,30 @@ def make_advance(
         for k in range(h[m.NY]):
             w[h[m.Y] + k] = w[h[m.Y_NEW] + k]
             w[slope + k] = w[final + k]
-        w[h[m.CONTROL] + m.TIME] = t_new
+        w[m.CONTROL.time(h)] = t_new
         keep_scales(h, w)
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
-        c = h[m.CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
-            t = w[c + m.TIME]
+            t = w[m.CONTROL.time(h)]
             if n[m.FRESH]:
                 if not first_step(h, f, w, n):
                     return
                 note(h, w)
                 forget(h, w, t)
             step = choose_step(h, w, t)
-            final = t + 1.0001 * step >= w[c + m.END]
+            final = t + 1.0001 * step >= w[m.CONTROL.end(h)]
             if final:
-                step = w[c + m.END] - t
-            if not step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
+                step = w[m.CONTROL.end(h)] - t
+            if not step > SMALLEST_STEP * max(abs(t), w[m.CONTROL.span(h)]):
                 if n[m.EVALUATION] == m.NOT_FINITE:
                     n[m.STATUS] = m.NOT_A_NUMBER
                 else:
                     n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
                 return
-            t_new = w[c + m.END] if final else t + step
+            t_new = w[m.CONTROL.end(h)] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
             if norm > allowed(h, w):
                 n[m.REJECTED] += 1
@@ -186,7 +187,7 @@ def make_advance(
             if happened < 0:
                 return
             n[m.STEPS] += 1
-            straddling = w[c + m.STRADDLING] > 0.0
+            straddling = w[m.CONTROL.straddling(h)] > 0.0
             if straddling:
                 snapshot(h, w, n, rows, t, h[m.Y])
             record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)

@@ -64,9 +64,9 @@ def make_detect_stiffness(method: Any) -> Callable:
     @kernel
     def detect_stiffness(h, w, n, step):
         """Note the step's steepness, and count the step if that limits it."""
-        rate, c = steepness(h, w, last), h[m.CONTROL]
-        w[c + m.STEEPEST] = max(w[c + m.STEEPEST], rate)
-        share = 1.0 if w[c + m.FIXED] > 0.0 else SWINGING
+        rate = steepness(h, w, last)
+        w[m.CONTROL.steepest(h)] = max(w[m.CONTROL.steepest(h)], rate)
+        share = 1.0 if w[m.CONTROL.fixed(h)] > 0.0 else SWINGING
         if rate * step > share * reach:
             n[m.STIFF_STEPS] += 1
 

@@ -170,6 +170,6 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
         m.MAGNITUDE: int(h[m.N_GROUPS]),
         m.CORRECTION: nv,
         m.LATCHED: contacts,
-        m.CONTROL: m.N_CONTROLS,
+        m.CONTROL.place: m.CONTROL.size,
     }
     return dict(sorted(lengths.items()))

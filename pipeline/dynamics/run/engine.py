@@ -85,6 +85,11 @@ class Engine:
         """Rows of a table of the work space with named fields, not copied, shape (count,)."""
         return m.named(table, self.view(table.place, table.size * count))
 
+    @property
+    def control(self) -> np.void:
+        """The stepper's floats with named fields, not copied."""
+        return self.table(m.CONTROL, 1)[0]
+
     def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
         """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
         if not self.attempt(y, t, repeat):

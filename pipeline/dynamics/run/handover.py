@@ -10,8 +10,8 @@ from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run.engine import Engine
 
-#: what a control float of the first method goes on as under the second
-LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
+#: control floats of the first method that go on under the second
+LASTING = ("time", "drift", "rate_drift", "steepest")
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Handover:
     """What the next method must know, copied, at the end of the last accepted step.
 
     y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers of `state`.
-    lasting: control floats LASTING.  rows, events: what was recorded.  selections: as of a trajectory.
+    lasting: control floats LASTING by name.  rows, events: what was recorded.  selections: as of a trajectory.
     """
 
     y: np.ndarray
@@ -27,7 +27,7 @@ class Handover:
     latched: np.ndarray
     watched: np.ndarray
     counters: np.ndarray
-    lasting: np.ndarray
+    lasting: dict[str, float]
     rows: np.ndarray
     events: np.ndarray
     selections: tuple[tuple[float, np.ndarray], ...]
@@ -35,7 +35,7 @@ class Handover:
     @property
     def time(self) -> float:
         """Where the next method begins [s]."""
-        return float(self.lasting[0])
+        return self.lasting["time"]
 
 
 class StiffError(SolverError):
@@ -58,7 +58,7 @@ def hand_over(
         engine.view(m.LATCHED, contacts).copy(),
         engine.view(m.WATCH.place, m.WATCH.size * contacts).copy(),
         n[m.STATUS : m.INTEGERS].copy(),
-        engine.view(m.CONTROL, m.N_CONTROLS)[LASTING],
+        {name: float(engine.control[name]) for name in LASTING},
         rows[: n[m.N_RECORDED]].copy(),
         events[: n[m.N_EVENTS]].copy(),
         tuple(selections),
@@ -75,4 +75,5 @@ def take_over(engine: Engine, left: Handover) -> None:
     engine.view(m.Y, len(left.y))[:] = left.y
     engine.view(m.LATCHED, contacts)[:] = left.latched
     engine.view(m.WATCH.place, len(left.watched))[:] = left.watched
-    engine.view(m.CONTROL, m.N_CONTROLS)[LASTING] = left.lasting
+    for name, value in left.lasting.items():
+        engine.control[name] = value

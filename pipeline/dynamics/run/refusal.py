@@ -17,12 +17,12 @@ OFTEN = 0.05
 
 def text(engine: Engine) -> str:
     """When and why the stepper stopped, in words."""
-    control, n = engine.view(m.CONTROL, m.N_CONTROLS), engine.n
+    control, n = engine.control, engine.n
     where = singular.diagnosis(engine)
     contacts = [name for name, *_ in engine.model.mechanism.contacts]
     culprit = contacts[n[m.CULPRIT]] if contacts else ""
-    fixed = f"{control[m.FIXED]:.2g} s"
-    too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
+    fixed = f"{control['fixed']:.2g} s"
+    too_long = f"the fixed step of {fixed} is too long for it, or " if control["fixed"] else ""
     unsolvable = (
         f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
@@ -32,7 +32,7 @@ def text(engine: Engine) -> str:
     reasons = {
         m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is used up ([solver.evaluations]); "
         + _why_so_many(engine, n, control),
-        m.STEP_TOO_SMALL: f"the step shrank to {control[m.STEP]:.2g} s: the motion is singular here, "
+        m.STEP_TOO_SMALL: f"the step shrank to {control['step']:.2g} s: the motion is singular here, "
         f"or stiffer than the integrator can follow ({where})",
         m.NO_START: f"the equations are singular here ({where})",
         m.NOT_A_NUMBER: f"the right-hand side is not a number here: {too_long}a force or a law overflows or "
@@ -47,7 +47,7 @@ def text(engine: Engine) -> str:
         f"({where}): give it another motion{_other_integrator(engine)}",
         m.LOST_CLOSURE: unsolvable,
     }
-    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}"
+    return f"at t = {control['time']:.6g} s: {reasons[int(n[m.STATUS])]}"
 
 
 def _other_integrator(engine: Engine) -> str:
@@ -57,19 +57,19 @@ def _other_integrator(engine: Engine) -> str:
     return f"; or it moves on and {engine.model.scene.solver.integrator} does not get over the pose: try {DEFAULT}"
 
 
-def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
+def _why_so_many(engine: Engine, n: np.ndarray, control: np.void) -> str:
     """What used the evaluations up, and what helps."""
-    name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
+    name, done = engine.model.scene.solver.integrator, control["time"] - engine.start
     other = engine.method.traits.hands_over_to
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
     told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
     if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
         choice = f"choose an implicit integrator ({other}), or " if other else ""
         return f"{told[0]}; {stiffness(n, control)}; {choice}a larger v_static"
-    if control[m.STEEPEST] > 0.0:
-        told.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
+    if control["steepest"] > 0.0:
+        told.append(f"rates up to {control['steepest']:.2g} 1/s")
     if done > 0.0:
-        whole = n[m.EVALUATIONS] * control[m.SPAN] / done
+        whole = n[m.EVALUATIONS] * control["span"] / done
         told.append(f"at this pace the whole run takes {whole:.1g} evaluations")
     return "; ".join([*told, _remedy(steps, rejected, events, other)])
 
@@ -86,9 +86,9 @@ def _remedy(steps: int, rejected: int, events: int, other: str) -> str:
     return f"a looser rtol{implicit} or more evaluations"
 
 
-def stiffness(n: np.ndarray, control: np.ndarray) -> str:
+def stiffness(n: np.ndarray, control: np.void) -> str:
     """How many steps stability limited, and the rates that did it."""
     return (
         f"{n[m.STIFF_STEPS]} of {n[m.STEPS]} steps were limited by stability: the equations have rates up "
-        f"to {control[m.STEEPEST]:.2g} 1/s, as the slope of friction at small sliding speeds has"
+        f"to {control['steepest']:.2g} 1/s, as the slope of friction at small sliding speeds has"
     )

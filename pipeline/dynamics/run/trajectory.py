@@ -99,12 +99,12 @@ def integrate(
     run = _begin(engine, y) if left is None else _resume(engine, left)
     if left is None and engine.mobility.singular_start:
         _depart(engine, run)
-    control = engine.view(m.CONTROL, m.N_CONTROLS)
+    control = engine.control
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
-        if b <= control[m.TIME]:
+        if b <= control["time"]:
             continue
         engine.select_pieces(0.5 * (a + b))
-        control[m.END], run.n[m.FRESH] = b, 1
+        control["end"], run.n[m.FRESH] = b, 1
         if _segment(engine, run, progress, stop):
             break
     return _collect(run, control)
@@ -131,12 +131,12 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
     """Work space and record of an integration from state y at time t, nothing recorded yet."""
     model, n = engine.model, engine.n
     scene, contacts = model.scene, model.arrays.size(m.N_CONTACTS)
-    control = engine.view(m.CONTROL, m.N_CONTROLS)
+    control = engine.control
     engine.select_pieces_after(t)
-    control[:] = 0.0
-    control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
-    control[m.RTOL], control[m.LENGTH] = engine.rtol, model.mechanism.length
-    control[m.FIXED], control[m.PARAMETER] = scene.solver.step or 0.0, engine.method.parameter(scene.solver)
+    engine.view(m.CONTROL.place, m.CONTROL.size)[:] = 0.0
+    control["time"], control["span"] = t, engine.end - engine.start
+    control["rtol"], control["length"] = engine.rtol, model.mechanism.length
+    control["fixed"], control["parameter"] = scene.solver.step or 0.0, engine.method.parameter(scene.solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[n[m.MODE] :] = 0
     n[m.CAP] = scene.solver.evaluations
@@ -154,7 +154,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
 
 def _depart(engine: Engine, run: _Run) -> None:
     """Lay the way out of a singular start, and choose the closure rows at its end."""
-    n, control, first = run.n, engine.view(m.CONTROL, m.N_CONTROLS), 1
+    n, control, first = run.n, engine.control, 1
     way = depart(engine, run.rows[0, first:])
     passed = run.outputs[(run.outputs > engine.start) & (run.outputs < engine.start + way.span)]
     times = np.concatenate([[engine.start], passed, [engine.start + way.span]])
@@ -162,7 +162,7 @@ def _depart(engine: Engine, run: _Run) -> None:
     run.rows[: len(times), first:] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
     n[m.N_RECORDED], n[m.NEXT_OUTPUT] = len(times), 1 + len(passed)
     n[m.EVALUATIONS] += way.evaluations
-    control[m.TIME] = times[-1]
+    control["time"] = times[-1]
     ratio = singular.select_rows(engine, way.y, float(times[-1]))
     engine.view(m.Y, len(way.y))[:] = way.y
     engine.view(m.PIVOT, m.PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
@@ -194,12 +194,12 @@ def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.nda
 def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
     """To the end of the segment; True when it was stopped before."""
     arrays, n = engine.model.arrays, run.n
-    control = engine.view(m.CONTROL, m.N_CONTROLS)
+    control = engine.control
     while True:
         n[m.BUDGET] = n[m.EVALUATIONS] + SLICE
         engine.entry.advance(engine.h, arrays.f, run.w, n, run.outputs, run.rows, run.events)
-        t = control[m.TIME]
-        progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
+        t = control["time"]
+        progress((t - engine.start) / control["span"], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
         status = n[m.STATUS]
         if status == m.SEGMENT_END:
             return False
@@ -222,15 +222,15 @@ def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
 
 def _crawls(engine: Engine, run: _Run) -> bool:
     """Whether stability limits the steps so much that the run would take far too long."""
-    n, control = run.n, engine.view(m.CONTROL, m.N_CONTROLS)
-    if not engine.method.traits.hands_over_to or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
+    n, control = run.n, engine.control
+    if not engine.method.traits.hands_over_to or control["fixed"] or n[m.EVALUATIONS] < TRIAL:
         return False
-    done = max((control[m.TIME] - engine.start) / control[m.SPAN], 1e-12)
+    done = max((control["time"] - engine.start) / control["span"], 1e-12)
     too_many = min(HOPELESS, n[m.CAP])
     return bool(n[m.STIFF_STEPS] > refusal.STIFF_SHARE * n[m.STEPS] and n[m.EVALUATIONS] / done > too_many)
 
 
-def _collect(run: _Run, control: np.ndarray) -> Trajectory:
+def _collect(run: _Run, control: np.void) -> Trajectory:
     n = run.n
     rows = run.rows[: n[m.N_RECORDED]]
     keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
@@ -246,5 +246,5 @@ def _collect(run: _Run, control: np.ndarray) -> Trajectory:
     events = run.events[: n[m.N_EVENTS]]
     # what happens inside a step is noted when the step is done: one contact after the other
     in_order = events[np.argsort(events[:, m.EVENT.time], kind="stable")]
-    drift, rate_drift, steepest = (float(control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
+    drift, rate_drift, steepest = (float(control[name]) for name in ("drift", "rate_drift", "steepest"))
     return Trajectory(rows[keep], in_order, counters, tuple(run.selections), drift, rate_drift, steepest)
