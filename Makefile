@@ -31,11 +31,11 @@ test: $(READY) ## Tests, except those marked slow
 test-slow: $(READY) ## The tests marked slow
 	$(RUN) -m pytest -q -n auto --dist loadfile -m slow
 
-bench: $(READY) ## Benchmarks of accuracy against cost
-	$(RUN) -m benchmarks
+bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
+	$(RUN) -m benchmarks evaluation runs growth exudyn
 
 atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour; goes on where it stopped)
-	@$(RUN) -m benchmarks.stability
+	@$(RUN) -m benchmarks stability
 
 clean: ## Remove results and caches; .venv stays
 	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

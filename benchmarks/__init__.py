@@ -1,1 +1,1 @@
-"""Measurements of cost: `python -m benchmarks [group ...]`. Nothing here is cached or tested for speed."""
+"""Measurements of this program: `python -m benchmarks [FAMILY ...]`; `--list` says what there is."""

@@ -1,4 +1,4 @@
-"""`python -m benchmarks [group ...]`: measure, print tables, append to the log, write docs/benchmarks.md."""
+"""``python -m benchmarks [FAMILY ...]``: measure, log, and write the pages of docs/ that show it."""
 
 from __future__ import annotations
 
@@ -6,44 +6,134 @@ from __future__ import annotations
 import pipeline  # noqa: F401  isort: skip
 
 import argparse
+import os
 import sys
-from importlib import import_module
+import time
+from dataclasses import replace
+from fnmatch import fnmatch
+from importlib.util import find_spec
+from pathlib import Path
 
-from benchmarks import log, page
-from pipeline.core.errors import FlexclearError
+from benchmarks import families, log, page
+from benchmarks.family import WRONG, Case, Family, Record
+from pipeline.core.errors import FlexclearError, InputError
+from pipeline.core.registry import suggestion
+from pipeline.core.workflow.progress import Monitor, duration
+from pipeline.post.plotting.table import pipe_table
+from stages.__main__ import INTERRUPTED
 
 
-def main() -> int:
-    """Run the groups asked for; exit code as of the command `flexclear`."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What things cost, and against what.")
-    parser.add_argument("groups", nargs="*", metavar="GROUP", help=f"some of {', '.join(page.GROUPS)}; default: all")
-    parser.add_argument("--dry", action="store_true", help="print only; leave log and page alone")
-    options = parser.parse_args()
-    unknown = [name for name in options.groups if name not in page.GROUPS]
-    if unknown:
-        parser.error(f"no group is called {', '.join(unknown)}; known: {', '.join(page.GROUPS)}")
+def main(arguments: list[str] | None = None) -> int:
+    """Do what the options say; exit code as of the command `flexclear`, and 1 when a case went wrong."""
+    options = _parser().parse_args(arguments)
     try:
-        for group in options.groups or page.GROUPS:
-            _run(group, options.dry)
+        chosen = {name: page.named(name) for name in options.families or families.NAMES}
+        if options.list:
+            print(_listed(chosen))
+            return 0
+        if options.page:
+            _write({family.page for family in chosen.values()}, options)
+            return 0
+        return int(any([_run(name, family, options) for name, family in chosen.items()]))
     except FlexclearError as error:
-        print(error, file=sys.stderr)
+        print(f"benchmarks: {error}", file=sys.stderr)
         return error.exit_code
-    return 0
+    except KeyboardInterrupt:
+        print("\nbenchmarks: interrupted; cases that were finished are kept", file=sys.stderr)
+        return INTERRUPTED
 
 
-def _run(group: str, dry: bool) -> None:
-    module = import_module(f"benchmarks.{page.GROUPS[group]}")
-    results = []
-    for result in module.measure():
-        results.append(result)
-        print(".", end="", file=sys.stderr, flush=True)
-    print(file=sys.stderr)
-    if not results:
-        return
-    print(f"{module.TITLE}\n\n{module.show(results)}\n", flush=True)
-    if not dry:
-        log.append(group, results)
-        page.write()
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="What this program costs, and holds.")
+    parser.add_argument("families", nargs="*", metavar="FAMILY", help=f"{', '.join(families.NAMES)}; default: all")
+    parser.add_argument("--list", action="store_true", help="what there is, how long it takes; measure nothing")
+    parser.add_argument("--page", action="store_true", help="only write the pages again from the log")
+    parser.add_argument("--only", action="append", metavar="PATTERN", help="only cases of such names (may be repeated)")
+    parser.add_argument("--dry", action="store_true", help="print only; leave log and pages alone")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, metavar="N", help="processes; default: all")
+    parser.add_argument("--trust", action="store_true", help="keep what finished with older sources")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=N", help="other settings; see --list")
+    parser.add_argument("--into", type=Path, metavar="FOLDER", help="write log and pages there, not in this project")
+    return parser
+
+
+def _listed(chosen: dict[str, Family]) -> str:
+    rows = []
+    for name, family in chosen.items():
+        settings = ", ".join(f"{key}={value}" for key, value in family.settings.items())
+        count = str(len(family.cases(**family.settings)))
+        rows.append((name, family.what, count, family.takes, f"docs/{family.page}", settings))
+    return pipe_table(("family", "what it measures", "cases", "takes", "page", "settings"), rows)
+
+
+def _run(name: str, family: Family, options: argparse.Namespace) -> bool:
+    """Measure a family, print and log what was found; whether a case went wrong."""
+    settings = _settings(name, family, options)
+    if family.needs is not None and not _installed(family.needs[0]):
+        library, extra = family.needs
+        print(f"{name}: {library} is not installed; .venv/bin/python -m pip install -e '.[{extra}]' brings it")
+        return False
+    every = family.cases(**settings)
+    cases = [case for case in every if any(fnmatch(case.name, pattern) for pattern in options.only or ["*"])]
+    if not cases:
+        known = suggestion(options.only[0], [case.name for case in every])
+        raise InputError(f"--only {options.only[0]}", f"no case of {name} has such a name", known)
+    memory = log.Memory(name, family, trusting=options.trust)
+    found = _measured(name, family, cases, memory, options.jobs)
+    records = [record for case in cases for record in found[case.name]]
+    shown = family.show(records)
+    print(shown if isinstance(shown, str) else "\n\n".join(shown.values()), end="\n\n", flush=True)
+    if not options.dry:
+        session = replace(log.today(), records=records)
+        log.append(_logs(options) / f"{name}.jsonl", session, history=family.times)
+        _write({family.page}, options)
+    memory.forget(cases)
+    return any(record.get("verdict") == WRONG for record in records)
+
+
+def _measured(name: str, family: Family, cases: list[Case], memory: log.Memory, jobs: int) -> dict[str, list[Record]]:
+    """Records by case; what is known is not measured again."""
+    found = {case.name: known for case in cases if (known := memory.recall(case)) is not None}
+    todo = [case for case in cases if case.name not in found]
+    say, begun = Monitor().say, time.monotonic()
+    say(f"{name}: {len(found)} of {len(cases)} cases are known, {len(todo)} to measure; takes {family.takes}")
+    digits = log.DIGITS if family.times else None
+    for done, (case, records) in enumerate(family.measure(todo, jobs) if todo else (), start=1):
+        found[case.name] = log.plain([{"case": case.name, **record} for record in records], digits)
+        memory.learn(case, found[case.name])
+        told = "".join(f" {record[key]}" for record in records for key in ("verdict", "reason") if record.get(key))
+        say(f"{name} [{done}/{len(todo)}] {case.name}:{told} after {duration(time.monotonic() - begun)}")
+    return found
+
+
+def _settings(name: str, family: Family, options: argparse.Namespace) -> dict[str, int]:
+    """Settings of a family with those that were asked for; others than its own go into a folder of their own."""
+    found = dict(family.settings)
+    for text in options.set:
+        key, _, value = text.partition("=")
+        if key not in found or not value.isdecimal():
+            known = ", ".join(f"{key}=N" for key in found) or "it has none"
+            raise InputError(f"--set {text}", f"is no setting of {name}", f"known: {known}")
+        found[key] = int(value)
+    if found != family.settings and options.into is None and not options.dry:
+        raise InputError("--set", "would put other cases in the place of those of this project", "say --into FOLDER")
+    return found
+
+
+def _installed(library: str) -> bool:
+    try:
+        return find_spec(library) is not None
+    except ValueError:  # its import is blocked
+        return False
+
+
+def _logs(options: argparse.Namespace) -> Path:
+    return log.FOLDER if options.into is None else options.into / "log"
+
+
+def _write(pages: set[str], options: argparse.Namespace) -> None:
+    for name in sorted(pages):
+        print(page.write(name, _logs(options), options.into or page.DOCS))
 
 
 if __name__ == "__main__":

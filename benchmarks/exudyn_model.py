@@ -1,86 +1,59 @@
-"""A scene as an Exudyn model: the same masses, frames, joints, drive laws, contact and modal invariants.
+"""A scene as an Exudyn model, and its runs: the same masses, frames, joints, drive laws, contact and modal invariants.
 
-Redundant coordinates, as Exudyn has them. Its leanest objects are taken: Euler parameters, prismatic and spherical
-joints, drives as coordinate constraints that also have a velocity level (without it only the index-3 solver works);
-legs whose drive holds them are merged into one body.
-
-What is the same: everything of rigid and flexible bodies, joints and drives (the two codes converge to one solution),
-and the normal contact force: Exudyn's Hunt-Crossley model is K d^n (1 + 3/2 (1 - e) d'/d'0), which with
-e = 1 - (1 - c_r^2)/2 is Lankarani and Nikravesh's.
-
-What differs: friction. Exudyn's built-in law is linear up to one speed and constant above; for the paper's law it is
-given the dynamic coefficient and the same slope at rest. The contact point lies half a penetration off.
+Redundant coordinates, as Exudyn has them, in its leanest objects. docs/benchmarks.md says what is the same in the two
+codes and what differs, and which settings were tried: these are the best of them.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-import sys
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.polynomial.polynomial import polyder
 
-from benchmarks import exudyn_contact
-from benchmarks.laws import derivative, holds_at_zero, joint_laws
+from benchmarks.errors import SAMPLING, Samples
+from benchmarks.exudyn_bodies import Model, add_bodies, add_rigid, load, marker, transformation
+from benchmarks.mechanisms import Mechanism, joint_laws
+from benchmarks.timing import once
 from pipeline.core.scene.clearance import ClearanceSpherical
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.drives.pieces import Piece
-from pipeline.dynamics.model.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
+from pipeline.dynamics.contact.surfaces import BallInSocket
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model.merge import Frame, frames_of, merge, start_places
 
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
 X_FROM_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 #: mass of the slide between a cylinder and a flexible rod, which a drive's marker needs, as a share of the rod's
 SLIDE_SHARE = 1e-8
-EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
+#: Newmark's method (beta 1/4, gamma 1/2) or not, and the spectral radius of generalized-alpha, by name
+METHODS = {"trapezoidal, index 2": (True, 1.0), "generalized-alpha, index 3": (False, 0.9)}
 
 
-@dataclass
-class Model:
-    """An Exudyn system under construction; bodies[i] is the object of group i, centres[i] its node's place in it."""
+@dataclass(frozen=True)
+class Outcome:
+    """One run: processor time of the solver alone [s], and what was sampled; or why it failed."""
 
-    system: Any
-    parts: Any
-    frames: dict[str, Frame]
-    groups: list[Group]
-    group_of: dict[str, int]
-    starts: list[Placement]
-    bundles: Mapping[str, xr.Dataset]
-    bodies: list[Any] = field(default_factory=list)
-    centres: list[np.ndarray] = field(default_factory=list)
-    ground_coordinate: Any = None
-
-
-def load() -> Any:
-    """The exudyn package, in its version without range checks; ImportError when it is not installed."""
-    sys.exudynFast = True  # type: ignore[attr-defined]  # how the package is told, before it is imported
-    with contextlib.redirect_stdout(io.StringIO()):  # it prints a line on import
-        import exudyn
-    return exudyn
+    seconds: float
+    samples: Samples | None
+    failure: str = ""
 
 
 def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Model:
     """The model of a scene, not yet assembled, so that sensors can be added."""
-    exudyn = load()
-    parts = import_module("exudyn.itemInterface")
+    container, parts = load().SystemContainer(), import_module("exudyn.itemInterface")
     _check(scene)
     frames = frames_of(scene, bundles)
     scene = _held_legs_merged(scene, frames)
     groups, group_of = merge(scene, frames)
-    container = exudyn.SystemContainer()
     starts = start_places(scene, groups, group_of, frames)
     model = Model(container.AddSystem(), parts, frames, groups, group_of, starts, bundles)
     model.system.variables["container"] = container  # kept alive with its system
-    model.bodies.append(model.system.AddObject(parts.ObjectGround()))
-    model.centres.append(np.zeros(3))
-    ground = model.system.AddNode(parts.NodePointGround())
-    model.ground_coordinate = model.system.AddMarker(parts.MarkerNodeCoordinate(nodeNumber=ground, coordinate=0))
-    for i, group in enumerate(groups[1:], start=1):
-        (_flexible_body if group.flexible else _rigid_body)(model, scene, i, exudyn)
+    add_bodies(model, scene)
     _joints(model, scene)
     return model
 
@@ -103,118 +76,6 @@ def _held_legs_merged(scene: Scene, frames: Mapping[str, Frame]) -> Scene:
     return scene.model_copy(update={"joint": scene.joint | held, "drive": drives})
 
 
-def _node(model: Model, place: Placement) -> Any:
-    from exudyn.utilities import RotationMatrix2EulerParameters
-
-    turned = list(RotationMatrix2EulerParameters(place.R))
-    return model.system.AddNode(model.parts.NodeRigidBodyEP(referenceCoordinates=[*place.p, *turned]))
-
-
-def _add_rigid(model: Model, place: Placement, mass: float, J: np.ndarray) -> Any:
-    inertia = [J[0, 0], J[1, 1], J[2, 2], J[1, 2], J[0, 2], J[0, 1]]
-    body = model.parts.ObjectRigidBody(mass=mass, inertia=inertia, nodeNumber=_node(model, place))
-    return model.system.AddObject(body)
-
-
-def _rigid_body(model: Model, scene: Scene, i: int, exudyn: Any) -> None:
-    mass, com, J = rigid_inertia(scene, model.groups[i], Placement())
-    model.bodies.append(_add_rigid(model, model.starts[i].of(Placement(com)), mass, J))
-    model.centres.append(com)
-
-
-def _flexible_body(model: Model, scene: Scene, i: int, exudyn: Any) -> None:
-    """Floating frame with reduced order; all its matrices are integrals that the bundle holds."""
-    name = model.groups[i].host
-    b, parts = model.bundles[name], model.parts
-    n, damping = b.sizes["mode"], scene.flexible()[name].damping or 0.0
-    if not isinstance(damping, float):
-        raise ValueError(f"[body.{name}.damping] is not one ratio for all modes")
-    zeros = [0.0] * n
-    modal = model.system.AddNode(
-        parts.NodeGenericODE2(
-            referenceCoordinates=zeros,
-            initialCoordinates=zeros,
-            initialCoordinates_t=zeros,
-            numberOfODE2Coordinates=n,
-        )
-    )
-    stiffness, mass = b["modal_stiffness"].values, float(b["mass"])
-    second = b["second_moment"].values
-    positions, basis = _frame_points(b)
-    body = parts.ObjectFFRFreducedOrder(
-        nodeNumbers=[_node(model, model.starts[i]), modal],
-        massMatrixReduced=_dense(exudyn, b["modal_mass"].values),
-        stiffnessMatrixReduced=_dense(exudyn, stiffness),
-        dampingMatrixReduced=_dense(exudyn, 2.0 * damping * np.sqrt(stiffness)),
-        modeBasis=basis,
-        referencePositions=positions,
-        mass=mass,
-        inertia=np.trace(second) * np.eye(3) - second,
-        centerOfMass=b["first_moment"].values / mass,
-        computeFFRFterms=True,
-        **_invariants(b),
-    )
-    model.bodies.append(model.system.AddObject(body))
-    model.centres.append(np.zeros(3))
-
-
-def _dense(exudyn: Any, matrix: np.ndarray) -> Any:
-    container = exudyn.MatrixContainer()
-    container.SetWithDenseMatrix(np.ascontiguousarray(matrix), useDenseMatrix=True)
-    return container
-
-
-def _invariants(b: xr.Dataset) -> dict[str, np.ndarray]:
-    """Integrals of Zwoelfer and Gerstmayr's nodal FFRF, for fields S_j and X with ~v w = v x w."""
-    S, XS, SS = (b[name].values for name in ("modal_first_moment", "position_mode_moment", "mode_mode_moment"))
-    n, e = S.shape[1], EPSILON
-    return {
-        "mPsiTildePsi": np.einsum("abc,cbij->iaj", e, SS).reshape(3 * n, n),
-        "mPsiTildePsiTilde": np.einsum("adc,dbf,cfij->iajb", e, -e, SS).reshape(3 * n, 3 * n),
-        "mPhitTPsi": S,
-        "mPhitTPsiTilde": np.einsum("abc,cj->ajb", -e, S).reshape(3, 3 * n),
-        "mXRefTildePsi": np.einsum("abc,cbj->aj", e, XS),
-        "mXRefTildePsiTilde": np.einsum("adc,dbf,cfj->ajb", e, -e, XS).reshape(3, 3 * n),
-    }
-
-
-def _frame_points(b: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Six points around each frame, 10 mm off, and their modes: a marker on them moves and turns as the frame does."""
-    arms = 0.01 * np.concatenate([np.eye(3), -np.eye(3)])
-    positions, basis = [], []
-    for k in range(b.sizes["frame"]):
-        shift, turn = b["frame_translation_shape"].values[k], b["frame_rotation_shape"].values[k]
-        for arm in arms:
-            positions.append(b["frame_position"].values[k] + arm)
-            basis.append(shift - np.cross(arm, turn, axisb=0).T)
-    return np.concatenate(positions), np.concatenate(basis)
-
-
-def marker(model: Model, frame: str, turn: np.ndarray | None = None) -> Any:
-    """A rigid marker at a frame, its axes turned by `turn` against the frame's."""
-    f = model.frames[frame]
-    i, turn = model.group_of[f.body], np.eye(3) if turn is None else turn
-    if not model.groups[i].flexible:
-        place = model.groups[i].places[f.body].of(f.place)
-        here = _transformation(place.p - model.centres[i], place.R @ turn)
-        return model.system.AddMarker(model.parts.MarkerBodyRigid(bodyNumber=model.bodies[i], localHT=here))
-    k = list(model.bundles[f.body]["frame"].values).index(frame.partition(".")[2])
-    return model.system.AddMarker(
-        model.parts.MarkerSuperElementRigid(
-            bodyNumber=model.bodies[i],
-            meshNodeNumbers=list(range(6 * k, 6 * k + 6)),
-            weightingFactors=[1.0 / 6.0] * 6,
-            localHT=_transformation(np.zeros(3), f.place.R @ turn),
-        )
-    )
-
-
-def _transformation(p: np.ndarray, R: np.ndarray) -> np.ndarray:
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = R, p
-    return result
-
-
 def _joints(model: Model, scene: Scene) -> None:
     laws = joint_laws(scene)
     add, parts = model.system.AddObject, model.parts
@@ -226,7 +87,7 @@ def _joints(model: Model, scene: Scene) -> None:
         elif joint.type == "spherical":
             add(parts.SphericalJoint(markerNumbers=[marker(model, a), marker(model, b)]))
         elif isinstance(joint, ClearanceSpherical):
-            exudyn_contact.add(model.system, parts, joint, marker(model, a), marker(model, b))
+            _contact(model, joint, marker(model, a), marker(model, b))
         elif name in laws:
             _driven(model, a, b, laws[name])
         else:
@@ -234,7 +95,7 @@ def _joints(model: Model, scene: Scene) -> None:
             add(parts.ObjectJointPrismaticX(markerNumbers=ends))
 
 
-def _driven(model: Model, a: str, b: str, law: tuple[Piece, ...]) -> None:
+def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
     """Prismatic joint with a prescribed coordinate; on a flexible rod by way of a slide of next to no mass."""
     add, parts = model.system.AddObject, model.parts
     f, g = model.frames[a], model.frames[b]
@@ -243,8 +104,8 @@ def _driven(model: Model, a: str, b: str, law: tuple[Piece, ...]) -> None:
     body, point, end = model.bodies[j], outer.p - model.centres[j], None
     if model.groups[j].flexible:
         mass = SLIDE_SHARE * float(model.bundles[g.body]["mass"])
-        body = _add_rigid(model, model.starts[i].of(inner), mass, mass * 1e-4 * np.eye(3))
-        point, turned = np.zeros(3), _transformation(np.zeros(3), X_FROM_Z)
+        body = add_rigid(model, model.starts[i].of(inner), mass, mass * 1e-4 * np.eye(3))
+        point, turned = np.zeros(3), transformation(np.zeros(3), X_FROM_Z)
         end = model.system.AddMarker(parts.MarkerBodyRigid(bodyNumber=body, localHT=turned))
         rod = marker(model, b, X_FROM_Z)
         add(parts.GenericJoint(markerNumbers=[end, rod], constrainedAxes=[1] * 6))
@@ -266,3 +127,116 @@ def _driven(model: Model, a: str, b: str, law: tuple[Piece, ...]) -> None:
             offsetUserFunction_t=lambda mbs, t, item, offset: rate(t),
         )
     )
+
+
+def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) -> None:
+    """Exudyn's contact of a ball in a hollow sphere, between markers; ValueError for laws that it does not have."""
+    restitution = joint.normal.restitution
+    if joint.normal.law != "lankarani-nikravesh" or restitution is None:
+        raise ValueError(f"no Exudyn object has the normal law '{joint.normal.law}'")
+    dynamic, linear_up_to = _friction(joint)
+    exponent, parts = joint.normal.exponent or 1.5, model.parts
+    data = model.system.AddNode(
+        parts.NodeGenericData(initialCoordinates=[joint.clearance, 0.0, 0.0, 0.0], numberOfDataCoordinates=4)
+    )
+    model.system.AddObject(
+        parts.ObjectContactSphereSphere(
+            markerNumbers=[ball, socket],
+            nodeNumber=data,
+            spheresRadii=[joint.ball_radius, joint.ball_radius + joint.clearance],
+            isHollowSphere1=True,
+            impactModel=1,
+            contactStiffness=BallInSocket.stiffness(joint, exponent),
+            contactStiffnessExponent=exponent,
+            restitutionCoefficient=1.0 - 0.5 * (1.0 - restitution**2),
+            minimumImpactVelocity=joint.floor,
+            dynamicFriction=dynamic,
+            frictionProportionalZone=linear_up_to,
+        )
+    )
+
+
+def _friction(joint: ClearanceSpherical) -> tuple[float, float]:
+    """Coefficient, and the speed [m/s] up to which Exudyn's law rises to it."""
+    law = joint.friction
+    if law is None:
+        return 0.0, 1e-3
+    if law.law == "ambrosio" and law.v0 == 0.0:
+        return law.dynamic, law.v1
+    if law.law != "modified-coulomb":
+        raise ValueError(f"no Exudyn object has the friction law '{law.law}'")
+    # the slope of mu at rest is 3/2 mu_s / v_s here and mu_d / v there
+    return law.dynamic, law.dynamic * law.v_static / (1.5 * law.static)
+
+
+def holds_at_zero(law: Pieces) -> bool:
+    """Whether the coordinate stays at zero for ever."""
+    return all(not piece.terms and not any(piece.coefficients) for piece in law.pieces)
+
+
+def derivative(law: Pieces, order: int) -> Callable[[float], float]:
+    """A derivative of a law of polynomials; at a break the later side.
+
+    Plain floats, no arrays: a peer calls it at every iteration.  ValueError for laws with harmonics.
+    """
+    if law.harmonic:
+        raise ValueError("laws with harmonics have no polynomials")
+    starts = [piece.start for piece in law.pieces]
+    falling = [polyder(piece.coefficients, order)[::-1].tolist() for piece in law.pieces]
+
+    def value(t: float) -> float:
+        k = max(bisect_right(starts, t) - 1, 0)
+        s, result = t - starts[k], 0.0
+        for c in falling[k]:
+            result = result * s + c
+        return result
+
+    return value
+
+
+def solve(here: Mechanism, body: str, method: str, step: float) -> Outcome:
+    """Run a scene in Exudyn at a fixed step; building and assembling the model is not timed."""
+    exudyn = load()
+    model = build(here.scene, here.bundles)
+    i = model.group_of[body]
+    centre = np.array(here.scene.body[body].com)  # type: ignore[union-attr]
+    place = model.groups[i].places[body]
+    sensors = [
+        model.system.AddSensor(
+            model.parts.SensorBody(
+                bodyNumber=model.bodies[i],
+                localPosition=place.p + place.R @ centre - model.centres[i],
+                outputVariableType=kind,
+                storeInternal=True,
+            )
+        )
+        for kind in (exudyn.OutputVariableType.Position, exudyn.OutputVariableType.Velocity)
+    ]
+    model.system.Assemble()
+    settings = _settings(exudyn, here.scene.time.end, method, step)
+    try:
+        seconds = once(lambda: model.system.SolveDynamic(settings))
+    except exudyn.SolverError as error:
+        return Outcome(0.0, None, str(error))
+    position, velocity = (np.array(model.system.GetSensorStoredData(s)) for s in sensors)
+    return Outcome(seconds, Samples(position[:, 0], position[:, 1:4], velocity[:, 1:4]))
+
+
+def _settings(exudyn: Any, span: float, method: str, step: float) -> Any:
+    newmark, radius = METHODS[method]
+    settings = exudyn.SimulationSettings()
+    integration = settings.timeIntegration
+    integration.numberOfSteps, integration.endTime = round(span / step), span
+    integration.minimumStepSize = 1e-12
+    integration.verboseMode = 0
+    integration.generalizedAlpha.useNewmark = integration.generalizedAlpha.useIndex2Constraints = newmark
+    integration.generalizedAlpha.spectralRadius = radius
+    integration.newton.useModifiedNewton = True
+    integration.newton.modifiedNewtonContractivity = 0.005
+    integration.newton.relativeTolerance, integration.newton.absoluteTolerance = 1e-5, 1e-7
+    integration.discontinuous.useRecommendedStepSize = False
+    settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
+    settings.parallel.numberOfThreads = 1
+    settings.solution.file.write = False
+    settings.solution.sensors.writePeriod = SAMPLING
+    return settings

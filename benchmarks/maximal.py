@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from benchmarks.laws import derivative, joint_laws
+from benchmarks.mechanisms import joint_laws
+from pipeline.core.algebra import skew
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.model.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
 
@@ -121,7 +122,7 @@ def assemble(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Maximal:
         joint_rows += len(rows)
     for name, law in drives.items():
         blocks.append(_rows(a, scene.joint[name].between, *DRIVEN[scene.joint[name].type]))
-        gammas.append(derivative(law, 2)(scene.time.start))
+        gammas.append(law.value(scene.time.start, 2))
     J = np.concatenate(blocks)
     n = a.size + len(J)
     matrix, right = np.zeros((n, n)), np.zeros(n)
@@ -152,12 +153,8 @@ def _prepare(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> _Assembly:
 def _shift(arm: np.ndarray) -> np.ndarray:
     """Twist (v, omega) at a point `arm` away from the one where it is given, shape (6, 6)."""
     result = np.eye(6)
-    result[:3, 3:] = -_cross(arm)
+    result[:3, 3:] = -skew(arm)
     return result
-
-
-def _cross(a: np.ndarray) -> np.ndarray:
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def _same_link(a: _Assembly, between: tuple[str, str]) -> bool:
@@ -179,7 +176,7 @@ def _mass(a: _Assembly, i: int) -> np.ndarray:
     body = np.zeros((6 + modes, 6 + modes))
     second, moment = b["second_moment"].values, b["position_mode_moment"].values
     body[:3, :3] = float(b["mass"]) * np.eye(3)
-    body[3:6, :3] = R @ _cross(b["first_moment"].values) @ R.T
+    body[3:6, :3] = R @ skew(b["first_moment"].values) @ R.T
     body[3:6, 3:6] = R @ (np.trace(second) * np.eye(3) - second) @ R.T
     body[6:, :3] = (R @ b["modal_first_moment"].values).T
     # int rho X x S_j, component a: sum of eps_abc X_b S_cj

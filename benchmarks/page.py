@@ -1,47 +1,137 @@
-"""docs/benchmarks.md from the last log lines: `python -m benchmarks.page`."""
+"""The pages of docs/ that hold measurements: what stands between two marks of a page is written from the log.
+
+    <!-- begin growth -->      until <!-- end growth -->: what that family shows, or one part of it by name
+    <!-- begin measured -->    until <!-- end measured -->: when, and on what machine; nothing else says that
+
+Everything else on a page is written by hand, and stays.
+"""
 
 from __future__ import annotations
 
-from importlib import import_module
+import io
+import re
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from benchmarks.log import LOG, latest
+from benchmarks import families, log
+from benchmarks.family import Family, Record
+from benchmarks.log import Session
+from pipeline.core.errors import InputError
+from pipeline.core.registry import lookup
+from pipeline.core.workflow.fingerprint import TREE
+from pipeline.post.plotting.table import pipe_table
 
-PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
-#: groups in the order in which they run and are shown, and the module of each
-GROUPS = {"evaluation": "evaluation", "runs": "runs", "growth": "growth", "exudyn": "peer"}
-HEAD = """# Benchmarks
-
-Written by `python -m benchmarks` from `benchmarks/log.jsonl`; do not edit. `make bench` measures everything again,
-`python -m benchmarks GROUP ...` some of it: {groups}.
-
-All times are processor time on one thread, warm (kernels compiled, bundles made). What is compared is measured in
-turns; ratios are medians of the ratios of neighbours. "± x %" is half the range of the middle half of the repeats.
-"""
+DOCS = TREE / "docs"
+#: what stands where nothing was measured
+NOTHING = "Not measured."
 
 
-def write(log: Path = LOG, page: Path = PAGE) -> None:
-    """Write the page; groups that were never measured are left out."""
-    page.write_text(text(latest(log)))
+def named(name: str) -> Family:
+    """The family of a name; InputError, with those there are, for any other."""
+    found: Family = lookup(families.__name__, name, where="python -m benchmarks")
+    return found
 
 
-def text(lines: dict[str, dict[str, Any]]) -> str:
-    """The page of the log lines of some groups."""
-    sections = [HEAD.format(groups=", ".join(f"`{name}`" for name in GROUPS))]
-    for group in GROUPS:
-        if group in lines:
-            sections.append(_section(group, lines[group]))
-    return "\n".join(sections)
+def of_page(page: str) -> dict[str, Family]:
+    """Families by name whose measurements are on a page."""
+    return {name: family for name in families.NAMES if (family := named(name)).page == page}
 
 
-def _section(group: str, line: dict[str, Any]) -> str:
-    module = import_module(f"benchmarks.{GROUPS[group]}")
-    what = "\n\n".join((m.__doc__ or "").strip() for m in (module, *getattr(module, "EXPLAINED_BY", ())))
-    versions = ", ".join(f"{name} {number}" for name, number in line["versions"].items())
-    where = f"Measured {line['date']} on {line['cpu']}; {versions}."
-    return f"## {module.TITLE}\n\n{what}\n\n{where}\n\n{module.show(line['results'])}\n"
+def write(page: str, logs: Path = log.FOLDER, into: Path = DOCS) -> Path:
+    """Write a page, and what stands beside it, from the logs in a folder; returns the page."""
+    (into / page).parent.mkdir(parents=True, exist_ok=True)
+    (into / page).write_text(text(page, logs))
+    for path, content in beside(page, logs).items():
+        (into / path).parent.mkdir(parents=True, exist_ok=True)
+        (into / path).write_bytes(content)
+    return into / page
 
 
-if __name__ == "__main__":
-    write()
+def text(page: str, logs: Path = log.FOLDER) -> str:
+    """A page with the lines between its marks from the logs."""
+    parts = dict[str, str]()
+    sessions = {name: log.latest(logs / f"{name}.jsonl") for name in of_page(page)}
+    for name, family in of_page(page).items():
+        if sessions[name]:
+            shown = family.show(records(sessions[name]))
+            parts |= {name: shown} if isinstance(shown, str) else {f"{name} {part}": of for part, of in shown.items()}
+    parts["measured"] = where({name: of for name, of in sessions.items() if of})
+    return filled((DOCS / page).read_text(), parts, f"docs/{page}")
+
+
+def beside(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:
+    """What stands beside a page, by path below docs/."""
+    found: dict[str, bytes] = {}
+    for name, family in of_page(page).items():
+        if sessions := log.latest(logs / f"{name}.jsonl"):
+            found |= family.files(records(sessions))
+    return found
+
+
+def records(sessions: list[Session]) -> list[Record]:
+    """The measurements of some sessions."""
+    return [record for session in sessions for record in session.records]
+
+
+def filled(page: str, parts: Mapping[str, str], place: str) -> str:
+    """A page with other text between its marks; InputError where a part has no place on it."""
+    found = re.split(r"<!-- begin (.+?) -->\n.*?<!-- end \1 -->\n", page, flags=re.DOTALL)
+    if missing := sorted(parts.keys() - set(found[1::2])):
+        marks = " and ".join(f"<!-- {word} {missing[0]} -->" for word in ("begin", "end"))
+        raise InputError(place, f"has no place for '{missing[0]}'", f"write {marks}")
+    for k, name in enumerate(found[1::2]):
+        found[2 * k + 1] = f"<!-- begin {name} -->\n\n{parts.get(name, NOTHING).strip()}\n\n<!-- end {name} -->\n"
+    return "".join(found)
+
+
+def where(measured: Mapping[str, list[Session]]) -> str:
+    """Date and machine of a page's measurements: once, if they are the same, else once for each."""
+    told: dict[str, list[str]] = {}
+    for name, sessions in measured.items():
+        for session in sessions:
+            part = (
+                name
+                if len(sessions) == 1
+                else f"{name} ({', '.join(dict.fromkeys(r['case'] for r in session.records))})"
+            )
+            told.setdefault(_session(session), []).append(part)
+    if len(told) == 1:
+        return f"Measured {next(iter(told))}."
+    return "Measured:\n\n" + "\n".join(f"- {', '.join(parts)}: {session}" for session, parts in told.items())
+
+
+def _session(session: Session) -> str:
+    versions = "".join(f", {name} {number}" for name, number in session.versions.items())
+    machine = f"{session.measured} on {session.cpu or 'a machine that nobody noted'}{versions}"
+    return f"{machine} ({session.note})" if session.note else machine
+
+
+def table(records: Iterable[Record], columns: Mapping[str, Callable[[Record], str]]) -> str:
+    """A row for each record, and for each column its heading and the cell of a record."""
+    return pipe_table(tuple(columns), [[cell(record) for cell in columns.values()] for record in records])
+
+
+def spread(time: Mapping[str, float], unit: str, digits: int) -> str:
+    """A time of the log, and half the range of the middle half of its repeats."""
+    return f"{time[unit]:.{digits}f} ± {percent(time['spread'])}"
+
+
+def percent(share: float) -> str:
+    """A share with one digit after the point."""
+    return f"{100 * share:.1f} %"
+
+
+def short(value: float) -> str:
+    """Three digits, without an exponent where it is readable without."""
+    return f"{value:.3g}" if value == 0.0 or 1e-3 <= abs(value) < 1e4 else f"{value:.1e}"
+
+
+def png(figure: Any, **how: Any) -> bytes:
+    """A figure of matplotlib as a file; without the version that drew it, so that equal records give equal bytes."""
+    from matplotlib import pyplot as plt
+
+    file = io.BytesIO()
+    figure.savefig(file, metadata={"Software": None}, **how)
+    plt.close(figure)
+    return file.getvalue()

@@ -12,12 +12,13 @@ from pipeline.core.workflow.task import Task
 from stages import cost_design, cost_peers, kernels, run, s4_simulate
 from stages.cost_peers import Track
 from stages.graph import Graph
-from stages.run import Workplace, check
+from stages.run import Workplace, bundles, check
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.scene.schema import Scene
+    from pipeline.post.cost.page import Studied
 
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
@@ -100,36 +101,41 @@ def bring(
     return place.store.load(outcome.records[id(task)]), place.store.root / task.folder
 
 
+def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
+    """What a page says of a scene, and the files of its pictures, by path relative to the page.
+
+    study, folder: as `bring` returned them.  pictures: folder for them beside the page.
+    """
+    from pipeline.post.cost.page import Studied, advice
+
+    tables = tuple((folder / file).read_text() for file in PRINTED if (folder / file).is_file())
+    files = {stem: folder / f"{stem}.png" for stem in FIGURES}
+    shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem, file in files.items() if file.is_file()}
+    said = Studied(name, advice(study, tables), tables, {FIGURES[stem]: path for stem, path in shown.items()})
+    return said, {path: files[stem] for stem, path in shown.items()}
+
+
 def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
     """The page on accuracy, with its pictures in a folder of its name beside it.
 
     studies: what `bring` returned, by scene.  options: what else the command was told.
     """
-    from pipeline.post.cost.page import Studied, markdown
+    from pipeline.post.cost.page import markdown
 
-    pictures = page.parent / page.stem
-    pictures.mkdir(parents=True, exist_ok=True)
+    (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
     found = []
     for name, (study, folder) in studies.items():
-        shown = {}
-        for stem, title in FIGURES.items():
-            if (folder / f"{stem}.png").is_file():
-                target = pictures / f"{name.replace('/', '_')}_{stem}.png"
-                target.write_bytes((folder / f"{stem}.png").read_bytes())
-                shown[title] = f"{pictures.name}/{target.name}"
-        tables = tuple((folder / f).read_text() for f in PRINTED if (folder / f).is_file())
-        found.append(Studied(name, study, tables, shown))
+        said, pictures = told(name, study, folder, page.stem)
+        found.append(said)
+        for path, file in pictures.items():
+            (page.parent / path).write_bytes(file.read_bytes())
     page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"))
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:
     """The highest frequency in the scene's bundles [Hz]; they are made first."""
-    bundles = list(Graph(scene).bundle.values())
-    if not bundles:
-        return None
-    outcome = place.bring(bundles)
-    check(outcome)
-    return max(float(place.store.load(outcome.records[id(task)])["frequency"].max()) for task in bundles)
+    found = bundles(scene, place, jobs=None)
+    return max((float(bundle["frequency"].max()) for bundle in found.values()), default=None)
 
 
 def _kernels(designs: list[cost_design.Design]) -> dict[tuple[str, ...], Task]:

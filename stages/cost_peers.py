@@ -19,7 +19,7 @@ def read(path: Path) -> dict[str, list[Track]]:
     try:
         table = json.loads(path.read_text())
     except (OSError, ValueError) as error:
-        raise InputError(f"--peer {path}", f"cannot be read: {error}", "benchmarks.peer_points writes one") from None
+        raise InputError(f"--peer {path}", f"cannot be read: {error}", "docs/accuracy/exudyn.json is one") from None
     if not isinstance(table, dict):
         raise InputError(f"--peer {path}", "expected a table of scenes")
     return {

@@ -50,7 +50,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     kept = quantities.keep(done, chosen)
     kept["cpu_repeat"] = (("repeat",), seconds, {"units": "s", "long_name": "processor time of a warm run"})
-    costs = {"evaluations": done.attrs["evaluations"], "peak_memory": _memory()}
+    costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
     return {"nc": kept.assign_attrs(**costs, **_twin(done), **_contacts(scene))}
 
@@ -86,7 +86,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
 
 
-def _memory() -> int:
+def peak_memory() -> int:
     """Largest resident memory of this process so far [B]."""
     import resource
     import sys

@@ -111,12 +111,28 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
 
 
+def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
+    """The reduced flexible bodies of a scene by name, brought up to date.
+
+    jobs: as of `Workplace.bring`; one is this process, since workers would run a caller's script again from its top.
+    Raises FlexclearError.
+    """
+    place, graph = place or workplace(), Graph(scene, shown=False)
+    outcome = place.bring(list(graph.bundle.values()), jobs)
+    check(outcome)
+    return _loaded(graph, place, outcome)
+
+
+def _loaded(graph: Graph, place: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
+    return {body: place.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
+
+
 def deficits(graph: Graph, place: Workplace, outcome: Outcome) -> str:
     """What the scene's bundles lack, one table for each flexible body."""
     from pipeline.core.artifacts.deficits import table
 
-    bundles = {body: place.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
-    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in bundles.items())
+    found = _loaded(graph, place, outcome)
+    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in found.items())
 
 
 def linear(

@@ -31,12 +31,12 @@ def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
-    from pipeline.structure import modes
     from pipeline.structure.modes import paraview
     from pipeline.structure.modes.select import Wanted
+    from pipeline.structure.modes.solution import solve
 
     count = params.get("count")
-    result = modes.solve(
+    result = solve(
         inputs["mesh"],
         params["reference"],
         interfaces=params.get("interfaces"),

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from benchmarks.family import Record as Row
 from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
 
-Row = dict[str, Any]
 #: two answers agree, or one is right, when they differ by less than this share of the effect in question
 AGREE = 0.1
 #: an effect is small beside another below this share of it
@@ -64,6 +63,12 @@ class Rows:
         return min((r for r in getattr(self, group) if r["condition"] == condition), key=lambda r: r["count"])
 
 
+def at(rows: list[Row], place: int, condition: str, count: int = 0) -> Row:
+    """The row of a condition at a place with the least count that is not below `count`."""
+    of = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition) and r.get("finer", 1) == 1]
+    return min((r for r in of if r["count"] >= count), key=lambda r: r["count"])
+
+
 def off(row: Row, full: Row) -> dict[str, float]:
     """How far the largest effects of a mode set are from those of the full rod, as shares of these."""
     return {name: abs(row[name] / full[name] - 1.0) for name in EFFECTS}
@@ -81,6 +86,17 @@ def verdicts(groups: dict[str, list[Row]]) -> list[tuple[Claim, dict[int, tuple[
             at[place] = claim.test(Rows(far, clearance))
         found.append((claim, at))
     return found
+
+
+def told(groups: dict[str, list[Row]]) -> str:
+    """Every claim with its rule and the numbers of each place."""
+    lines = []
+    for claim, outcomes in verdicts(groups):
+        lines.append(f"**{claim.paper}** {sentence(outcomes)}")
+        lines.append(f"Rule: {claim.rule[0].lower()}{claim.rule[1:]}\n")
+        lines += [f"- {place} mm: {numbers}" for place, (_, numbers) in outcomes.items()]
+        lines.append("")
+    return "\n".join(lines)
 
 
 def sentence(outcomes: dict[int, tuple[bool, str]]) -> str:

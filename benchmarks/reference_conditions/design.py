@@ -1,18 +1,24 @@
-"""What is compared: mode sets and places of the prismatic joint, and the run that a case takes."""
+"""What is compared: mode sets of the rod, places of its prismatic joint, and the runs that this takes."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
-import pipeline
+import xarray as xr
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene, read_toml
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
+from pipeline.structure.fe import mesh
+from pipeline.structure.modes.solution import solve
 from stages import s4_simulate
 from stages.graph import Graph
+from stages.run import find_scene
 
-SCENES = Path(__file__).parents[2] / "scenes" / "sps4"
 ROD = "rod1"
 #: frame of the rod that carries the prismatic joint, by its distance from the rod's lower end [mm]
 PLACES = {0: "bottom", 60: "at_60mm", 120: "at_120mm"}
@@ -67,16 +73,15 @@ def modes(case: Case) -> dict[str, Any]:
 
 def scene(case: Case) -> Scene:
     """The paper's scene with the joint at the case's place and the rod of its mode set."""
-    stem = "" if case.place == 0 else f"prismatic_{case.place}mm"
-    folder = SCENES if case.place == 0 else SCENES / "variants"
+    stem, folder = ("", "sps4") if case.place == 0 else (f"prismatic_{case.place}mm", "sps4/variants")
     if case.condition == RIGID:
         name = "_".join(part for part in (stem, "csj" if case.clearance else "") if part) or "ideal"
-        return pipeline.load_scene(folder / f"{name}.toml")
+        return load_scene(find_scene(f"{folder}/{name}"))
     name = "_".join(part for part in (stem, "far_csj_cb" if case.clearance else "far_cb") if part)
     changes: dict[str, Any] = {f"body.{ROD}.modes": modes(case)}
     if case.clearance:
         changes["ensemble.members"] = case.members
-    return pipeline.load_scene(folder / f"{name}.toml", override=changes)
+    return load_scene(find_scene(f"{folder}/{name}"), changes)
 
 
 def task(case: Case) -> Task:
@@ -100,3 +105,78 @@ def _told_apart(made: Task, case: Case) -> Task:
     """The task and its inputs under the case's name: progress is told by name, and many cases share a scene."""
     above = {name: _told_apart(task, case) for name, task in made.inputs.items()}
     return replace(made, scene=f"{made.scene}, {case.label}, elements x {case.finer}", inputs=above)
+
+
+@cache
+def rod(finer: int) -> xr.Dataset:
+    """The paper's rod in cells."""
+    recipe = read_toml(Path(scene(Case(0, FULL)).flexible()[ROD].mesh))
+    return mesh.build(recipe | {"elements": finer * recipe["elements"]})
+
+
+@cache
+def solved(case: Case) -> xr.Dataset:
+    """Modes (schema MODES) of a case; InputError for counts that cut a pair."""
+    table = modes(case)
+    count = None if table["count"] == "all" else table["count"]
+    return solve(rod(case.finer), table["reference"], count, table["interfaces"])
+
+
+@cache
+def whole(place: int, condition: str, count: int) -> int:
+    """The least whole count that is not below `count`."""
+    while True:
+        try:
+            solved(Case(place, condition, count))
+        except InputError as error:
+            if "cut a cluster" not in str(error):
+                raise
+            count += 1
+        else:
+            return count
+
+
+def whole_counts(place: int, condition: str, most: int) -> list[int]:
+    """Counts up to `most` that cut no pair."""
+    found = []
+    for count in range(1, most + 1):
+        try:
+            solved(Case(place, condition, count))
+        except InputError:
+            continue
+        found.append(count)
+    return found
+
+
+def far(places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
+    """Ideal joints: rigid, every condition, the full rod; at the first place in all counts and meshes."""
+    found = []
+    for place in places:
+        found += [Case(place, RIGID), Case(place, FULL)]
+        found += [Case(place, c, whole(place, c, COUNT)) for c in CONDITIONS]
+        found += [Case(place, c, whole(place, c, 7)) for c in ("free-free", "fixed-fixed")]
+    found += [Case(places[0], c, whole(places[0], c, n)) for c in CONDITIONS for n in FAR_COUNTS]
+    found += [Case(places[0], "craig-bampton", COUNT, finer=n) for n in FINER]
+    return list(dict.fromkeys(found))
+
+
+def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
+    """Clearance at A1: likewise, as ensembles."""
+    found = []
+    for place in places:
+        found.append((place, RIGID, COUNT))
+        sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in ("free-free", "fixed-fixed")]
+        sets += [("craig-bampton", n) for n in MOST_COMPLETE]
+        found += [(place, c, whole(place, c, n)) for c, n in sets]
+    first = places[0]
+    for condition in ("free-free", "craig-bampton"):
+        found += [(first, condition, whole(first, condition, n)) for n in CLEARANCE_COUNTS]
+    return [Case(*key, clearance=True, members=_share(members, *key[1:])) for key in dict.fromkeys(found)]
+
+
+def _share(members: int, condition: str, count: int) -> int:
+    """Members of an ensemble: fewer where a run is dear; a rigid rod has one run."""
+    if condition == RIGID:
+        return 0
+    # whole counts may lie a little above COUNT
+    return members if count < MOST_COMPLETE[0] else max(2, round(LARGE_SETS * members))

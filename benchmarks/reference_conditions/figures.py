@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -11,7 +11,9 @@ import numpy as np
 mpl.use("Agg")
 from matplotlib import pyplot as plt
 
-from benchmarks.reference_conditions.claims import Rows, off
+from benchmarks.family import Record as Row
+from benchmarks.page import png
+from benchmarks.reference_conditions.claims import Rows, at
 from benchmarks.reference_conditions.design import (
     CLEARANCE_COUNTS,
     CONDITIONS,
@@ -21,28 +23,20 @@ from benchmarks.reference_conditions.design import (
     PLACES,
     RIGID,
 )
+from benchmarks.reference_conditions.sections import far_error
 
-Row = dict[str, Any]
 COLORS = dict(zip(CONDITIONS, ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000"), strict=True))
 MARKERS = dict(zip(CONDITIONS, "osDv^", strict=True))
 #: shares of error below this are drawn at it
 FLOOR = 1e-7
 
 
-def write(rows: dict[str, list[Row]], folder: Path) -> list[str]:
-    """Write every figure whose rows are there; names of the files."""
-    found = []
-    for name, needs, draw in (
-        ("compliance", "statics", _compliance),
-        ("frequencies", "frequencies", _frequencies),
-        ("far", "far", _far),
-        ("clearance", "clearance", _clearance),
-    ):
-        if needs in rows:
-            figure = draw(rows[needs])
-            figure.savefig(folder / f"{name}.png", dpi=110, metadata={"Software": None})
-            plt.close(figure)
-            found.append(f"{name}.png")
+def files(records: Sequence[Row]) -> dict[str, bytes]:
+    """Every figure whose rows are there, by path below docs/."""
+    found = {}
+    for name, (group, draw) in FIGURES.items():
+        if rows := [r for r in records if r["case"] == group]:
+            found[f"reference-conditions/{name}.png"] = png(draw(rows), dpi=110)
     return found
 
 
@@ -91,10 +85,8 @@ def _far(rows: list[Row]) -> Any:
         line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
         style = {"color": COLORS[condition], "marker": MARKERS[condition], "label": condition}
         axes[0].semilogy([r["count"] for r in line], [_off(r, rows) for r in line], **style)
-        at = [
-            min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES
-        ]
-        axes[1].semilogy(list(PLACES), [_off(r, rows) for r in at], **style)
+        least = [at(of, place, condition, COUNT) for place in PLACES]
+        axes[1].semilogy(list(PLACES), [_off(r, rows) for r in least], **style)
     axes[0].set_xlabel("coordinates (joint at 0 mm)")
     axes[1].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
     axes[1].set_xticks(list(PLACES))
@@ -106,8 +98,7 @@ def _far(rows: list[Row]) -> Any:
 
 
 def _off(row: Row, rows: list[Row]) -> float:
-    full = next(r for r in rows if r["place_mm"] == row["place_mm"] and r["condition"] == FULL)
-    return max(FLOOR, *off(row, full).values())
+    return max(FLOOR, far_error(rows, row))
 
 
 def _clearance(rows: list[Row]) -> Any:
@@ -115,10 +106,8 @@ def _clearance(rows: list[Row]) -> Any:
     first = next(iter(PLACES))
     for k, condition in enumerate(CONDITIONS):
         of = [r for r in rows if r["condition"] == condition]
-        at = [
-            min((r for r in of if r["place_mm"] == p and r["count"] >= COUNT), key=lambda r: r["count"]) for p in PLACES
-        ]
-        _bars(axes[0], [p + 2.5 * (k - 2) for p in PLACES], at, condition)
+        least = [at(of, place, condition, COUNT) for place in PLACES]
+        _bars(axes[0], [p + 2.5 * (k - 2) for p in PLACES], least, condition)
         line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
         if len(line) > 1:
             _bars(axes[1], [r["count"] + 0.25 * (k - 2) for r in line], line, condition)
@@ -150,3 +139,12 @@ def _bars(ax: Any, x: list[float], rows: list[Row], condition: str) -> None:
 def _plain(ax: Any) -> None:
     ax.grid(visible=True, color="#e3e3e3", linewidth=0.7)
     ax.tick_params(labelsize=8)
+
+
+#: by name: the rows that a figure shows, and who draws it
+FIGURES: dict[str, tuple[str, Callable[[list[Row]], Any]]] = {
+    "compliance": ("statics", _compliance),
+    "frequencies": ("frequencies", _frequencies),
+    "far": ("far", _far),
+    "clearance": ("clearance", _clearance),
+}

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from benchmarks.stability.cases import ALONG, RANGES
-from benchmarks.stability.mechanism import Parameters
-from benchmarks.stability.outcome import FINISHED, LEDGER, REFUSED, WRONG, Outcome
+from benchmarks.family import FINISHED, REFUSED, WRONG, Record
+from benchmarks.page import png
+from benchmarks.stability.runs import LEDGER
+from benchmarks.stability.scenes import ALONG, RANGES, Parameters
 from pipeline.core.integrators import DEFAULT, INTEGRATORS
 from pipeline.post.plotting.style import SOFT, plt, style
-
-if TYPE_CHECKING:
-    from benchmarks.stability.page import Row
 
 BLUE, MARKS = "#0072B2", {REFUSED: ("D", "#E69F00"), WRONG: ("X", "#D55E00")}
 LOGARITHMIC = {"clearance", "stiffness", "speed", "mass", "strokes", "nearness"}
@@ -44,53 +41,50 @@ SYMBOLS = {
 
 @dataclass(frozen=True)
 class Shade:
-    """What colours the random points: a number of an outcome, and the decades of its colour bar."""
+    """What colours the random points: a number of a record, and the decades of its colour bar."""
 
     label: str
-    value: Callable[[Outcome], float]
+    number: str
     ticks: tuple[float, ...]
 
 
 SHADES = (
-    Shade("energy error", lambda o: o.ledger, (-14.0, -12.0, -10.0, -8.0, -6.0, -4.0)),
-    Shade("evaluations", lambda o: o.evaluations, (4.0, 5.0, 6.0, 7.0)),
+    Shade("energy error", "ledger", (-14.0, -12.0, -10.0, -8.0, -6.0, -4.0)),
+    Shade("evaluations", "evaluations", (4.0, 5.0, 6.0, 7.0)),
 )
 
 
-def write(rows: Sequence[Row], folder: Path) -> None:
-    """All figures, as PNG files in `folder`."""
+def files(records: Sequence[Record]) -> dict[str, bytes]:
+    """All figures, by path below docs/."""
+    random = [r for r in records if r["sweep"] == "random"]
     with style():
-        _sweeps(rows, lambda o: o.evaluations, "evaluations", folder / "sweeps.png")
-        _sweeps(rows, lambda o: o.ledger, "energy error", folder / "ledger.png", limit=LEDGER)
-        _sweeps(rows, lambda o: o.horizon_share, "share before the horizon", folder / "horizon.png", logarithmic=False)
-        _random([row for row in rows if row.case.sweep == "random"], folder / "random.png")
+        return {
+            "stability/sweeps.png": _sweeps(records, "evaluations", "evaluations"),
+            "stability/ledger.png": _sweeps(records, "ledger", "energy error", limit=LEDGER),
+            "stability/horizon.png": _sweeps(records, "horizon_share", "share before the horizon", logarithmic=False),
+            "stability/random.png": _random(random),
+        }
 
 
-def _axis(row: Row, name: str) -> float:
-    """Where a row stands on the axis of a parameter."""
-    value = float(getattr(row.case.parameters, name))
+def _axis(row: Record, name: str) -> float:
+    """Where a record stands on the axis of a parameter."""
+    value = float(row["parameters"][name])
     return 1.0 - value if name == "nearness" else value
 
 
 def _sweeps(
-    rows: Sequence[Row],
-    height: Callable[[Outcome], float],
-    label: str,
-    path: Path,
-    *,
-    logarithmic: bool = True,
-    limit: float | None = None,
-) -> None:
+    rows: Sequence[Record], number: str, label: str, *, logarithmic: bool = True, limit: float | None = None
+) -> bytes:
     """A panel per parameter, all with one vertical axis."""
     columns = 4
     lines = -(-len(RANGES) // columns)
     figure, axes = plt.subplots(lines, columns, figsize=(12.5, 2.5 * lines), sharey=True, squeeze=False)
-    finished = [height(r.outcome) for r in rows if r.outcome.verdict == FINISHED and r.case.sweep in RANGES]
+    finished = [r[number] for r in rows if r["verdict"] == FINISHED and r["sweep"] in RANGES]
     floor = 0.5 * min(finished, default=1.0) if logarithmic else 0.0
     for k, (ax, sweep) in enumerate(zip(axes.ravel(), RANGES, strict=False)):
         if logarithmic:
             ax.set_yscale("log")
-        _panel(ax, [row for row in rows if row.case.sweep == sweep], sweep, height, floor)
+        _panel(ax, [row for row in rows if row["sweep"] == sweep], sweep, number, floor)
         if not logarithmic:
             ax.set_ylim(0.0, 1.05)
         if limit is not None:
@@ -99,20 +93,20 @@ def _sweeps(
             ax.set_ylabel(label)
     for ax in axes.ravel()[len(RANGES) :]:
         ax.set_visible(False)
-    _save(figure, path)
+    return png(figure)
 
 
-def _panel(ax: Any, rows: Sequence[Row], sweep: str, height: Callable[[Outcome], float], floor: float) -> None:
+def _panel(ax: Any, rows: Sequence[Record], sweep: str, number: str, floor: float) -> None:
     if sweep in LOGARITHMIC:
         ax.set_xscale("log")
-    done = [row for row in rows if row.outcome.verdict == FINISHED]
-    places, heights = [_axis(row, sweep) for row in done], [height(row.outcome) for row in done]
+    done = [row for row in rows if row["verdict"] == FINISHED]
+    places, heights = [_axis(row, sweep) for row in done], [row[number] for row in done]
     ax.plot(places, heights, "o-", color=BLUE, markersize=4, linewidth=1)
     for verdict, (mark, color) in MARKS.items():
-        lost = [_axis(row, sweep) for row in rows if row.outcome.verdict == verdict]
+        lost = [_axis(row, sweep) for row in rows if row["verdict"] == verdict]
         if lost:
             ax.plot(lost, [floor] * len(lost), mark, color=color, markersize=7, clip_on=False)
-    switched = [k for k, row in enumerate(done) if row.outcome.switched]
+    switched = [k for k, row in enumerate(done) if row["switched"]]
     if switched:
         ring = {"color": "none", "markeredgecolor": SOFT, "markersize": 9}
         ax.plot([places[k] for k in switched], [heights[k] for k in switched], "o", **ring)
@@ -124,7 +118,7 @@ def _panel(ax: Any, rows: Sequence[Row], sweep: str, height: Callable[[Outcome],
     ax.set_title(LABELS[sweep], fontsize=8.5)
 
 
-def _random(rows: Sequence[Row], path: Path) -> None:
+def _random(rows: Sequence[Record]) -> bytes:
     """The random points in planes of two parameters each, coloured by their energy errors and by their cost."""
     figure, axes = plt.subplots(2, len(PLANES), figsize=(12.5, 6.2))
     for line, shade in zip(axes, SHADES, strict=True):
@@ -134,18 +128,18 @@ def _random(rows: Sequence[Row], path: Path) -> None:
         bar = figure.colorbar(shown, ax=line, label=shade.label, aspect=16)
         bar.set_ticks(shade.ticks, labels=[f"$10^{{{t:.0f}}}$" for t in shade.ticks])
     _legend(figure)
-    _save(figure, path)
+    return png(figure)
 
 
-def _points(ax: Any, rows: Sequence[Row], x: str, y: str, shade: Shade) -> Any:
+def _points(ax: Any, rows: Sequence[Record], x: str, y: str, shade: Shade) -> Any:
     """One plane of the random points; returns what a colour bar needs."""
     shown: Any = None
     for method, (symbol, _) in SYMBOLS.items():
-        done = [row for row in rows if row.outcome.verdict == FINISHED and row.outcome.method == method]
+        done = [row for row in rows if row["verdict"] == FINISHED and row["method"] == method]
         shown = ax.scatter(
             [_axis(row, x) for row in done],
             [_shaken(row, y) for row in done],
-            c=[np.log10(max(shade.value(row.outcome), 1e-16)) for row in done],
+            c=[np.log10(max(row[shade.number], 1e-16)) for row in done],
             marker=symbol,
             cmap="viridis",
             vmin=shade.ticks[0],
@@ -154,16 +148,16 @@ def _points(ax: Any, rows: Sequence[Row], x: str, y: str, shade: Shade) -> Any:
             linewidths=0,
         )
     for verdict, (mark, color) in MARKS.items():
-        lost = [row for row in rows if row.outcome.verdict == verdict]
+        lost = [row for row in rows if row["verdict"] == verdict]
         ax.scatter([_axis(r, x) for r in lost], [_shaken(r, y) for r in lost], marker=mark, color=color, s=42)
     _name_axes(ax, x, y)
     return shown
 
 
-def _shaken(row: Row, name: str) -> float:
+def _shaken(row: Record, name: str) -> float:
     """Whole numbers spread a little, so that points do not hide each other; the same for the same case."""
     value = _axis(row, name)
-    return value + 0.6 * (row.case.parameters.restitution - 0.5) if name == "joints" else value
+    return value + 0.6 * (row["parameters"]["restitution"] - 0.5) if name == "joints" else value
 
 
 def _name_axes(ax: Any, x: str, y: str) -> None:
@@ -186,9 +180,3 @@ def _legend(figure: Any) -> None:
         for mark, color, text in entries
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
-
-
-def _save(figure: Any, path: Path) -> None:
-    # without the name of the version that drew it, equal rows give equal bytes
-    figure.savefig(path, metadata={"Software": None})
-    plt.close(figure)

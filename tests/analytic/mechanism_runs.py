@@ -8,11 +8,23 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from benchmarks.stability.run import bundles as bundles
+from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from stages import run as stages
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
+
+
+@cache
+def _place() -> stages.Workplace:
+    return stages.workplace()
+
+
+def bundles(scene: Scene) -> dict[str, xr.Dataset]:
+    """The reduced flexible bodies of a scene, as the program makes them, kept as long as the tests run."""
+    return stages.bundles(scene, _place())
 
 
 def _table(value: object) -> object:
@@ -26,7 +38,7 @@ def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
     from pipeline import dynamics
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override={place: _table(value) for place, value in overrides})
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+    return dynamics.simulate(scene, bundles(scene), silent)
 
 
 def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:

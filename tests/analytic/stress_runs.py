@@ -1,44 +1,29 @@
-"""Runs with recorded section forces, straight from the engine; each is made once per session."""
+"""Runs with recorded section forces, straight from the engine."""
 
 from __future__ import annotations
 
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from pipeline.core.scene.load import edited, load_scene, read_toml
+from pipeline.core.progress import silent
+from pipeline.core.scene.load import edited, load_scene
 from pipeline.core.scene.schema import Scene
-from tests.analytic.mechanism_runs import TREE
+from tests.analytic.mechanism_runs import TREE, bundles
 
 
-def bundles(scene: Scene) -> dict[str, xr.Dataset]:
-    """The reduced bodies of a scene with what stress recovery needs of them."""
-    return {name: bundle(body.mesh, body.modes) for name, body in scene.flexible().items()}
-
-
-@cache
-def bundle(recipe: str, modes: Any) -> xr.Dataset:
-    """One reduced body, through stages 1 to 3."""
-    from pipeline.structure.fe import mesh
-    from pipeline.structure.modes import bundle as bundling
-    from pipeline.structure.modes import solve
-    from pipeline.structure.stress.beam import recover
-
-    grid = mesh.build(read_toml(Path(recipe)))
-    count = None if modes.count == "all" else modes.count
-    found = solve(grid, modes.reference, count, interfaces=modes.interfaces)
-    return bundling.build(grid, found, recover(grid, found))
+def recorded(name: str, changes: dict[str, Any]) -> tuple[Scene, dict[str, xr.Dataset]]:
+    """A scene with changes, all of its flexible bodies recorded, and their bundles with what stress recovery needs."""
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", override=changes)
+    scene = edited(scene, {"output.stress": list(scene.flexible())})
+    return scene, bundles(scene)
 
 
 def run(name: str, changes: dict[str, Any]) -> xr.Dataset:
-    """The run of a scene with changes, all of its flexible bodies recorded."""
+    """The run of such a scene."""
     from pipeline import dynamics
 
-    scene = load_scene(TREE / "scenes" / f"{name}.toml", override=changes)
-    scene = edited(scene, {"output.stress": list(scene.flexible())})
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+    return dynamics.simulate(*recorded(name, changes), silent)
 
 
 def last(dataset: xr.Dataset) -> dict[str, Any]:

@@ -42,6 +42,7 @@ def test_euler_loads_are_met_from_above_at_order_four(ends: str) -> None:
     elements = [4, 8, 16]
     error = np.array([critical_load(n, ends) / exact - 1.0 for n in elements])
     assert error.min() > 0.0
+    # (k h)^4 / 720 with k h = 2 pi / 16 of clamped ends is 3e-5; the next order turns the slope by 0.08
     assert error[-1] < 1e-4
     np.testing.assert_allclose(order(elements, error), 4.0, atol=0.2)
 
@@ -52,6 +53,7 @@ def test_shear_lowers_the_euler_load_as_engesser_says() -> None:
     found = critical_load(16, "PP", theory="timoshenko", section=section)
     euler = np.pi**2 * EI / PAPER_ROD.length**2
     exact = euler / (1.0 + euler / (0.1 * PAPER_ROD.shear_modulus * PAPER_ROD.area))
+    # as above with k h = pi / 16: 2e-6
     assert found == pytest.approx(exact, rel=1e-5)
     assert exact < 0.96 * euler
 

@@ -7,7 +7,7 @@ import pytest
 
 from pipeline.structure.closed_form import frequencies as closed_form
 from pipeline.structure.fe import beam
-from pipeline.structure.modes import solve
+from pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, build, frequencies
 from tests.analytic.beam_solutions import PAPER_ROD, Rod, element_stiffness, rayleigh_frequencies
 

@@ -110,6 +110,7 @@ def test_fv5_deep_beam_has_the_exact_frequencies() -> None:
     np.testing.assert_allclose(found, expected, rtol=1e-3)
     fine = lowest(mesh.read_recipe(CHECKS / "nafems_fv5.toml") | {"elements": 24}, "0123", "12", 9)
     np.testing.assert_allclose(fine, expected, rtol=1e-4)
+    # the published targets are up to 0.4 % above the exact values
     np.testing.assert_allclose(fine, FV5_TARGET, rtol=0.005)
 
 

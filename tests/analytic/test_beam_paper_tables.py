@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
 
 MESHES = Path(__file__).parents[2] / "meshes"
 #: Hz, elastic modes

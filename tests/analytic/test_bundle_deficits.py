@@ -16,7 +16,8 @@ from pipeline.core.errors import InputError
 from pipeline.structure.fe import mesh
 from pipeline.structure.fe.model import Model
 from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import bundle, deficits, solve
+from pipeline.structure.modes import bundle, deficits
+from pipeline.structure.modes.solution import solve
 from pipeline.structure.modes.statics import support
 
 MESHES = Path(__file__).parents[2] / "meshes"

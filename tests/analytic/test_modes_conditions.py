@@ -15,8 +15,9 @@ from pipeline.core.errors import InputError
 from pipeline.structure.fe import mesh
 from pipeline.structure.fe.model import Model
 from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import compliance, eigen, solve
+from pipeline.structure.modes import compliance, eigen
 from pipeline.structure.modes.select import Wanted
+from pipeline.structure.modes.solution import solve
 from pipeline.structure.modes.statics import Flexibility, support
 
 MESHES = Path(__file__).parents[2] / "meshes"

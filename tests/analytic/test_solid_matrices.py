@@ -16,7 +16,8 @@ from pipeline.structure.fe import mesh as beams
 from pipeline.structure.fe.exchange import files
 from pipeline.structure.fe.model import Model
 from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
 from tests.analytic.solid_models import block, build
 
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -10,10 +10,8 @@ import pytest
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from pipeline.core.scene.load import load_scene
 from tests.analytic.beam_solutions import PAPER_ROD as ROD
-from tests.analytic.mechanism_runs import TREE
-from tests.analytic.stress_runs import bundle, last, run
+from tests.analytic.stress_runs import last, recorded, run
 
 AREA, SECOND = np.pi * ROD.radius**2, np.pi * ROD.radius**4 / 4.0
 WEIGHT = ROD.density * AREA * 9.81  #: [N/m]
@@ -161,9 +159,7 @@ def test_modal_coordinates_alone_miss_a_share_of_it() -> None:
 
 def curvature_moments(q: np.ndarray) -> np.ndarray:
     """My = -E I w'' at both ends of every cell, of Hermite cubics through the nodes, shape (section,)."""
-    modes = {"reference": "free-free", "count": 7}
-    body = load_scene(TREE / "scenes" / "checks" / "swinging_rod.toml", {"body.rod.modes": modes}).flexible()["rod"]
-    data = bundle(body.mesh, body.modes)
+    data = recorded("checks/swinging_rod", {"body.rod.modes": {"reference": "free-free", "count": 7}})[1]["rod"]
     w, slope = data["shape_translation"].values[:, 2] @ q, -data["shape_rotation"].values[:, 1] @ q
     h, rise = ROD.length / 12, np.diff(w)
     start = 6.0 * rise / h**2 - (4.0 * slope[:-1] + 2.0 * slope[1:]) / h

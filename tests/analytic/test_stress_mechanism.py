@@ -8,9 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.scene.load import load_scene
-from tests.analytic.mechanism_runs import TREE
-from tests.analytic.stress_runs import bundles, run
+from tests.analytic.stress_runs import recorded, run
 
 PIECES = 12
 FINE = 5e-7  #: [s]
@@ -27,8 +25,7 @@ def fine() -> xr.Dataset:
 
 
 def rod1() -> xr.Dataset:
-    scene = load_scene(TREE / "scenes" / "sps4" / "far_cb.toml")
-    return bundles(scene)["rod1"]
+    return recorded("sps4/far_cb", {})[1]["rod1"]
 
 
 def at_joint(name: str) -> np.ndarray:

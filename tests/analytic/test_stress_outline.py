@@ -13,7 +13,8 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
 from pipeline.structure.fe import section as sections
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
 from pipeline.structure.stress.beam import recover
 from pipeline.structure.stress.outline import Outline, outline
 from stages.graph import Graph

@@ -9,10 +9,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
-from stages.families import TREE
 
 from pipeline.core.artifacts.store import Record, Store
-from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.task import Task, facts, in_order, key
 from stages import report
 from stages.run import Workplace
@@ -25,8 +24,8 @@ SLOW = {"numpy", "xarray", "pandas", "scipy", "numba", "matplotlib", "pyvista", 
 #: the command, and what it has imported at its end
 COMMAND = """import sys
 from stages.__main__ import main
-code = main(sys.argv[1:]) if sys.argv[1:] else 0
-print(*sys.modules, sep="\\n", file=sys.stderr)
+code = main(sys.argv[1:])
+print(*sys.modules, file=sys.stderr)
 sys.exit(code)"""
 
 
@@ -40,7 +39,7 @@ def imported(*arguments: str, results: Path) -> set[str]:
         text=True,
         check=True,
     )
-    names = {name.partition(".")[0] for name in done.stderr.split()} - set(sys.stdlib_module_names)
+    names = {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()} - set(sys.stdlib_module_names)
     # the interpreter's own: its configuration, whose name tells the machine, and what its site loads at every start
     own = subprocess.run(
         [sys.executable, "-c", "import sys; print(*sys.modules)"], capture_output=True, text=True, check=True

@@ -10,7 +10,8 @@ import pytest
 import xarray as xr
 
 from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
 
 MESHES = Path(__file__).parents[2] / "meshes"
 CASES = [

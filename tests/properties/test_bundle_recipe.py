@@ -12,7 +12,8 @@ import xarray as xr
 
 from pipeline.core.errors import InputError
 from pipeline.structure.fe import mesh, section
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
 
 MESHES = Path(__file__).parents[2] / "meshes"
 

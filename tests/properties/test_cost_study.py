@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -230,9 +232,15 @@ def test_contacts_beyond_the_horizon_do_not_count():
         assert quantities.error(a, b, quantity, until=0.45) == 0.0
 
 
+def written(found: xr.Dataset, tables: tuple[str, ...] = (), pictures: Mapping[str, str] | None = None) -> str:
+    """The page of one scene."""
+    said = page.Studied("a/scene", page.advice(found, tables), tables, pictures or {})
+    return page.markdown((said,), "docs/accuracy.md")
+
+
 def test_the_page_says_what_each_digit_costs():
     found, *_ = study()
-    text = page.markdown((page.Studied("a/scene", found, ("| a table |",), {"Error": "x/y.png"}),), "docs/accuracy.md")
+    text = written(found, ("| a table |",), {"Error": "x/y.png"})
     assert "flexclear cost a/scene \\\n        --page docs/accuracy.md" in text
     assert "0.001 takes rk4, step 0.001 s (50 evaluations)" in text
     assert "1e-09 cannot be had" in text
@@ -245,7 +253,7 @@ def test_the_page_says_which_quantities_can_be_had_when_not_all_can():
     finest["event_time"] = finest["event_time"] + 1e-7
     points.append(Point("d3", "tolerance", {"adaptive_integrator": "dop853", "rtol": 1e-12}))
     found = assemble(points, runs | {"d3": finest}, [POSITION, TIMES])
-    text = page.markdown((page.Studied("a/scene", found, (), {}),), "p.md")
+    text = written(found)
     assert "1e-09 can be had for slider.position, not for pin.impact_times." in text
 
 
@@ -253,10 +261,10 @@ def test_the_page_says_how_far_it_holds_and_what_to_refine():
     found, *_ = study(horizon=0.5)
     shares = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
     split_up = causes.beside(found, shares)
-    text = page.markdown((page.Studied("a/scene", split_up, ("**Beyond the horizon: x**",), {}),), "p.md")
+    text = written(split_up, ("**Beyond the horizon: x**",))
     assert "holds up to t = 0.5 s of 1 s; beyond that nothing but the means of an ensemble, below" in text
     assert "more elements (mesh limits slider.position)" in text
-    alone = page.markdown((page.Studied("a/scene", split_up, (), {}),), "p.md")
+    alone = written(split_up)
     assert "an ensemble, which the scene can ask for" in alone
 
 

@@ -129,7 +129,8 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
     kinetic, potential, _ = observed(engine, made)["energy"].T
     total = kinetic + potential
     lost = (total[0] - total[-5:].mean()) / np.ptp(potential)
+    # 0.8 % of what swings to and fro, and otherwise 5.4 % at least; the bound lies between, by like factors
     if rho == 1.0:
-        assert abs(lost) < 0.05
+        assert abs(lost) < 0.02
     else:
-        assert lost > 0.05
+        assert lost > 0.02

@@ -12,8 +12,9 @@ import xarray as xr
 from pipeline import dynamics
 from pipeline.core.scene.load import load_scene, read_toml
 from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle, solve
+from pipeline.structure.modes import bundle
 from pipeline.structure.modes.geometric_stiffness import variables
+from pipeline.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE
 
 RECIPE = TREE / "meshes" / "checks" / "slender_beam.toml"

@@ -6,7 +6,8 @@ built of two kinds: the offset of two points along an axis of the first body, an
 .. math:: \begin{pmatrix} M & J^T \\ J & 0 \end{pmatrix} \begin{pmatrix} \dot v \\ -\lambda \end{pmatrix}
           = \begin{pmatrix} f \\ -\dot J v \end{pmatrix}
 
-solved densely; nothing holds the rows but that they start satisfied, which suffices for milliseconds.
+solved densely; nothing holds the rows but that they start satisfied, which suffices for milliseconds. Rows that
+follow from others at the start, as those of planar loops in space do, are left out.
 """
 
 from __future__ import annotations
@@ -24,6 +25,8 @@ SIZE = 13
 ROWS: dict[str, tuple[tuple[int, ...], tuple[tuple[int, int], ...]]] = {
     "spherical": ((0, 1, 2), ()),
     "revolute": ((0, 1, 2), ((0, 2), (1, 2))),
+    "cylindrical": ((0, 1), ((0, 2), (1, 2))),
+    "universal": ((0, 1, 2), ((0, 1),)),
     "prismatic": ((0, 1), ((0, 1), (0, 2), (1, 2))),
     "planar": ((2,), ((0, 2), (1, 2))),
     "clearance-revolute": ((2,), ((0, 2), (1, 2))),
@@ -82,6 +85,7 @@ class LooseBodies:
         self.gravity = si(weight["acceleration"]) if weight else np.zeros(3)
         self.pairs = [tuple(self.frames[f] for f in j["between"]) for j in scene["joint"].values()]
         self.kinds = [j["type"] for j in scene["joint"].values()]
+        self.kept = _independent(self.all_rows(self.start())[0])
 
     def start(self) -> Array:
         """The state as the scene gives it."""
@@ -122,7 +126,12 @@ class LooseBodies:
         return out
 
     def rows(self, y: Array) -> tuple[Array, Array]:
-        """Jacobian of all joints, and what J v' must be."""
+        """Jacobian of the rows that are kept, and what J v' must be."""
+        J, gamma = self.all_rows(y)
+        return J[self.kept], gamma[self.kept]
+
+    def all_rows(self, y: Array) -> tuple[Array, Array]:
+        """The same of all joints."""
         jacobian, gamma = [], []
         for kind, pair in zip(self.kinds, self.pairs, strict=True):
             a, b = (self.place(y, frame) for frame in pair)
@@ -135,6 +144,20 @@ class LooseBodies:
                 jacobian.append(full)
                 gamma.append(value)
         return np.array(jacobian).reshape(-1, 6 * len(self.bodies)), np.array(gamma)
+
+
+def _independent(J: Array) -> Array:
+    """Numbers of rows that do not follow from those before (Gram and Schmidt)."""
+    kept: list[int] = []
+    basis = np.zeros((0, J.shape[1]))
+    for k, row in enumerate(J):
+        left = row / np.linalg.norm(row)
+        for _ in range(2):
+            left = left - basis.T @ (basis @ left)
+        if np.linalg.norm(left) > 1e-6:
+            kept.append(k)
+            basis = np.vstack([basis, left / np.linalg.norm(left)])
+    return np.array(kept, dtype=int)
 
 
 def _point_row(a: Place, b: Place, k: int) -> tuple[tuple[Array, Array], float]:

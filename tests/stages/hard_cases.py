@@ -6,11 +6,11 @@ import os
 import time
 from collections.abc import Callable
 
-from benchmarks.stability.mechanism import Parameters
-from benchmarks.stability.outcome import FINISHED, Outcome
+from benchmarks.family import FINISHED, Record
+from benchmarks.stability.scenes import Parameters
 
 
-def work(parameters: Parameters, compiled: Callable[[], None]) -> Outcome:
+def work(parameters: Parameters, compiled: Callable[[], None]) -> Record:
     """What becomes of it the number of joints says."""
     compiled()
     if parameters.joints == 2:
@@ -18,4 +18,4 @@ def work(parameters: Parameters, compiled: Callable[[], None]) -> Outcome:
             time.process_time()
     if parameters.joints == 3:
         os._exit(7)
-    return Outcome(FINISHED, evaluations=parameters.joints)
+    return {"verdict": FINISHED, "evaluations": parameters.joints}

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import __main__ as command
-from benchmarks import accuracy, evaluation, growth, log, maximal, measure, page, peer, peer_points
-from benchmarks.accuracy import Error
-from benchmarks.engines import (
+from benchmarks import errors, log, maximal, timing
+from benchmarks.errors import SAMPLING, Error, Samples
+from benchmarks.exudyn_model import METHODS, derivative, holds_at_zero, solve
+from benchmarks.families import evaluation, exudyn, growth
+from benchmarks.family import Case
+from benchmarks.mechanisms import (
     Mechanism,
     damped,
     evaluation_time,
+    joint_laws,
     mechanism,
     states,
     trajectory,
     without_clearance,
     without_friction,
 )
-from benchmarks.exudyn_runs import METHODS, SAMPLING, Samples, solve
-from benchmarks.laws import derivative, holds_at_zero, joint_laws
 from pipeline import dynamics
 from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
@@ -97,10 +97,10 @@ def test_drive_laws_are_the_paper_s_steps(root: Path):
 
 def test_a_ratio_is_that_of_neighbours():
     """A machine that becomes twice as slow half way does not change how two tasks compare."""
-    fast, slow = measure.Times((1.0, 1.0, 2.0, 2.0, 2.0)), measure.Times((3.0, 3.0, 6.0, 6.0, 6.0))
+    fast, slow = timing.Times((1.0, 1.0, 2.0, 2.0, 2.0)), timing.Times((3.0, 3.0, 6.0, 6.0, 6.0))
     assert slow.over(fast) == 3.0
-    assert measure.Times((1.0, 2.0, 3.0, 4.0, 5.0)).spread == pytest.approx(1.0 / 3.0)
-    assert measure.slope([5, 10, 20], [1.0, 2.0, 4.0]) == pytest.approx(1.0)
+    assert timing.Times((1.0, 2.0, 3.0, 4.0, 5.0)).spread == pytest.approx(1.0 / 3.0)
+    assert timing.slope([5, 10, 20], [1.0, 2.0, 4.0]) == pytest.approx(1.0)
 
 
 def test_tasks_take_turns_and_the_first_round_does_not_count():
@@ -110,7 +110,7 @@ def test_tasks_take_turns_and_the_first_round_does_not_count():
         calls.append(name)
         return float(len(calls))
 
-    times = measure.interleaved({"a": lambda: task("a"), "b": lambda: task("b")}, rounds=2)
+    times = timing.interleaved({"a": lambda: task("a"), "b": lambda: task("b")}, rounds=2)
     assert "".join(calls) == "ababab"
     assert times["a"].seconds == (3.0, 5.0)
 
@@ -118,7 +118,7 @@ def test_tasks_take_turns_and_the_first_round_does_not_count():
 def test_errors_are_taken_up_to_the_horizon_and_between_equal_times():
     time = SAMPLING * np.arange(11)
     still, moved = np.zeros((11, 3)), np.outer(time, [3.0, 0.0, 4.0])
-    reference = accuracy.of_samples(Samples(time, still, still + 2.0), 5 * SAMPLING)
+    reference = errors.Reference(Samples(time, still, still + 2.0), 5 * SAMPLING)
     error = reference.error(Samples(time, moved, still + 2.0 + 10 * moved))
     assert error.position == pytest.approx(5 * 5 * SAMPLING)
     assert error.relative == pytest.approx(250 * SAMPLING / np.sqrt(12.0))
@@ -166,35 +166,34 @@ def platform_motion(samples: Samples) -> tuple[float, float]:
 def test_the_peer_s_model_of_the_ideal_mechanism_converges_to_its_motion(root: Path):
     pytest.importorskip("exudyn")
     here = Mechanism("ideal", scene(root, "ideal"), {})
-    errors = []
+    found = []
     for step in (1e-3, 5e-4):
         samples = solve(here, "platform", next(iter(METHODS)), step).samples
         assert samples is not None
-        errors.append(platform_motion(samples))
+        found.append(platform_motion(samples))
     # the trapezoidal rule: 4e-6 m and 1.4e-6 m/s at the first step, a quarter of it at half the step
-    assert errors[0][0] < 1e-5
-    assert errors[0][1] < 5e-6
-    assert np.allclose(np.divide(errors[0], errors[1]), 4.0, rtol=0.1)
+    assert found[0][0] < 1e-5
+    assert found[0][1] < 5e-6
+    assert np.allclose(np.divide(found[0], found[1]), 4.0, rtol=0.1)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [c for c in peer.CASES if c.title in ("far_cb", "csj without friction")])
-def test_the_peer_converges_to_our_run(case: peer.Case):
+@pytest.mark.parametrize("case", [c for c in exudyn.FAMILY.cases() if c.name in ("far_cb", "csj without friction")])
+def test_the_peer_converges_to_our_run(case: Case):
     """Flexible rod, and normal contact: independent codes, one solution."""
     pytest.importorskip("exudyn")
-    original = mechanism(case.scene)
-    here = original.with_scene(case.title, case.edit(original.scene))
-    reference = accuracy.converged(here, "platform", here.scene.time.end)
-    errors = []
+    here = exudyn.edited(case)
+    reference = errors.converged(here, "platform", here.scene.time.end)
+    found = []
     for step in (1e-4, 5e-6):
         samples = solve(here, "platform", next(iter(METHODS)), step).samples
         assert samples is not None
-        errors.append(reference.error(samples))
+        found.append(reference.error(samples))
     # 0.5 m/s at most; impacts that no step ends on leave the method of second order with about the first: a twentieth,
     # which where impacts fall between steps scatters by a factor of four (steps of 1e-5 s are worse than of 2e-5 s)
-    assert errors[1].relative < 5e-3
-    assert errors[1].velocity < 0.2 * errors[0].velocity
-    assert errors[1].position < 0.2 * errors[0].position
+    assert found[1].relative < 5e-3
+    assert found[1].velocity < 0.2 * found[0].velocity
+    assert found[1].position < 0.2 * found[0].position
 
 
 def test_the_peer_s_model_refuses_what_it_would_leave_out():
@@ -204,7 +203,7 @@ def test_the_peer_s_model_refuses_what_it_would_leave_out():
 
 
 def test_the_logged_runs_of_the_peer_are_points_of_cost_studies(tmp_path: Path):
-    found = peer_points.points(log.latest()["exudyn"])
+    found = exudyn.points([r for session in log.latest(log.FOLDER / "exudyn.jsonl") for r in session.records])
     assert {"sps4/csj", "sps4/variants/far_csj_cb_damped"} <= found.keys()
     for track in found["sps4/csj"]:
         # in SI: some 10 um and some mm/s at the longest step
@@ -213,40 +212,3 @@ def test_the_logged_runs_of_the_peer_are_points_of_cost_studies(tmp_path: Path):
     file = tmp_path / "peers.json"
     file.write_text(json.dumps(found))
     assert cost_peers.read(file) == found
-
-
-def test_without_the_peer_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
-    monkeypatch.setitem(sys.modules, "exudyn", None)
-    assert list(peer.measure()) == []
-    said = capsys.readouterr().out
-    assert said.count("\n") == 1
-    assert "pip install" in said
-
-
-def test_an_unknown_group_is_refused_with_those_there_are(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-):
-    monkeypatch.setattr(sys, "argv", ["benchmarks", "speed"])
-    with pytest.raises(SystemExit) as ended:
-        command.main()
-    assert ended.value.code == 2
-    assert "evaluation, runs, growth, exudyn" in capsys.readouterr().err
-
-
-def test_the_log_keeps_lines_and_the_page_shows_the_last(tmp_path: Path):
-    path, shown = tmp_path / "log.jsonl", tmp_path / "page.md"
-    row = {"scene": "csj", "rtol": 1e-10, "evaluations": 7, "us_per_evaluation": 1.23456789}
-    for seconds in (1.0, 2.0):
-        part = {"s": seconds, "spread": 0.01}
-        log.append("runs", [row | {"integration": part, "stage": part}], path)
-    lines = [json.loads(line) for line in path.read_text().splitlines()]
-    assert [line["results"][0]["stage"]["s"] for line in lines] == [1.0, 2.0]
-    assert lines[0]["results"][0]["us_per_evaluation"] == 1.235
-    assert set(lines[0]) == {"date", "cpu", "versions", "group", "results"}
-    page.write(path, shown)
-    assert "2.0000 ± 1.0 %" in shown.read_text()
-    assert "1.0000" not in shown.read_text()
-
-
-def test_the_page_is_that_of_the_log():
-    assert page.PAGE.read_text() == page.text(log.latest())

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Any
-
 import pytest
 
-from benchmarks.reference_conditions import chosen, claims, design, page
+from benchmarks.families import reference_conditions
+from benchmarks.family import Record as Row
+from benchmarks.reference_conditions import claims, design, figures
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 
-Row = dict[str, Any]
 EFFECT = {"angle": 3e-6, "displacement": 3e-7, "velocity": 7e-4}
 
 
@@ -85,12 +83,13 @@ def test_each_statement_turns_with_its_numbers(
     assert outcome(at_60, words) == "**Holds at 0 mm and 120 mm, not at 60 mm.**"
 
 
-def test_the_page_has_a_section_per_group(tmp_path: Path) -> None:
-    written = page.write(rows(), tmp_path).read_text()
-    assert "## What holds of the paper's statements" in written
-    assert "## Clearance at A1" in written
-    assert "## Static compliance" not in written
-    assert (tmp_path / "reference-conditions" / "clearance.png").is_file()
+def test_the_page_has_a_part_and_a_figure_per_group() -> None:
+    records = [{"case": group, **row} for group, of in rows().items() for row in of]
+    parts = reference_conditions.FAMILY.show(records)
+    assert isinstance(parts, dict)
+    assert parts.keys() == {"short", "claims", "far", "clearance"}
+    assert "**Holds** at all three places." in parts["claims"]
+    assert figures.files(records).keys() == {"reference-conditions/far.png", "reference-conditions/clearance.png"}
 
 
 def test_cases_take_the_scene_of_their_place() -> None:
@@ -105,8 +104,8 @@ def test_cases_take_the_scene_of_their_place() -> None:
 
 
 def test_ensembles_of_dear_sets_have_half_the_members(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chosen, "whole", lambda place, condition, count: count)
-    cases = chosen.clearance(8)
+    monkeypatch.setattr(design, "whole", lambda place, condition, count: count)
+    cases = design.clearance(8)
     assert len(set(cases)) == len(cases)
     assert {case.members for case in cases if case.condition == RIGID} == {0}
     assert {case.members for case in cases if case.condition != RIGID and case.count <= COUNT} == {8}

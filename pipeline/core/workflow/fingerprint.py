@@ -21,7 +21,7 @@ from pathlib import Path
 
 from pipeline.core.artifacts.store import publish
 
-OWN = ("pipeline", "stages")
+OWN = ("pipeline", "stages", "benchmarks")
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg"}
 

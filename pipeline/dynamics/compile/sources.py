@@ -7,6 +7,7 @@ the integrator and on whether there are closures and contacts, not on joints or 
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING
 
 from pipeline.core import integrators
@@ -52,9 +53,15 @@ def modules(scene: Scene) -> tuple[str, ...]:
     found = {part.module for part in named(scene)}
     for scheme in schemes(scene):
         for source in sources(most_parts(scene), scheme).values():
-            names = imported(source.encode(), "entry", package=False)[0]
-            found |= {name for name in names if source_file(TREE, name)}  # others are in modules
+            found |= _reached(source)
     return tuple(sorted(found))
+
+
+@cache
+def _reached(source: str) -> frozenset[str]:
+    """Modules that a generated file imports; many scenes share one, and every command asks this of each."""
+    names, _ = imported(source.encode(), "entry", package=False)
+    return frozenset(name for name in names if source_file(TREE, name))  # others are in modules
 
 
 def _evaluate(parts: Parts) -> str:

@@ -14,6 +14,9 @@ ITERATIONS = 8
 BLIND = 1e-8
 #: rounding may stop the residuals this far above a very tight tolerance
 ROUNDING = 1e3
+#: rows that are not solved for may open by this share of the mechanism's size: joints whose axes miss each other by
+#: less than `model.rates.ZERO` count as redundant, and on the way they part by that much times some turns
+APART = 1e-6
 
 
 @kernel
@@ -23,6 +26,22 @@ def largest(w, first, count):
     for k in range(first, first + count):
         if not abs(w[k]) <= result:
             result = abs(w[k]) if w[k] == w[k] else 1e300
+    return result
+
+
+@kernel
+def widest(h, w, values, solved):
+    """Largest of the closure rows' values from w[values] on, a turn counting with the mechanism's size [m, or m/s].
+
+    solved: whether only of the rows that are solved for.
+    """
+    result, arm = 0.0, w[h[m.CONTROL] + m.LENGTH]
+    for c in range(h[m.N_CLOSURES]):
+        first = m.CLOSURES.row0(h, c)
+        for k in range(first, first + (m.CLOSURES.n_kept(h, c) if solved else m.CLOSURES.n_rows(h, c))):
+            size = abs(w[values + k]) * (1.0 if m.CLOSURE_ROWS.kind(h, k) == 0 else arm)
+            if not size <= result:
+                result = size if size == size else 1e300
     return result
 
 
@@ -58,19 +77,19 @@ def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) 
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
-        """Correct y until residuals [m] and their rates [m/s] are below `tolerance`.
+        """Correct y until residuals [m] and their rates [m/s] of the rows solved for are below `tolerance`.
 
         Needs the work space of evaluate(t, y); leaves it, and dy, up to date.  Returns the number
         of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
         residual says little about the error behind it, nothing is changed.
         """
-        rows, step, used = h[m.N_CLOSURE_ROWS], h[m.CORRECTION], 0
+        step, used, apart = h[m.CORRECTION], 0, APART * w[h[m.CONTROL] + m.LENGTH]
         if w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
             return 0
         for _ in range(ITERATIONS):
-            worst = max(largest(w, h[m.RESIDUAL], rows), largest(w, h[m.RESIDUAL_RATE], rows))
+            worst = max(widest(h, w, h[m.RESIDUAL], True), widest(h, w, h[m.RESIDUAL_RATE], True))
             if worst <= tolerance:
-                return used
+                return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
             correction(h, w, h[m.RESIDUAL_RATE], step)
             for k in range(h[m.NV]):
                 w[y + h[m.NQ] + k] += w[step + k]
@@ -80,6 +99,8 @@ def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) 
             used += 1
             if n[m.EVALUATION] != m.OK:
                 return -1
-        return used if largest(w, h[m.RESIDUAL], rows) <= ROUNDING * tolerance else -1
+        if not widest(h, w, h[m.RESIDUAL], True) <= ROUNDING * tolerance:
+            return -1
+        return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, ROUNDING * tolerance) else -1
 
     return project

@@ -14,6 +14,7 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model import initial, selection
+from pipeline.dynamics.model.driving import prescribed
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.run import singular
@@ -39,6 +40,12 @@ class Bench:
     time: float
     drives: np.ndarray
     turns: np.ndarray
+
+    @property
+    def units(self) -> np.ndarray:
+        """What counts as far for each drive: a radian, or the mechanism's size [m]; shape (known,)."""
+        mechanism = self.engine.model.mechanism
+        return np.array([1.0 if p.dimension == "angle" else mechanism.length for p in prescribed(mechanism.scene)])
 
     @property
     def contacts(self) -> int:
@@ -140,8 +147,8 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     if not bench.engine.model.mechanism.closures:
         share = 1.0
     else:
-        way = float(np.max(np.abs(target - origin), initial=0.0))
-        stride = min(1.0, STRIDE * min(bench.engine.model.mechanism.length, 1.0) / way) if way > 0.0 else 1.0
+        way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
+        stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
     while share < 1.0:
         attempt = min(1.0, share + stride)
         try:
@@ -194,19 +201,10 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
     arrays, nv = engine.model.arrays, engine.model.numbering.nv
+    L = engine.mass_factor()
     return Balance(
         engine.view(m.BIAS, nv).copy(),
-        _mass(engine),
+        L @ L.T,
         engine.rows(m.JACOBIAN),
         engine.view(m.RESIDUAL_RATE, arrays.size(m.N_CLOSURE_ROWS))[selection.kept_places(engine.model, engine.h)],
     )
-
-
-def _mass(engine: Engine) -> np.ndarray:
-    """M = L L^T from the factor that the last evaluation left in its envelope."""
-    arrays = engine.model.arrays
-    L = np.zeros((engine.model.numbering.nv,) * 2)
-    entries = engine.view(m.MASS, arrays.size(m.MASS_SIZE))
-    for i, (first, start) in enumerate(arrays.table(m.ENVELOPE)):
-        L[i, first : i + 1] = entries[start : start + i + 1 - first]
-    return L @ L.T

@@ -19,7 +19,7 @@ from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import Bench, closed
 from pipeline.dynamics.linear.names import leading
-from pipeline.dynamics.linear.tangent import Tangent, magnitude, scales, stiffness, tangent
+from pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
 
 #: iterations before giving up
 MOST = 200
@@ -56,7 +56,7 @@ def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
         if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):
             return Equilibrium(at, residual(bench, at), iteration)
         step = _step(bench, at, BALANCED * largest)
-        if float(np.max(np.abs(at.Z @ step) / scales(bench))) <= SHORT:
+        if float(np.max(np.abs(at.Z @ step) / bench.engine.model.speed_scales)) <= SHORT:
             return Equilibrium(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
     loose = leading(bench, at.Z @ at.unbalanced, at.mass)
@@ -76,7 +76,10 @@ def weight(bench: Bench) -> float:
 def residual(bench: Bench, at: Tangent) -> float:
     """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
     forces = at.mass @ at.Z @ at.unbalanced
-    return float(np.max(np.abs(forces) * scales(bench), initial=0.0)) / bench.engine.model.mechanism.length
+    return (
+        float(np.max(np.abs(forces) * bench.engine.model.speed_scales, initial=0.0))
+        / bench.engine.model.mechanism.length
+    )
 
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
@@ -86,7 +89,7 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     force = axes.T @ at.unbalanced
     floor = max(LIMP * float(np.max(np.abs(k))), 1e-30)
     along = np.where(np.abs(force) > negligible / len(k), -force / np.maximum(np.abs(k), floor), 0.0)
-    size = scales(bench)[:, None]
+    size = bench.engine.model.speed_scales[:, None]
     reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
     along = np.clip(along, -LONGEST / reach, LONGEST / reach)
     step = axes @ along

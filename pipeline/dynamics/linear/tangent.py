@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.linear.bench import Bench, balance, displacement_map
 from pipeline.dynamics.linear.differences import Rounding, derivative
 
@@ -68,16 +67,9 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     )
 
 
-def scales(bench: Bench) -> np.ndarray:
-    """Size of a large displacement of every coordinate: the mechanism's size, or a radian; shape (nv,)."""
-    arrays, numbering = bench.engine.model.arrays, bench.engine.model.numbering
-    groups = arrays.table(m.GROUPS)["group"][numbering.nq : numbering.nq + numbering.nv]
-    return arrays.table(m.FLOORS)["magnitude"][groups]
-
-
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and an error estimate of each column."""
-    size = scales(bench)
+    size = bench.engine.model.speed_scales
     noise = EPSILON * magnitude(motions, at)
 
     def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
@@ -95,7 +87,7 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and errors."""
-    size, noise = scales(bench), Rounding(EPSILON * magnitude(motions, at))
+    size, noise = bench.engine.model.speed_scales, Rounding(EPSILON * magnitude(motions, at))
 
     def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
         def force(s: float) -> np.ndarray:

@@ -20,9 +20,15 @@ from pipeline.dynamics.model.tree import PATH
 
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
-#: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end
+#: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end; where
+#: coordinates are large beside the mechanism, so many roundings of them if that is more
 EXACT, CLOSED = 1e-13, 1e-11
+EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
+#: joints that miss each other by less than this share of the mechanism's size are meant to fit
+SLIGHT = 1e-4
 ITERATIONS = 60
+#: least damping, as a share of the mean of the normal matrix: without any, that of redundant joints has no inverse
+ROUNDING = 1e-15
 #: least cosine between axes that a joint keeps parallel
 SAME_WAY = 0.5
 #: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
@@ -73,9 +79,10 @@ def close(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placem
     Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints ask for the
     same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
     """
-    here = list(poses)
+    here, grain = list(poses), _rounding(mechanism)
+    exact, closed = max(EXACT, EXACT_ROUNDINGS * grain), max(CLOSED, CLOSED_ROUNDINGS * grain)
     now = misfit(mechanism, joints, here)
-    if now.worst <= EXACT:
+    if now.worst <= exact:
         return here
     from scipy.sparse.linalg import spsolve  # slow to import, and most scenes give poses that fit
 
@@ -84,7 +91,7 @@ def close(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placem
     for _ in range(ITERATIONS):
         G = now.gradient @ mobility
         normal, rows = G @ now.gradient.T, len(now.values)
-        scale = damping * float(np.linalg.norm(now.values)) * normal.trace() / rows
+        scale = max(damping * float(np.linalg.norm(now.values)), ROUNDING) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
         there = _moved(mechanism, here, step)
         then = misfit(mechanism, joints, there)
@@ -92,9 +99,16 @@ def close(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placem
             here, now, damping = there, then, 0.1 * damping
         else:
             damping *= 10.0
-        if now.worst <= EXACT or damping > 1e12:
+        if now.worst <= exact or damping > 1e12:
             break
-    return here if now.worst <= CLOSED else None
+    return here if now.worst <= closed else None
+
+
+def _rounding(mechanism: Mechanism) -> float:
+    """Rounding of the largest coordinates of the scene, as a share of the mechanism's size."""
+    reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
+    reach += [frame.place.p for frame in mechanism.frames.values()]
+    return float(np.finfo(float).eps * np.max(np.abs(reach)) / mechanism.length)
 
 
 def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Misfit:
@@ -269,8 +283,12 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
     found = residuals(joints, poses)
     worst = max(found, key=lambda name: found[name])
     listed = ", ".join(f"{name} {value:.3g}" for name, value in found.items() if value > EXACT * mechanism.length)
+    slight = misfit(mechanism, joints, poses).worst < SLIGHT
     return InputError(
         f"[joint.{worst}.between]",
-        f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}",
-        "correct lengths, frames, poses, or the start of a drive",
+        f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}"
+        + ("; several joints ask for nearly, but not exactly, the same" if slight else ""),
+        "write lengths, frames and poses with more digits, or let one of the joints give way"
+        if slight
+        else "correct lengths, frames, poses, or the start of a drive",
     )

@@ -107,11 +107,12 @@ def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
     return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
-def freedoms(kind: str, A: Placement, B: Placement, length: float) -> np.ndarray:
-    """Basis (n, 6) of the twists of B relative to A that a joint allows; velocities in units of `length` per second."""
-    _, wrenches = demands(kind, A, B)
-    if not len(wrenches):
-        return np.eye(6)
-    scaled = wrenches * np.array([1.0 / length] * 3 + [1.0] * 3)
-    _, _, Vt = np.linalg.svd(scaled)
-    return np.asarray(Vt[len(wrenches) :])
+def freedoms(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """What a joint leaves free of the motion of B relative to A: axes of turns about B's origin, and of slides.
+
+    Shapes (turns, 3) and (slides, 3), orthonormal each; turns come first in the joint's speeds.
+    """
+    declared, (_, wrenches) = joint_class(kind), demands(kind, A, B)
+    turning = wrenches[len(declared.TRANSLATIONS) :, :3]
+    turns = np.linalg.svd(turning)[2][len(turning) :] if len(turning) else np.eye(3)
+    return np.asarray(turns), A.R.T[[k for k in range(3) if k not in declared.TRANSLATIONS]]

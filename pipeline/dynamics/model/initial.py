@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import Ground
+from pipeline.core.scene.parts import Ground, RigidBody
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.chain import path_positions
 from pipeline.dynamics.model.constraints import outboard_place
+from pipeline.dynamics.model.deformation import shift
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.flexible_bodies import bow
 from pipeline.dynamics.model.loads import order
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
@@ -21,8 +24,11 @@ from pipeline.dynamics.model.tree import PATH
 #: state -> frames of all links, (links, FRAME_SIZE), and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-#: misses below this share of the speeds asked for are rounding
-RIGID = 1e-9
+#: misses below this share of the speeds asked for are rounding; speeds that contradict each other miss by more than
+#: this share
+RIGID, CONTRADICTS = 1e-9, 1e-6
+#: combinations of speeds that change rates by less than this share of the largest change nothing: redundant closures
+REDUNDANT = 1e-9
 #: a spring shorter than this share of the mechanism's size has no direction
 SHORTEST = 1e-9
 
@@ -69,7 +75,8 @@ def _world(model: Model, frame: str) -> Placement:
 def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
     """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
 
-    Flexible bodies start without speeds of deformation if joints, drives and given velocities allow that.
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
     Raises InputError when joints and drives do not allow the velocities.
     """
     scene, numbering = model.scene, model.numbering
@@ -87,37 +94,47 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
     nq, nv = numbering.nq, numbering.nv
     y[nq : nq + nv] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told, arms = ~np.isnan(given), _arms(model, wanted)
+    told, centres = ~np.isnan(given), _centres(model, wanted)
+
+    unit, L = model.speed_scales, model.mechanism.length
+    lengths = np.tile([1.0] * 3 + [L] * 3, len(wanted))[told]
+    opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
-        return np.concatenate([_twists(frames, *arms)[told], opening])
+        moving = [centre.motion(frames, state[:nq], state[nq : nq + nv]) for centre in centres]
+        return np.concatenate([np.array(moving).ravel()[told] / lengths, opening / opening_lengths])
 
     base = rates(y)
     columns = []
     for k in range(nv):
         moved = y.copy()
-        moved[nq + k] = 1.0
+        moved[nq + k] = unit[k]
         columns.append(rates(moved) - base)
     matrix = np.array(columns).T.reshape(len(base), nv)
-    target = np.concatenate([given[told], np.zeros(len(base) - told.sum())]) - base
+    asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
+    target = asked - base
+    # a radian, or the mechanism's size, in the time of the whole run is slow
+    slow = 1.0 / (scene.time.end - scene.time.start)
+    fastest = slow + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
     speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * (1.0 + float(np.max(np.abs(target), initial=0.0))):
+    if miss > RIGID * fastest:
         speeds, miss = _least(matrix, target)
-    if wanted and miss > 1e-6 * (1.0 + float(np.max(np.abs(given[told])))):
+    if wanted and miss > CONTRADICTS * fastest:
         names = ", ".join(wanted)
         raise InputError(
             f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g})",
+            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
+            "mechanism's size, or radians, per second)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[nq : nq + nv] = speeds
+    y[nq : nq + nv] = unit * speeds
     return y
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
-    """The least speeds that come nearest to the target, and by how much they miss it."""
-    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=1e-12)
+    """The least speeds that come nearest to the target, and by how much they miss it; all in their natural units."""
+    speeds, *_ = np.linalg.lstsq(matrix, target, rcond=REDUNDANT)
     return speeds, float(np.max(np.abs(matrix @ speeds - target), initial=0.0))
 
 
@@ -125,21 +142,45 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
     return [np.nan] * 3 if given is None else list(given)
 
 
-def _arms(model: Model, bodies: dict) -> tuple[np.ndarray, np.ndarray]:
-    """Number of each body's link, (n,), and its centre of mass in the link's frame, (n, 3)."""
-    links = [model.mechanism.link_of[name] for name in bodies]
-    places = [model.mechanism.links[link].places[name] for link, name in zip(links, bodies, strict=True)]
-    coms = [np.array(getattr(body, "com", (0.0, 0.0, 0.0))) for body in bodies.values()]
-    arms = [place.p + place.R @ com for place, com in zip(places, coms, strict=True)]
-    return np.array(links, dtype=int), np.array(arms).reshape(len(links), 3)
+@dataclass(frozen=True)
+class _Centre:
+    """Centre of mass of a body: its place in the frame of its link, undeformed.
+
+    shape, bow: its shift with the modal coordinates, from q0 and with the speeds from c0 on, as in `deformation.shift`.
+    """
+
+    link: int
+    place: np.ndarray
+    shape: np.ndarray
+    bow: np.ndarray | None = None
+    q0: int = 0
+    c0: int = 0
+
+    def motion(self, frames: np.ndarray, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Angular velocity of the body and velocity of this point, world axes, shape (6,)."""
+        modes, frame = self.shape.shape[1], frames[self.link]
+        bent, bending = q[None, self.q0 : self.q0 + modes], u[None, self.c0 : self.c0 + modes]
+        moved, rate, _ = shift(self.shape, self.bow, bent, bending, np.zeros((1, modes)))
+        R = frame[m.FRAME.axes : m.FRAME.axes + 9].reshape(3, 3)
+        omega, v = (frame[o : o + 3] for o in (m.FRAME.omega, m.FRAME.velocity))
+        return np.concatenate([omega, v + np.cross(omega, R @ (self.place + moved[0])) + R @ rate[0]])
 
 
-def _twists(link_frames: np.ndarray, links: np.ndarray, arms: np.ndarray) -> np.ndarray:
-    """Angular velocity and velocity of the centre of mass of each body, flattened."""
-    frames = link_frames[links]
-    omega, v = frames[:, m.FRAME.omega : m.FRAME.omega + 3], frames[:, m.FRAME.velocity : m.FRAME.velocity + 3]
-    turned = np.einsum("nij,nj->ni", frames[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3), arms)
-    return np.hstack([omega, v + np.cross(omega, turned)]).ravel()
+def _centres(model: Model, bodies: Iterable[str]) -> list[_Centre]:
+    """The centres of mass of bodies, in their order."""
+    mechanism, numbering, found = model.mechanism, model.numbering, []
+    for name in bodies:
+        i = mechanism.link_of[name]
+        place, body = mechanism.links[i].places[name], mechanism.scene.body[name]
+        if isinstance(body, RigidBody):
+            found.append(_Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0))))
+            continue
+        bundle, bent = mechanism.bundles[name], bow(mechanism, name)
+        mass = float(bundle["mass"])
+        first, shape = (bundle[key].values / mass for key in ("first_moment", "modal_first_moment"))
+        bent = None if bent is None else bent / mass
+        found.append(_Centre(i, first, shape, bent, numbering.flex_q0[i], numbering.flex_c0[i]))
+    return found
 
 
 def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:

@@ -25,6 +25,9 @@ from pipeline.dynamics.model.merge import (
 )
 from pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
 
+#: share of the largest radius of gyration below which the distances of a scene are no size of it
+NOTHING = 1e-9
+
 
 @dataclass(frozen=True)
 class Site:
@@ -215,7 +218,13 @@ def _length(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> flo
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)
-    return size if size > 0.0 else 1.0
+    # of a body held at its centre of mass, only rounding of its place is left
+    gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
+    return size if size > NOTHING * gyration else float(gyration) or 1.0
+
+
+def _inertias(links: list[Link]) -> list[tuple[float, np.ndarray, np.ndarray]]:
+    return [link.inertia for link in links if link.inertia is not None]
 
 
 def require_bodies(scene: Scene) -> None:

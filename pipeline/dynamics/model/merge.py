@@ -108,6 +108,7 @@ def merge(scene: Scene, frames: Mapping[str, Frame]) -> tuple[list[Group], dict[
 
 def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group], group_of: Mapping[str, int]) -> None:
     """InputError for fixed joints around a loop of rigid bodies that do not fit together."""
+    same = _same_place(scene, frames)
     for name, joint in scene.joint.items():
         if joint.type != "fixed":
             continue
@@ -116,7 +117,7 @@ def _refuse_bent(scene: Scene, frames: Mapping[str, Frame], groups: list[Group],
             continue
         places = groups[group_of[a.body]].places
         A, B = places[a.body].of(a.place), places[b.body].of(b.place)
-        if not _close(A, B):
+        if not _close(A, B, same):
             angle = np.degrees(np.arccos(np.clip((np.trace(A.R.T @ B.R) - 1.0) / 2.0, -1.0, 1.0)))
             raise InputError(
                 f"[joint.{name}.between]",
@@ -173,13 +174,14 @@ def start_places(
     contradicts the fixed joints.
     """
     known: dict[int, Placement] = {0: Placement()}
+    same = _same_place(scene, frames)
     for i, group in enumerate(groups[1:], start=1):
         for name, place in group.places.items():
             pose = scene.body[name].pose  # type: ignore[union-attr]
             if pose is None:
                 continue
             here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(place.inverse())
-            if i in known and not _close(known[i], here):
+            if i in known and not _close(known[i], here, same):
                 raise InputError(
                     f"[body.{name}.pose]",
                     "contradicts the poses of the bodies that it is fixed to",
@@ -195,8 +197,17 @@ def start_places(
     return [known[i] for i in range(len(groups))]
 
 
-def _close(a: Placement, b: Placement) -> bool:
-    return bool(np.allclose(a.p, b.p, rtol=0, atol=1e-9) and np.allclose(a.R, b.R, rtol=0, atol=1e-9))
+def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
+    """Distance within which two places are one [m]: nine digits of a metre, but six to nine of what the scene spans."""
+    poses = [pose.position for body in scene.body.values() if (pose := getattr(body, "pose", None)) is not None]
+    origins = np.array([(0.0, 0.0, 0.0), *poses])
+    span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.place.p)) for f in frames.values())])
+    return float(np.clip(1e-9, 1e-9 * span, 1e-6 * span)) if span > 0.0 else 1e-9
+
+
+def _close(a: Placement, b: Placement, same: float) -> bool:
+    """Whether two places are one; `same`: distance that makes no difference [m]."""
+    return bool(np.allclose(a.p, b.p, rtol=0, atol=same) and np.allclose(a.R, b.R, rtol=0, atol=1e-9))
 
 
 def _propagate(

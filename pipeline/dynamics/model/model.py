@@ -50,6 +50,13 @@ class Model:
         """The scene that the mechanism was built from."""
         return self.mechanism.scene
 
+    @property
+    def speed_scales(self) -> np.ndarray:
+        """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
+        nq, nv = self.numbering.nq, self.numbering.nv
+        groups = self.arrays.table(m.GROUPS)["group"][nq : nq + nv]
+        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][groups])
+
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
     """Place a system's links so that its joints fit, number it and fill its tables.

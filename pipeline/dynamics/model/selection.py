@@ -14,7 +14,8 @@ from pipeline.dynamics.model.arrays import envelope_size
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.wiring import closure_envelope
 
-#: rows below this share of the longest are rounding
+#: a row below this share of its natural length is rounding: the square root of what rounding leaves of a cancelling
+#: sum, 1e-13 at worst, with some digits to spare
 NOTHING = 1e-6
 
 
@@ -22,36 +23,66 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     """Rows to keep, as many as `rank`, and their least pivot: 1 for rows at right angles, 0 for dependent ones.
 
     spread: J L^-T, shape (rows, nv), a row each in the metric of the mass, M = L L^T.  scale: what a row's
-    length is compared with, so that one that has shrunk to nothing is not mistaken for a good one.  QR decomposition
-    with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each row kept is the one that stands
-    out most from those before.
+    length is compared with, so that one that has shrunk to nothing is not mistaken for a good one; a row of the scale 0
+    moves nothing.  QR decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each
+    row kept is the one that stands out most from those before.  Of rows that are no numbers the first ones are kept,
+    with the pivot 0.
     """
     from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
 
     kept, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
     if not count:
         return kept, 1.0
-    R, order = qr((spread / scale[:, None]).T, mode="r", pivoting=True)
+    compared = spread / np.where(scale > 0.0, scale, 1.0)[:, None]
+    if not np.isfinite(compared).all():
+        kept[:count] = True
+        return kept, 0.0
+    R, order = qr(compared.T, mode="r", pivoting=True)
     kept[order[:count]] = True
     return kept, float(R[count - 1, count - 1] ** 2)
 
 
-def row_scales(model: Model, spread: np.ndarray) -> np.ndarray:
+def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
     """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
 
-    Not less than a small share of the longest of all, a length of the mechanism's size counting like a radian: rows
-    that are nothing but rounding must stay small.
+    Not less than a small share of the row's natural length: rows that are nothing but rounding must stay small.
     """
     kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
-    units = np.where(kinds == 0, model.mechanism.length, 1.0)
     lengths = np.linalg.norm(spread, axis=1)
-    floor = NOTHING * units * float(np.max(lengths / units, initial=0.0))
     for line in model.arrays.table(m.CLOSURES):
         span = slice(line["row0"], line["row0"] + line["n_rows"])
         for kind in (0, 1):
             mine = np.flatnonzero(kinds[span] == kind) + span.start
-            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), floor[mine])
+            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), NOTHING * natural[mine])
     return scales
+
+
+def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Length in the metric of the mass that each closure row would have if nothing cancelled in it; shape (rows,).
+
+    columns: rows of the work space's table COLUMNS; points: origins of all sites, (sites, 3);
+    factor: L of the mass matrix.  A turn counts with the mechanism's size as its arm, which only rounding resolves.
+    All are 0 where the mass matrix has no factor.
+    """
+    from scipy.linalg import solve_triangular
+
+    arrays, found = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
+    if not np.all(factor.diagonal() > 0.0):
+        return found
+    kinds, entries = arrays.table(m.CLOSURE_ROWS)["kind"], arrays.table(m.ENTRIES)
+    support = arrays.table(m.SUPPORT)["coordinate"]
+    inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
+    mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
+    for c in arrays.table(m.CLOSURES):
+        mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
+        turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
+        angle = np.linalg.norm(turn, axis=1)
+        way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.mechanism.length * angle
+        share = mobility[support[c["support0"] + mine["slot"]]]
+        rows = slice(c["row0"], c["row0"] + c["n_rows"])
+        along, about = (np.sqrt(np.sum(size**2 * share)) for size in (way, angle))
+        found[rows] = np.where(kinds[rows] == 0, along, about)
+    return found
 
 
 def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:

@@ -18,21 +18,21 @@ ZERO = 1e-14
 TAKES_PART = 1e-3
 
 
-def refuse(model: Model, poses: Sequence[Placement], twists: np.ndarray, J: np.ndarray, rank: int) -> None:
+def refuse(model: Model, poses: Sequence[Placement], twists: np.ndarray, free: np.ndarray) -> None:
     """InputError when rigid bodies can move without any of their masses moving.
 
-    twists: of every column of the layout, (columns, 6), velocities in units of the size; J: closure rows, (rows, nv).
-    Flexible bodies are left to the engine, whose mass matrix knows their modes.
+    twists: unit motions of every column of the numbering, (columns, 6); free: those of them that open no closure,
+    (nv, mobility).  Flexible bodies are left to the engine, whose mass matrix knows their modes.
     """
     links, nv, L = model.mechanism.links, model.numbering.nv, model.mechanism.length
-    if any(link.flexible for link in links) or rank == nv:
+    if any(link.flexible for link in links):
         return
     moved = np.zeros((len(links), 6, nv))
     own, even = np.zeros((nv, nv)), np.zeros((nv, nv))
     for i, link in enumerate(links[1:], start=1):
         for coordinate, column in model.numbering.joint_route(i):
             if coordinate < nv:
-                moved[i, :, coordinate] = twists[column]
+                moved[i, :, coordinate] = twists[column] / ([1.0] * 3 + [L] * 3)
         if link.inertia is not None:
             m, com, inertia = link.inertia
             turning, R = moved[i, :3], poses[i].R
@@ -40,7 +40,6 @@ def refuse(model: Model, poses: Sequence[Placement], twists: np.ndarray, J: np.n
             most = np.linalg.eigvalsh(inertia)[-1] / L**2 + m * LEAST_GYRATION**2
             own += m * moving.T @ moving + turning.T @ (R @ inertia @ R.T / L**2) @ turning
             even += m * moving.T @ moving + most * turning.T @ turning
-    free = np.linalg.svd(J)[2][rank:].T if rank else np.eye(nv)
     motion = _without_mass(free.T @ own @ free, free.T @ even @ free)
     if motion is not None:
         _refuse(model, moved @ (free @ motion))

@@ -79,7 +79,7 @@ def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tu
         declared = joint_class(kind)
         mine = [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
         slots = sorted({c for c, _, _ in routes[old] if c < numbering.nv})
-        moved = _moved(routes[old])
+        moved = uncommon(routes[old])
         entry0 = len(entries)
         entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < numbering.nv]
         known += [(new, c - numbering.nv, col, sign) for c, col, sign in moved if c >= numbering.nv]
@@ -106,7 +106,7 @@ def closure_route(numbering: Numbering, a: int, b: int) -> list[tuple[int, int, 
     return [(c, col, 1) for c, col in numbering.route(b)] + [(c, col, -1) for c, col in numbering.route(a)]
 
 
-def _moved(route: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+def uncommon(route: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
     """What is left after motions common to both sides cancel."""
     plus = {col for _, col, sign in route if sign > 0}
     minus = {col for _, col, sign in route if sign < 0}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from pipeline.dynamics.model.deformation import shift
 from pipeline.dynamics.model.flexible_bodies import bow
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.deformation import shift
 from pipeline.dynamics.record.motion import Motion, modal
 
 

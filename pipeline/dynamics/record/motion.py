@@ -9,9 +9,9 @@ import numpy as np
 from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.deformation import shift
 from pipeline.dynamics.model.flexible_bodies import bow
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.deformation import shift
 
 
 @dataclass(frozen=True)

@@ -43,12 +43,13 @@ def topology(
     redundant = np.array([name in engine.mobility.redundant_joints for name in joints], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.numbering.nv
-    values = _singular_values(engine, trajectory, seen)
+    values = _singular_values(engine, trajectory, seen, singular.natural)
     rank = np.zeros(rows, dtype=np.int32)
     if values.shape[1]:
         rank = np.sum(values > ZERO * values[:, :1], axis=1).astype(np.int32)
-        least = np.maximum(values[:, -1], values[:, 0] / singular.INFINITE)
-        variables["condition"] = (("time",), np.minimum(values[:, 0] / least, singular.INFINITE))
+        told = _singular_values(engine, trajectory, seen, singular.scaled)
+        least = np.maximum(told[:, -1], told[:, 0] / singular.INFINITE)
+        variables["condition"] = (("time",), np.minimum(told[:, 0] / least, singular.INFINITE))
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
     if not values.shape[1]:
@@ -63,18 +64,16 @@ def topology(
     return variables, {"pass_joint": ("singular_pass", np.array([p.joint for p in found], dtype=str))}
 
 
-def _jacobians(engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> np.ndarray:
-    """Scaled closure Jacobian of every row, with the rows solved for there; (time, rank, nv)."""
+def _singular_values(
+    engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray], scale: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """Singular values of every row's closure Jacobian, with the rows solved for there; shape (time, rank)."""
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
         J = selection.dense(engine.model, engine.h, seen["jacobian"][part])
-        parts.append(singular.scaled(engine.model, engine.h, J))
-    return np.concatenate(parts)
-
-
-def _singular_values(engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray]) -> np.ndarray:
-    J = _jacobians(engine, trajectory, seen)
+        parts.append(scale(engine.model, engine.h, J))
+    J = np.concatenate(parts)
     return np.linalg.svd(J, compute_uv=False) if J.size else np.zeros((len(J), 0))
 
 

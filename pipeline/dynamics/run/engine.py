@@ -102,6 +102,14 @@ class Engine:
         self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
 
+    def mass_factor(self) -> np.ndarray:
+        """L of the mass matrix M = L L^T that the last evaluation left in its envelope, shape (nv, nv)."""
+        arrays, nv = self.model.arrays, self.model.numbering.nv
+        L, entries = np.zeros((nv, nv)), self.view(m.MASS, arrays.size(m.MASS_SIZE))
+        for i, (first, start) in enumerate(arrays.table(m.ENVELOPE)):
+            L[i, first : i + 1] = entries[start : start + i + 1 - first]
+        return L
+
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
         size = self.model.arrays.size(m.JACOBIAN_SIZE)
@@ -128,7 +136,10 @@ def prepare(model: Model, progress: Progress) -> Engine:
     h, w, n = model.arrays.work_space(method.room)
     kept = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool)
     entry.connect(h)
-    return Engine(model, entry, method, h, kept, mobility, w, n, scene.time.start, scene.time.end, scene.solver.rtol)
+    end, rtol = scene.time.end, scene.solver.rtol
+    engine = Engine(model, entry, method, h, kept, mobility, w, n, scene.time.start, end, rtol)
+    engine.view(m.CONTROL, m.N_CONTROLS)[m.LENGTH] = model.mechanism.length
+    return engine
 
 
 def consistent_start(engine: Engine) -> tuple[np.ndarray, float]:

@@ -35,11 +35,17 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
     engine.keep(everything)
     engine.attempt(y, t)
     spread = engine.rows(m.SPREAD)
-    scales = selection.row_scales(engine.model, spread)
+    scales = selection.row_scales(engine.model, spread, _natural_lengths(engine))
     kept, ratio = selection.choose(spread, scales, engine.mobility.rank)
     engine.keep(kept)
     engine.view(m.ROW_SCALE, int(kept.sum()))[:] = scales[kept] ** 2
     return ratio
+
+
+def _natural_lengths(engine: Engine) -> np.ndarray:
+    columns = engine.table(m.COLUMNS, engine.model.numbering.columns)
+    points = engine.table(m.SITE_FRAMES, engine.model.arrays.size(m.N_SITES))["origin"]
+    return selection.natural_lengths(engine.model, columns, points, engine.mass_factor())
 
 
 def improve(engine: Engine, t: float) -> bool:
@@ -64,9 +70,15 @@ def improve(engine: Engine, t: float) -> bool:
 
 
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`, so that all entries are pure numbers."""
+    """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`: what condition numbers are told of."""
     along = built_rows(model, h) == 0
     return J * np.where(along, 1.0 / SCALE, 1.0)[:, None] * coordinate_scales(model.numbering)
+
+
+def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
+    """The same with lengths in units of the mechanism's size, and modes with the root of their body's mass besides."""
+    along = built_rows(model, h) == 0
+    return J * np.where(along, 1.0 / model.mechanism.length, 1.0)[:, None] * model.speed_scales
 
 
 def built_rows(model: Model, h: np.ndarray) -> np.ndarray:
@@ -93,7 +105,9 @@ def diagnosis(engine: Engine) -> str:
     if not engine.model.mechanism.closures:
         return "no loop is closed"
     J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
-    if not J.size or not np.isfinite(J).all():
+    if not J.size:
+        return "no closure holds anything that the tree's joints leave free"
+    if not np.isfinite(J).all():
         return "the closures cannot be evaluated"
     U, values, _ = np.linalg.svd(J)
     if len(values) < len(J):

@@ -27,10 +27,10 @@ made the page: their ratios carry over to others, their values do not.
 
 @dataclass(frozen=True, slots=True)
 class Studied:
-    """A scene's study and its printed tables (Markdown), and where its pictures are, relative to the page."""
+    """What the page says of a scene: `advice`, its tables (Markdown), its pictures by title, relative to the page."""
 
     scene: str
-    study: xr.Dataset
+    advice: str
     tables: tuple[str, ...]
     pictures: Mapping[str, str]
 
@@ -38,7 +38,12 @@ class Studied:
 def markdown(scenes: tuple[Studied, ...], page: str) -> str:
     """The whole page."""
     names = " ".join(s.scene for s in scenes)
-    parts = [INTRODUCTION.format(scenes=names, page=page), "## What to choose\n", *(_advice(s) for s in scenes)]
+    return "\n".join([INTRODUCTION.format(scenes=names, page=page), sections(scenes)])
+
+
+def sections(scenes: tuple[Studied, ...]) -> str:
+    """What to choose for each scene, and then each with its pictures and tables."""
+    parts = ["## What to choose\n", *(f"- **{s.scene}**: {s.advice}\n" for s in scenes)]
     for s in scenes:
         parts.append(f"\n## {s.scene}\n")
         parts += [f"![{title} of {s.scene}]({path})\n" for title, path in s.pictures.items()]
@@ -46,9 +51,9 @@ def markdown(scenes: tuple[Studied, ...], page: str) -> str:
     return "\n".join(parts)
 
 
-def _advice(scene: Studied) -> str:
+def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
-    found = {target: cheapest(scene.study, target) for target in TARGETS}
+    found = {target: cheapest(study, target) for target in TARGETS}
     had = {target: choice for target, choice in found.items() if choice is not None}
     text = "; ".join(f"{target:g} takes {c.name} ({c.evaluations:.0f} evaluations)" for target, c in had.items())
     said = [
@@ -56,9 +61,9 @@ def _advice(scene: Studied) -> str:
     ]
     if had:
         said += [_digits(had)]
-    said += [_some(scene.study, target) for target in TARGETS if target not in had]
-    said += [_horizon(scene), _limits(scene.study)]
-    return f"- **{scene.scene}**: {' '.join(filter(None, said))}\n"
+    said += [_some(study, target) for target in TARGETS if target not in had]
+    said += [_horizon(study, tables), _limits(study)]
+    return " ".join(filter(None, said))
 
 
 def _some(study: xr.Dataset, target: float) -> str:
@@ -78,13 +83,13 @@ def _digits(had: Mapping[float, Choice]) -> str:
     return f"Each further digit multiplies the evaluations by {factor:.2f}."
 
 
-def _horizon(scene: Studied) -> str:
+def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     """What is to be done where a run cannot be predicted to its end."""
-    horizon, end = scene.study.attrs["horizon"], scene.study.attrs["end"]
+    horizon, end = study.attrs["horizon"], study.attrs["end"]
     if horizon == "none" or horizon >= end:
         return ""
     beyond = "the means of an ensemble, below, which more members make better and tighter tolerances do not"
-    if not any("Beyond the horizon" in table for table in scene.tables):
+    if not any("Beyond the horizon" in table for table in tables):
         beyond = "an ensemble, which the scene can ask for (`[ensemble]`)"
     return f"All this holds up to t = {horizon:.3g} s of {end:.3g} s; beyond that nothing but {beyond}."
 

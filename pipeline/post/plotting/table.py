@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import html
 import io
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -39,11 +40,15 @@ def as_csv(table: Table) -> str:
 
 def as_markdown(table: Table) -> str:
     """Title, aligned pipe table and notes."""
-    width = [max(3, *(len(row[i]) for row in (table.columns, *table.rows))) for i in range(len(table.columns))]
-    lines = [_line(table.columns, width), "|" + "|".join(_rule(i, w) for i, w in enumerate(width)) + "|"]
-    lines += [_line(row, width) for row in table.rows]
     notes = "".join(f"\n{note}\n" for note in table.notes)
-    return f"**{table.title}**\n\n" + "\n".join(lines) + f"\n{notes}"
+    return f"**{table.title}**\n\n{pipe_table(table.columns, table.rows)}\n{notes}"
+
+
+def pipe_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Markdown that reads the same on a terminal: the first column is text, the others are numbers."""
+    width = [max(3, *(len(row[i]) for row in (columns, *rows))) for i in range(len(columns))]
+    rule = "|" + "|".join(_rule(i, w) for i, w in enumerate(width)) + "|"
+    return "\n".join([_line(columns, width), rule, *(_line(row, width) for row in rows)])
 
 
 def from_markdown(text: str) -> Table:
@@ -69,7 +74,7 @@ def as_html(table: Table) -> str:
     )
 
 
-def _line(cells: tuple[str, ...], width: list[int]) -> str:
+def _line(cells: Sequence[str], width: list[int]) -> str:
     padded = (c.ljust(w) if i == 0 else c.rjust(w) for i, (c, w) in enumerate(zip(cells, width, strict=True)))
     return "| " + " | ".join(padded) + " |"
 

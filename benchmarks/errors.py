@@ -1,0 +1,124 @@
+"""Errors of whole runs against one converged reference, and our own ladder of tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.mechanisms import Mechanism
+from benchmarks.timing import once
+from pipeline import dynamics
+from pipeline.core.progress import silent
+from pipeline.core.scene.load import edited
+from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.run import observed
+from pipeline.dynamics.run.trajectory import integrate
+
+#: two codes are compared at multiples of this [s]
+SAMPLING = 1e-3
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
+#: of the reference
+FINEST = 1e-13
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Motion of a body's centre of mass: time [s], shape (n,); position [m] and velocity [m/s], shape (n, 3)."""
+
+    time: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+
+
+@dataclass(frozen=True)
+class Error:
+    """Largest deviations over the samples: of position [m] and velocity [m/s]; speed: the largest speed [m/s]."""
+
+    position: float
+    velocity: float
+    speed: float
+
+    @property
+    def relative(self) -> float:
+        """Error of the velocity as a share of the largest speed."""
+        return self.velocity / self.speed
+
+    def within(self, other: Error) -> bool:
+        """Whether neither deviation is larger."""
+        return self.position <= other.position and self.velocity <= other.velocity
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One of our runs: its tolerance, what it costs, how wrong it is, and how to time it once more [s]."""
+
+    rtol: float
+    evaluations: int
+    error: Error
+    time: Callable[[], float]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A motion to compare with, up to a horizon [s]."""
+
+    samples: Samples
+    horizon: float
+
+    def error(self, samples: Samples) -> Error:
+        """Deviation of a motion; ValueError when it was sampled at other times."""
+        here, known = samples.time <= self.horizon * (1.0 + 1e-9), self.samples
+        t = samples.time[here]
+        k = np.minimum(np.searchsorted(known.time, t - 0.5 * SAMPLING), len(known.time) - 1)
+        if not np.allclose(known.time[k], t, rtol=0.0, atol=1e-6 * SAMPLING):
+            raise ValueError("the two runs were not sampled at the same times")
+        return Error(
+            float(np.max(np.linalg.norm(samples.position[here] - known.position[k], axis=1))),
+            float(np.max(np.linalg.norm(samples.velocity[here] - known.velocity[k], axis=1))),
+            float(np.max(np.linalg.norm(known.velocity[k], axis=1))),
+        )
+
+
+def converged(here: Mechanism, body: str, horizon: float) -> Reference:
+    """Our run at the tightest tolerance."""
+    return Reference(_regular(_run(_at(here, FINEST)), body), horizon)
+
+
+def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
+    """Our runs at all tolerances."""
+    rungs = []
+    for rtol in TOLERANCES:
+        mine = _at(here, rtol)
+        run = _run(mine)
+        rungs.append(Rung(rtol, int(run.attrs["evaluations"]), reference.error(_regular(run, body)), _timer(mine)))
+    return rungs
+
+
+def _at(here: Mechanism, rtol: float) -> Mechanism:
+    return here.with_scene(here.name, edited(here.scene, {"solver.rtol": rtol, "output.interval": SAMPLING}))
+
+
+def _run(here: Mechanism) -> xr.Dataset:
+    return dynamics.simulate(here.scene, here.bundles, silent)
+
+
+def _regular(run: xr.Dataset, body: str) -> Samples:
+    """The rows at multiples of the sampling time; those of events lie in between."""
+    time, motion = run["time"].values, run.sel(body=body)
+    here = np.abs(time / SAMPLING - np.round(time / SAMPLING)) < 1e-6
+    return Samples(time[here], motion["position"].values[here], motion["velocity"].values[here])
+
+
+def _timer(here: Mechanism) -> Callable[[], float]:
+    engine = here.engine()
+    start, _ = consistent_start(engine)
+    # with the rows evaluated, as the peer evaluates its samples
+    return lambda: once(lambda: observed(engine, integrate(engine, start, silent)))
+
+
+def cheapest(rungs: list[Rung], good: Callable[[Error], bool]) -> Rung | None:
+    """Our run with the fewest evaluations whose error is good."""
+    return min((rung for rung in rungs if good(rung.error)), key=lambda rung: rung.evaluations, default=None)

@@ -1,0 +1,14 @@
+"""The benchmarks: a module each, whose `FAMILY` declares it (`benchmarks.family.Family`)."""
+
+KIND = "benchmark"
+NAMES = {
+    "evaluation": "evaluation:FAMILY",
+    "runs": "runs:FAMILY",
+    "growth": "growth:FAMILY",
+    "exudyn": "exudyn:FAMILY",
+    "integrators": "integrators:FAMILY",
+    "accuracy": "accuracy:FAMILY",
+    "solids": "solids:FAMILY",
+    "stability": "stability:FAMILY",
+    "reference-conditions": "reference_conditions:FAMILY",
+}

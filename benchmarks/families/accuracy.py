@@ -1,0 +1,76 @@
+"""What accuracy costs: the studies of `flexclear cost` of five scenes, with Exudyn's logged runs beside ours.
+
+The studies are in the store, point by point. The log has what the page says of them, and the digests of their pictures,
+which are drawn with the studies and not from the log.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+
+from benchmarks import log
+from benchmarks.families import exudyn
+from benchmarks.family import Case, Family, Measured, Record
+from pipeline.core.artifacts.paths import results_root
+from pipeline.core.scene.load import load_scene
+from pipeline.post.cost.page import Studied, sections
+from pipeline.post.plotting.table import Table, as_markdown, from_markdown
+from stages import cost
+from stages.run import find_scene, workplace
+
+SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_damped", "sps4/far_csj_cb")
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """Of each scene a record with the advice, one for each picture, one for each table."""
+    place = workplace()
+    peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
+    for case in cases:
+        study, folder = cost.bring(load_scene(find_scene(case.name)), place, peers.get(case.name, ()))
+        said, pictures = cost.told(case.name, study, folder, "accuracy")
+        records: list[Record] = [{"advice": said.advice}]
+        for title, path in said.pictures.items():
+            file = pictures[path]
+            digest = hashlib.sha256(file.read_bytes()).hexdigest()
+            records.append({"picture": title, "path": path, "file": file.name, "sha256": digest})
+        yield case, records + [{"table": asdict(from_markdown(text))} for text in said.tables]
+
+
+def show(records: list[Record]) -> str:
+    """What to choose for each scene, and its pictures and tables."""
+    found = []
+    for scene in dict.fromkeys(r["case"] for r in records):
+        mine = [r for r in records if r["case"] == scene]
+        tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r)
+        pictures = {r["picture"]: r["path"] for r in mine if "picture" in r}
+        found.append(Studied(scene, next(r["advice"] for r in mine if "advice" in r), tables, pictures))
+    return sections(tuple(found))
+
+
+def _table(told: Mapping[str, list]) -> Table:
+    rows = tuple(tuple(row) for row in told["rows"])
+    return Table(str(told["title"]), tuple(told["columns"]), rows, tuple(told["notes"]))
+
+
+def files(records: list[Record]) -> dict[str, bytes]:
+    """Pictures that are among the results still; those of other studies have other digests."""
+    found = {}
+    for r in records:
+        file = results_root() / "cost" / r["case"] / r.get("file", "")
+        if "picture" in r and file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() == r["sha256"]:
+            found[r["path"]] = file.read_bytes()
+    return found
+
+
+FAMILY = Family(
+    what="error against cost of five scenes, and where the error comes from",
+    takes="40 min",
+    page="accuracy.md",
+    cases=lambda: [Case(scene) for scene in SCENES],
+    measure=measure,
+    show=show,
+    files=files,
+    times=False,
+)

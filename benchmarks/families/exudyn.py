@@ -1,0 +1,243 @@
+"""Whole runs against Exudyn at equal error, both against the same converged reference.
+
+Each of Exudyn's runs is measured next to ours that is no worse in position and velocity and needs the fewest
+evaluations. Times are those of the whole integration with its samples; building the model and compiling are in neither.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from benchmarks import errors
+from benchmarks.errors import Error, Reference, Rung
+from benchmarks.exudyn_model import METHODS, Outcome, solve
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
+from benchmarks.page import short
+from pipeline.core.scene.schema import Scene
+from pipeline.post.plotting.table import pipe_table
+
+BODY = "platform"
+#: shares of the largest speed for which the times needed are compared
+LEVELS = (1e-2, 1e-3, 1e-4)
+REPEATS = 3
+#: Exudyn runs longer than this are not repeated [s]
+LONG = 1.0
+SMOOTH = (1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
+STIFF = (5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
+#: the second method is no better in the long run; it takes part at the first steps of each ladder
+TRIED = 4
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A scene, edited or not.
+
+    horizon: end of the comparison [s].  own_law: Exudyn has another friction law.
+    study: the cost study in whose figure its runs are points.  note: how they differ from that scene.
+    """
+
+    scene: str
+    steps: tuple[float, ...]
+    edit: Callable[[Scene], Scene] = field(default=lambda scene: scene, repr=False)
+    horizon: float | None = None
+    own_law: bool = False
+    study: str = ""
+    note: str = ""
+
+
+OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
+COMPARISONS = {
+    "ideal": Comparison("ideal", SMOOTH, study="sps4/ideal"),
+    "far_cb": Comparison("far_cb", SMOOTH, study="sps4/far_cb"),
+    "csj without friction": Comparison("csj", STIFF, without_friction),
+    "csj, each code with its own friction law": Comparison(
+        "csj", STIFF, own_law=True, study="sps4/csj", note=f"; {OWN_LAW}"
+    ),
+    "far_csj_cb without friction, 5 % modal damping": Comparison(
+        "far_csj_cb",
+        STIFF,
+        lambda scene: damped(without_friction(scene), 0.05),
+        study="sps4/variants/far_csj_cb_damped",
+        note="; without friction",
+    ),
+    "far_csj_cb without friction, error up to 30 ms": Comparison(
+        "far_csj_cb",
+        STIFF,
+        without_friction,
+        horizon=0.03,
+        study="sps4/far_csj_cb",
+        note="; without friction; errors up to 30 ms",
+    ),
+}
+
+
+def edited(case: Case) -> Mechanism:
+    """The mechanism that both codes run."""
+    original = mechanism(case.of.scene)
+    return original.with_scene(case.name, case.of.edit(original.scene))
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """Of each case a record on what is compared, then one for each of our runs and one for each of Exudyn's."""
+    for case in cases:
+        yield case, list(_records(case, edited(case)))
+
+
+def _records(case: Case, here: Mechanism) -> Iterator[Record]:
+    asked: Comparison = case.of
+    horizon = asked.horizon or here.scene.time.end
+    reference = errors.converged(here, BODY, horizon)
+    ours = errors.ladder(here, BODY, reference)
+    theirs, law, steps = reference, {}, asked.steps
+    if asked.own_law:
+        finest = solve(here, BODY, next(iter(METHODS)), steps[-1])
+        if finest.samples is None:
+            raise RuntimeError(f"Exudyn fails on its finest run of {case.name}: {finest.failure}")
+        theirs, steps = Reference(finest.samples, horizon), steps[:-1]
+        law = {"difference_of_laws": _numbers(reference.error(finest.samples))}
+    yield {"horizon": horizon, "version": version("exudyn"), **law}
+    for r in ours:
+        yield {"by": "flexclear", "rtol": r.rtol, "evaluations": r.evaluations, **_numbers(r.error)}
+    for k, method in enumerate(METHODS):
+        for step in steps[:TRIED] if k else steps:
+            yield {"by": "exudyn", "method": method, "step": step, **_run(here, method, step, theirs, ours)}
+
+
+def _numbers(error: Error) -> dict[str, float]:
+    return {"position_um": 1e6 * error.position, "velocity_mm_s": 1e3 * error.velocity, "relative": error.relative}
+
+
+def _run(here: Mechanism, method: str, step: float, reference: Reference, ours: list[Rung]) -> Record:
+    """One of their runs, and next to it ours that match its error or one of the levels."""
+    first = solve(here, BODY, method, step)
+    if first.samples is None:
+        return {"failed": first.failure}
+    error = reference.error(first.samples)
+    wanted = {"equal": errors.cheapest(ours, lambda e: e.within(error))}
+    for level in LEVELS:
+        wanted[str(level)] = errors.cheapest(ours, partial(_reaches, level))
+    seconds, timed = _side_by_side(here, method, step, first, [rung for rung in wanted.values() if rung])
+    matches = {
+        name: {"rtol": rung.rtol, "s": timed[rung.rtol], "ratio": seconds / timed[rung.rtol]}
+        for name, rung in wanted.items()
+        if rung
+    }
+    return {"s": seconds, **_numbers(error), "ours": matches}
+
+
+def _reaches(level: float, error: Error) -> bool:
+    return error.relative <= level
+
+
+def _side_by_side(
+    here: Mechanism, method: str, step: float, first: Outcome, rungs: list[Rung]
+) -> tuple[float, dict[float, float]]:
+    """Median times [s] of theirs, and of ours by tolerance, measured in turns."""
+    theirs, ours = [first.seconds], {rung.rtol: [rung.time()] for rung in rungs}
+    for _ in range(REPEATS - 1):
+        if first.seconds < LONG:
+            theirs.append(solve(here, BODY, method, step).seconds)
+        for rung in {rung.rtol: rung for rung in rungs}.values():
+            ours[rung.rtol].append(rung.time())
+    return float(np.median(theirs)), {rtol: float(np.median(times)) for rtol, times in ours.items()}
+
+
+def show(records: list[Record]) -> str:
+    """Times needed for an accuracy, then every run of Exudyn with ours beside it."""
+    heads, runs = {r["case"]: r for r in records if "horizon" in r}, _runs(records)
+    levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
+    head = ("velocity error below", "Exudyn [s]", "step [s]", "ours [s]", "rtol", "Exudyn / ours")
+    columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "rtol", "ours, no worse [s]", "ratio")
+    texts = [pipe_table(head, levels)]
+    for case, r in heads.items():
+        note = f"error over {1e3 * r['horizon']:g} ms"
+        if "difference_of_laws" in r:
+            d = r["difference_of_laws"]
+            note += (
+                "; each against the converged solution of its own law, which differ by "
+                f"{short(d['position_um'])} um and {short(d['velocity_mm_s'])} mm/s"
+            )
+        texts.append(f"{case} ({note}):\n\n{pipe_table(columns, [_run_row(run) for run in runs[case]])}")
+    return "\n\n".join(texts)
+
+
+def _runs(records: list[Record]) -> dict[str, list[Record]]:
+    """Exudyn's runs by case."""
+    found: dict[str, list[Record]] = {}
+    for r in records:
+        if r.get("by") == "exudyn":
+            found.setdefault(r["case"], []).append(r)
+    return found
+
+
+def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
+    """Their fastest run that reaches a level against ours; theirs may reach none, then its longest run is a bound."""
+    name = f"{case}: {100 * level:g} %"
+    done = [r for r in runs if "s" in r and str(level) in r["ours"]]
+    reaching = [r for r in done if r["relative"] <= level]
+    if not done:
+        return [name, "", "", "", "", ""]
+    best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
+    mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
+    seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
+    return [name, seconds, f"{best['step']:g}", f"{ours['s']:.3g}", f"{ours['rtol']:g}", ratio]
+
+
+def _run_row(run: Record) -> list[str]:
+    name = f"{run['method']}, {run['step']:g} s"
+    if "failed" in run:
+        return [name, "failed", "", "", "", "", ""]
+    cells = [short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
+    equal = run["ours"].get("equal")
+    matched = [f"{equal['rtol']:g}", f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""]
+    return [name, *cells, *matched]
+
+
+def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
+    """By scene of a cost study its runs as `flexclear cost --peer` draws them: seconds [s] and errors [SI] by step."""
+    versions = {r["case"]: r["version"] for r in records if "version" in r}
+    return {
+        asked.study: list(_tracks(runs, f"Exudyn {versions[case]}", asked.note))
+        for case, runs in _runs(records).items()
+        if (asked := COMPARISONS[case]).study
+    }
+
+
+def _tracks(runs: list[Record], program: str, note: str) -> Iterator[dict[str, Any]]:
+    done = [run for run in runs if "s" in run]
+    for method in dict.fromkeys(run["method"] for run in done):
+        mine = [run for run in done if run["method"] == method]
+        yield {
+            "name": f"Exudyn, {method}",
+            "note": f"{program}: times of its integration alone, ours hold all that a run records{note}",
+            "seconds": [run["s"] for run in mine],
+            "error": {
+                f"{BODY}.position": [1e-6 * run["position_um"] for run in mine],
+                f"{BODY}.velocity": [1e-3 * run["velocity_mm_s"] for run in mine],
+            },
+        }
+
+
+def files(records: list[Record]) -> Mapping[str, bytes]:
+    """The file of those points."""
+    return {"accuracy/exudyn.json": f"{json.dumps(points(records), indent=1)}\n".encode()}
+
+
+FAMILY = Family(
+    what="whole runs against Exudyn at equal error",
+    takes="15 min",
+    page="benchmarks.md",
+    cases=lambda: [Case(name, asked) for name, asked in COMPARISONS.items()],
+    measure=measure,
+    show=show,
+    files=files,
+    needs=("exudyn", "exudyn"),
+)

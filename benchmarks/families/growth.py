@@ -1,0 +1,158 @@
+"""What absent effects cost, and how the cost grows with the number of loops.
+
+The N-four-bar: N + 1 upright rods on revolute joints, their tops joined by N rods. In space, planar loops with
+revolute joints alone are redundant; here the joining rods have a spherical joint at each end and may spin about their
+own axes, which leaves the planar motion as it is and every closure independent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from benchmarks.family import REFUSED, Case, Family, Measured, Record
+from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
+from benchmarks.page import percent, short, spread, table
+from benchmarks.timing import interleaved, slope
+from pipeline.core.errors import FlexclearError
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.run.engine import Engine
+
+LOOPS = (5, 10, 20, 40, 80)
+#: what the fullest scene loses, and the scene that never had it
+ABSENT = {"clearance and flexibility": "ideal", "flexibility": "csj", "clearance": "far_cb"}
+ROUNDS = 25
+#: evaluations of a round, for one loop or scene
+EVALUATIONS = 4000
+
+
+def cases() -> list[Case]:
+    """Absent effects, then numbers of loops."""
+    return [Case(effect) for effect in ABSENT] + [Case(f"{n} loops", n) for n in LOOPS]
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each; numbers of loops take turns."""
+    for case in cases:
+        if case.name in ABSENT:
+            yield case, [_absent(case.name)]
+    yield from _loops([case for case in cases if case.name not in ABSENT])
+
+
+def _absent(effect: str) -> Record:
+    full, without = mechanism("far_csj_cb"), mechanism(ABSENT[effect])
+    engines = {"stripped": stripped(full, effect).engine(), "without": without.engine()}
+    times = interleaved({label: _evaluation(engine, EVALUATIONS) for label, engine in engines.items()}, ROUNDS)
+    return {
+        "scene": without.name,
+        "same_code": engines["stripped"].entry == engines["without"].entry,
+        "stripped_us": 1e6 * times["stripped"].median,
+        "without_us": 1e6 * times["without"].median,
+        "ratio": times["stripped"].over(times["without"]),
+        "spread": max(t.spread for t in times.values()),
+    }
+
+
+def stripped(full: Mechanism, effect: str) -> Mechanism:
+    """The fullest scene with a rigid rod in place of its flexible one, an ideal joint in place of the loose one."""
+    scene = full.scene
+    if "flexibility" in effect:
+        scene = scene.model_copy(update={"body": scene.body | {"rod1": mechanism("csj").scene.body["rod1"]}})
+    return full.with_scene(effect, without_clearance(scene) if "clearance" in effect else scene)
+
+
+def _loops(cases: Sequence[Case]) -> Measured:
+    tasks = {}
+    for case in cases:
+        try:
+            engine = Mechanism(case.name, four_bars(case.of), {}).engine()
+            tasks[case.name] = _evaluation(engine, max(EVALUATIONS // case.of, 10))
+        except FlexclearError as error:
+            yield case, [{"loops": case.of, "verdict": REFUSED, "reason": str(error)}]
+    times = interleaved(tasks, ROUNDS)
+    for case in cases:
+        if case.name in times:
+            yield case, [{"loops": case.of, **times[case.name].told("us")}]
+
+
+def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
+    state = states(engine, trajectory(engine))["free"]
+    return lambda: evaluation_time(engine, state, repeat)
+
+
+def four_bars(loops: int) -> Scene:
+    """N-four-bar with rods of 1 m and 1 kg under gravity along -z, its motion in the plane of x and z.
+
+    Data: IFToMM benchmark problem A02 (links of 1 m and 1 kg, first top at 1 m/s); joints as said above.
+    """
+    thin = [1.0 / 12.0, 1.0 / 12.0, 1e-4]  # a rod of 1 kg and 1 m along z; the last only keeps the spin regular
+    body: dict[str, Any] = {"ground": {"type": "ground", "frames": {}}}
+    joint: dict[str, Any] = {}
+    across = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
+    for k in range(loops + 1):
+        body["ground"]["frames"][f"P{k}"] = {"position": [float(k), 0.0, 0.0], "axes": across}
+        body[f"upright{k}"] = {
+            "type": "rigid",
+            "mass": 1.0,
+            "inertia": thin,
+            "pose": {"position": [float(k), 0.0, 0.5]},
+            "velocity": [0.5, 0.0, 0.0],
+            "angular_velocity": [0.0, 1.0, 0.0],
+            "frames": {"foot": {"position": [0.0, 0.0, -0.5], "axes": across}, "top": {"position": [0.0, 0.0, 0.5]}},
+        }
+        joint[f"P{k}"] = {"type": "revolute", "between": [f"ground.P{k}", f"upright{k}.foot"]}
+    for k in range(loops):
+        body[f"bar{k}"] = {
+            "type": "rigid",
+            "mass": 1.0,
+            "inertia": thin,
+            "pose": {"position": [k + 0.5, 0.0, 1.0], "axes": {"z": [1.0, 0.0, 0.0], "x": [0.0, 0.0, -1.0]}},
+            "velocity": [1.0, 0.0, 0.0],
+            "frames": {"left": {"position": [0.0, 0.0, -0.5]}, "right": {"position": [0.0, 0.0, 0.5]}},
+        }
+        joint[f"L{k}"] = {"type": "spherical", "between": [f"upright{k}.top", f"bar{k}.left"]}
+        joint[f"R{k}"] = {"type": "spherical", "between": [f"upright{k + 1}.top", f"bar{k}.right"]}
+    return Scene.model_validate(
+        {
+            "title": f"{loops} four-bars",
+            "body": body,
+            "joint": joint,
+            "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
+            "time": {"end": 0.1},
+            "output": {"interval": 0.01},
+        }
+    )
+
+
+def show(records: list[Record]) -> str:
+    """Both tables, with the exponent of the growth."""
+    loops = [r for r in records if "us" in r]
+    absent: dict[str, Callable[[Record], str]] = {
+        "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
+        "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
+        "never there [us]": lambda r: f"{r['without_us']:.2f}",
+        "ratio": lambda r: f"{r['ratio']:.3f}",
+        "spread": lambda r: percent(r["spread"]),
+        "same compiled code": lambda r: "yes" if r["same_code"] else "no",
+    }
+    growth: dict[str, Callable[[Record], str]] = {
+        "loops": lambda r: str(r["loops"]),
+        "us per evaluation": lambda r: spread(r, "us", 1),
+        "us per loop": lambda r: short(r["us"] / r["loops"]),
+    }
+    parts = [table([r for r in records if "same_code" in r], absent), table(loops, growth)]
+    if len(loops) > 1:
+        exponent = slope([r["loops"] for r in loops], [r["us"] for r in loops])
+        parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
+    return "\n\n".join(parts + [f"{r['case']} skipped: {r['reason']}" for r in records if "reason" in r])
+
+
+FAMILY = Family(
+    what="what absent effects cost, and growth with the number of loops",
+    takes="2 min",
+    page="benchmarks.md",
+    cases=cases,
+    measure=measure,
+    show=show,
+    quick="5 loops",
+)

@@ -1,0 +1,103 @@
+"""A large solid from its recipe to its Craig-Bampton bundle on the disk, by the parts of the work.
+
+One thread, so that processor seconds are those of the work.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.family import Case, Family, Measured, Record
+from pipeline.core.artifacts.store import write_dataset
+from pipeline.post.plotting.table import pipe_table
+from pipeline.structure.kinds.kind import of_recipe
+from pipeline.structure.modes import bundle
+from pipeline.structure.modes.solution import solve
+from stages.cost_point import peak_memory
+
+MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
+FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}
+#: the paper's rod with 100 083 displacements, and a compact block, whose factors are the largest for its 295 704
+SHAPES: dict[str, dict[str, Any]] = {
+    "rod": {
+        "type": "cylinder",
+        "radius": 0.01,
+        "length": 0.24,
+        "element": "hex27",
+        "cells": {"along": 36, "across": 6, "rings": 3},
+    },
+    "block": {"type": "block", "size": [0.2, 0.1, 0.1], "element": "hex8", "cells": [71, 36, 36]},
+}
+COUNT = 13
+#: parts of the work in their order, and what the stages say when each begins
+PARTS = {
+    "mesh and assembly": "mesh",
+    "static shapes": "static shapes",
+    "factorisation": "factorising",
+    "normal modes": "normal modes",
+    "counting them, by another factorisation": "checking that no mode was missed",
+    "compliances, free body to compare with, error bounds": "compliance of the full model",
+    "inertia integrals and writing": "inertia integrals",
+}
+
+
+class Parts:
+    """Processor seconds by part of the work; what a later part does again of an earlier one is its own."""
+
+    def __init__(self) -> None:
+        self.seconds = dict.fromkeys(PARTS, 0.0)
+        self._now, self._since = 0, time.process_time()
+
+    def __call__(self, share: float | None, text: str) -> None:
+        """Progress callback of the stages."""
+        now = time.process_time()
+        self.seconds[list(PARTS)[self._now]] += now - self._since
+        self._since = now
+        self._now = max([self._now, *(k for k, said in enumerate(PARTS.values()) if said in text)])
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each body: seconds by part, and the largest memory so far."""
+    for case in cases:
+        yield case, [_body(case.of)]
+
+
+def _body(shape: dict[str, Any]) -> Record:
+    told, begun = Parts(), time.process_time()
+    recipe = {"interfaces": list(FRAMES), "shape": shape, "material": MATERIAL, "frames": FRAMES}
+    mesh = of_recipe(recipe).build(recipe, Path())
+    modes = solve(mesh, "craig-bampton", COUNT, progress=told)
+    told(None, "inertia integrals")
+    with tempfile.TemporaryDirectory() as folder:
+        write_dataset(Path(folder) / "bundle.nc", bundle.build(mesh, modes))
+    told(None, "done")
+    return {
+        "cells": f"{shape['element'].removeprefix('hex')}-node cells",
+        "displacements": 3 * mesh.sizes["node"],
+        "seconds": told.seconds,
+        "together": time.process_time() - begun,
+        "gibibytes": peak_memory() / 2**30,
+    }
+
+
+def show(records: list[Record]) -> str:
+    """One column for each body."""
+    rows = [["displacements", *(f"{r['displacements']:,}".replace(",", " ") for r in records)]]
+    rows += [[part, *(f"{r['seconds'][part]:.0f}" for r in records)] for part in PARTS]
+    rows.append(["together", *(f"{r['together']:.0f}" for r in records)])
+    rows.append(["most memory", *(f"{r['gibibytes']:.1f} GiB" for r in records)])
+    return pipe_table(("", *(f"{r['case']}, {r['cells']}" for r in records)), rows)
+
+
+FAMILY = Family(
+    what="large solids from the recipe to the bundle, by parts of the work",
+    takes="11 min, 7 GiB of memory",
+    page="structure.md",
+    cases=lambda: [Case(name, shape) for name, shape in SHAPES.items()],
+    measure=measure,
+    show=show,
+)

@@ -1,0 +1,128 @@
+"""Scenes with their bundles and compiled engines, their drives' laws, and the states at which they are evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.timing import once
+from pipeline.core.progress import silent
+from pipeline.core.scene.clearance import ClearanceSpherical
+from pipeline.core.scene.drives import JointDrive
+from pipeline.core.scene.load import edited, load_scene
+from pipeline.core.scene.parts import IdealJoint
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from pipeline.dynamics.run.engine import Engine, consistent_start
+from pipeline.dynamics.run.run import engine_of, observed
+from pipeline.dynamics.run.trajectory import Trajectory, integrate
+from stages.run import bundles, find_scene
+
+#: the scenes of the paper, from the least to the fullest
+SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")
+
+#: of what a drive prescribes
+DIMENSION = {"prismatic": "length", "revolute": "angle"}
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A scene and the bundles of its flexible bodies."""
+
+    name: str
+    scene: Scene
+    bundles: Mapping[str, xr.Dataset]
+
+    def engine(self) -> Engine:
+        """Its compiled engine."""
+        return engine_of(self.scene, self.bundles, silent)
+
+    def with_scene(self, name: str, scene: Scene) -> Mechanism:
+        """The same bundles under an edited scene."""
+        return Mechanism(name, scene, {body: self.bundles[body] for body in scene.flexible()})
+
+
+@dataclass(frozen=True)
+class State:
+    """A state of a run: time [s], per contact its mode and impact rate [m/s], state vector."""
+
+    t: float
+    modes: np.ndarray
+    latched: np.ndarray
+    y: np.ndarray
+
+
+def mechanism(name: str) -> Mechanism:
+    """``scenes/sps4/<name>.toml`` with up-to-date bundles; FlexclearError when these cannot be made."""
+    scene = load_scene(find_scene(f"sps4/{name}"))
+    return Mechanism(name, scene, bundles(scene))
+
+
+def without_friction(scene: Scene) -> Scene:
+    """A copy whose clearance joints have no friction."""
+    smooth = {name: joint.model_copy(update={"friction": None}) for name, joint in _loose(scene).items()}
+    return scene.model_copy(update={"joint": scene.joint | smooth})
+
+
+def without_clearance(scene: Scene) -> Scene:
+    """A copy whose clearance joints are ideal ones."""
+    ideal = {name: IdealJoint(type="spherical", between=joint.between) for name, joint in _loose(scene).items()}
+    return scene.model_copy(update={"joint": scene.joint | ideal})
+
+
+def _loose(scene: Scene) -> dict[str, ClearanceSpherical]:
+    return {name: joint for name, joint in scene.joint.items() if isinstance(joint, ClearanceSpherical)}
+
+
+def damped(scene: Scene, ratio: float) -> Scene:
+    """A copy whose flexible bodies have a modal damping ratio."""
+    return edited(scene, {f"body.{name}.damping": ratio for name in scene.flexible()})
+
+
+def joint_laws(scene: Scene) -> dict[str, Pieces]:
+    """The law of every driven joint's coordinate; ValueError for drives that prescribe something else."""
+    found = {}
+    for name, drive in scene.drive.items():
+        if not isinstance(drive, JointDrive):
+            raise ValueError(f"[drive.{name}] does not prescribe a joint's coordinate")
+        found[drive.joint] = pieces_of(drive.law, DIMENSION[scene.joint[drive.joint].type])
+    return found
+
+
+def trajectory(engine: Engine) -> Trajectory:
+    """A whole run of an engine, from its consistent start."""
+    return integrate(engine, consistent_start(engine)[0], silent)
+
+
+def states(engine: Engine, run: Trajectory) -> dict[str, State]:
+    """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
+    contacts = engine.model.arrays.size(m.N_CONTACTS)
+    modes = run.rows[:, 1 : 1 + contacts]
+    found = {"free": np.flatnonzero(~np.any(modes == 1.0, axis=1))}
+    if contacts:
+        touches = observed(engine, run)["touch"].reshape(len(modes), contacts, m.TOUCH.size)
+        found["in contact"] = np.flatnonzero(np.all(touches[:, :, m.TOUCH.normal_force] > 0.0, axis=1))
+    # the middle of the candidates: at the very start much is zero
+    return {name: _state(run.rows[rows[len(rows) // 2]], contacts) for name, rows in found.items()}
+
+
+def _state(row: np.ndarray, contacts: int) -> State:
+    return State(float(row[0]), row[1 : 1 + contacts], row[1 + contacts : 1 + 2 * contacts], row[1 + 2 * contacts :])
+
+
+def set_state(engine: Engine, state: State) -> None:
+    """Put contact modes, impact rates and the pieces of the drives as they are in a state."""
+    n, contacts = engine.n, len(state.modes)
+    n[n[m.MODE] : n[m.MODE] + contacts] = state.modes
+    engine.view(m.LATCHED, contacts)[:] = state.latched
+    engine.select_pieces(state.t)
+
+
+def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
+    """Processor time of one evaluation of the right-hand side [s], from `repeat` of them in compiled code."""
+    set_state(engine, state)
+    return once(lambda: engine.evaluate(state.y, state.t, repeat)) / repeat

@@ -1,0 +1,174 @@
+"""All runs brought up to date through the store, and the numbers of the verdict taken from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+import pipeline
+from benchmarks import family
+from benchmarks.family import Measured
+from benchmarks.family import Record as Row
+from benchmarks.reference_conditions import design
+from benchmarks.reference_conditions.cases import BODY
+from benchmarks.reference_conditions.design import (
+    CONDITIONS,
+    COUNT,
+    COUNTS,
+    FINER,
+    FULL,
+    PLACES,
+    RIGID,
+    TIMES,
+    TOP,
+    Case,
+)
+from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from stages.run import Workplace, check, workplace
+
+#: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
+DIRECTIONS = ("z", "x", "rz")
+#: vibrations of the mechanism that are compared
+VIBRATIONS = 6
+
+
+def cases(members: int) -> list[family.Case]:
+    """The groups of rows that the page has."""
+    return [family.Case(name, members if name == "clearance" else None) for name in GROUPS]
+
+
+def measure(cases: Sequence[family.Case], jobs: int) -> Measured:
+    """The rows of each group."""
+    for case in cases:
+        rows = GROUPS[case.name]
+        yield case, list(rows() if case.of is None else rows(case.of))
+
+
+def bring(cases: list[Case], place: Workplace) -> dict[Case, xr.Dataset]:
+    """Datasets of the cases, from the cache where fresh."""
+    tasks = {case: design.task(case) for case in cases}
+    outcome = place.bring(list(tasks.values()))
+    check(outcome)
+    return {case: place.store.load(outcome.records[id(task)]) for case, task in tasks.items()}
+
+
+def identity(case: Case) -> Row:
+    """What a row is about."""
+    reference = case.condition not in (FULL, RIGID)
+    return {
+        "place_mm": case.place,
+        "condition": case.condition,
+        "count": case.count if reference else 0,
+        "finer": case.finer,
+    }
+
+
+def static_rows() -> Iterator[Row]:
+    """The full rod's compliance [m/N, rad/(N m)] of the top with the prismatic joint's place held; shares of it.
+
+    Over all whole counts.
+    """
+    for place in PLACES:
+        full = design.solved(Case(place, FULL))
+        row = {"highest": float(full["frequency"].max())} | _compliance(full["compliance_full"], place)
+        yield {"place_mm": place, "condition": FULL, "count": 0} | row
+        for condition in CONDITIONS:
+            for count in design.whole_counts(place, condition, max(COUNTS)):
+                share = design.solved(Case(place, condition, count))["compliance_share"]
+                yield {"place_mm": place, "condition": condition, "count": count} | _compliance(share, place)
+
+
+def _compliance(values: xr.DataArray, place: int) -> Row:
+    found = values.sel(frame=TOP, frame_held=PLACES[place])
+    return {direction: float(found.sel(direction=direction)) for direction in DIRECTIONS}
+
+
+def mesh_rows() -> Iterator[Row]:
+    """Frequencies [Hz] of the Craig-Bampton set at 0 mm on finer meshes, the finest last."""
+    for finer in FINER:
+        found = design.solved(Case(0, "craig-bampton", COUNT, finer=finer))["frequency"]
+        yield {"elements": finer * design.rod(1).sizes["cell"], "frequency": found.values.tolist()}
+
+
+def frequency_rows() -> Iterator[Row]:
+    """Lowest frequencies [Hz] of the assembled mechanism, drives held, at each of `TIMES`."""
+    for where in PLACES:
+        sets = [Case(where, c, design.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
+        for case in sets:
+            for time in TIMES:
+                found = pipeline.frequencies(design.scene(case), time)["undamped_frequency"].values
+                elastic = np.sort(found[found > 1.0])[:VIBRATIONS]
+                yield identity(case) | {"time": time, "frequency": elastic.tolist()}
+
+
+def far_rows() -> Iterator[Row]:
+    """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
+    runs = bring(design.far(), workplace())
+    for case, run in runs.items():
+        rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
+        effect = max_deviation(run, rigid, BODY)
+        row = identity(case) | _deviation(effect) | _costs(run)
+        yield row | {
+            "force": _largest(run, rigid),
+            "force_error": _largest(run, full) / _largest(full, rigid),
+            "velocity_error": max_deviation(run, full, BODY).velocity / max_deviation(full, rigid, BODY).velocity,
+        }
+
+
+def clearance_rows(members: int) -> Iterator[Row]:
+    """Clearance at A1: means and standard deviations over the members of each set, one run of the rigid rod.
+
+    members: of each ensemble; of sets beyond 13 coordinates, half of them.
+    """
+    place = workplace()
+    runs = bring(design.clearance(members), place)
+    rigid = bring([Case(where, RIGID) for where in PLACES], place)
+    for case, run in runs.items():
+        ideal = rigid[Case(case.place, RIGID)]
+        costs = _costs(run)
+        if case.condition == RIGID:
+            spread = {"peak_force": [float(run.attrs["peak_force"])], "impacts": [int(run.attrs["impacts"])]}
+            effects = [max_deviation(run, ideal, BODY)]
+            acceleration = [float(np.abs(run["acceleration"].values[:, 0, 2]).max())]
+        else:
+            spread = {
+                n: run[v].values[:, 0].tolist() for n, v in (("peak_force", "peak_force"), ("impacts", "impact_count"))
+            }
+            effects = ensemble_deviations(run, ideal, BODY)
+            acceleration = np.abs(run["acceleration"].values[:, :, 0, 2]).max(axis=1).tolist()
+        spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}
+        yield identity(case) | costs | _statistics(spread | {"acceleration": acceleration}) | {"members": len(effects)}
+
+
+def _costs(run: xr.Dataset) -> Row:
+    """Evaluations and processor time [s] of one run."""
+    return {"evaluations": int(run.attrs["evaluations"]), "seconds": float(run.attrs["seconds"])}
+
+
+def _deviation(effect: Deviation) -> Row:
+    return {"angle": effect.angle, "displacement": effect.displacement, "velocity": effect.velocity}
+
+
+def _largest(run: xr.Dataset, other: xr.Dataset) -> float:
+    """Largest difference of the force at A1 [N]."""
+    return float(np.linalg.norm(run["joint_force"].values - other["joint_force"].values, axis=1).max())
+
+
+def _statistics(series: dict[str, Any]) -> Row:
+    found = {}
+    for name, values in series.items():
+        found[name] = float(np.mean(values))
+        found[f"{name}_std"] = float(np.std(values, ddof=1)) if len(values) > 1 else 0.0
+    return found
+
+
+GROUPS: dict[str, Callable[..., Iterator[Row]]] = {
+    "statics": static_rows,
+    "mesh": mesh_rows,
+    "frequencies": frequency_rows,
+    "far": far_rows,
+    "clearance": clearance_rows,
+}

@@ -1,0 +1,61 @@
+"""Times that mean something on a machine whose speed drifts: interleaved, repeated, told with their spread."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+#: of times in the log, per second
+UNITS = {"s": 1.0, "us": 1e6}
+
+
+@dataclass(frozen=True)
+class Times:
+    """Repeats of one measurement [s]; those of equal index in two measurements were made side by side."""
+
+    seconds: tuple[float, ...]
+
+    @property
+    def median(self) -> float:
+        """Median [s]."""
+        return float(np.median(self.seconds))
+
+    @property
+    def spread(self) -> float:
+        """Half the range of the middle half of the repeats, as a share of the median."""
+        low, high = np.percentile(self.seconds, (25, 75))
+        return float(0.5 * (high - low) / self.median)
+
+    def told(self, unit: str) -> dict[str, float]:
+        """Median, in the unit that it is called by, and spread, as the log has them."""
+        return {unit: UNITS[unit] * self.median, "spread": self.spread}
+
+    def over(self, other: Times) -> float:
+        """Median of the ratios to another measurement, pair by pair: a slow moment of the machine slows both."""
+        return float(np.median(np.array(self.seconds) / np.array(other.seconds)))
+
+
+def once(task: Callable[[], object]) -> float:
+    """Processor time of one call [s]: on one thread that is the time it takes on a machine without other work."""
+    begun = time.process_time()
+    task()
+    return time.process_time() - begun
+
+
+def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:
+    """Each task, which returns its own time [s], once per round, one after the other; a first round does not count."""
+    found: dict[str, list[float]] = {name: [] for name in tasks}
+    for number in range(rounds + 1):
+        for name, task in tasks.items():
+            seconds = task()
+            if number:
+                found[name].append(seconds)
+    return {name: Times(tuple(values)) for name, values in found.items()}
+
+
+def slope(x: Sequence[float], y: Sequence[float]) -> float:
+    """Exponent p of the best fit y = C x^p."""
+    return float(np.polyfit(np.log(x), np.log(y), 1)[0])

@@ -1,0 +1,190 @@
+r"""Rates at which closures open when the tree moves, each beside the size that such a rate may have.
+
+Which rows of the closures' Jacobian are independent is a question of size: an entry is zero when it is nothing but
+rounding. Rounding is proportional to the terms whose sum an entry is, not to the sum: a hinge's axis that
+meets a point of the closure contributes the turn times its distance along the axis, which cancels. So every entry
+has a natural size: that of a turn is the distance between the two joints, of a slide its way. Rows and columns are
+scaled until the natural sizes in each reach up to one:
+
+.. math:: J' = D_r J D_c, \qquad \max_j (D_r N D_c)_{ij} = \max_i (D_r N D_c)_{ij} = 1
+
+Then a singular value of J' is a pure number that depends on no unit, no mass, no axes and no size, and has an absolute
+floor. Small parts of large mechanisms keep their own scale.
+
+Source: scaling: Ruiz (2001), A scaling algorithm to equilibrate both rows and columns norms in matrices, Rutherford
+Appleton Laboratory, RAL-TR-2001-034.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.model.wiring import closure_route, uncommon
+
+#: a turn counts as having at least this arm, in units of the mechanism's size: places are no more exact for being near
+LEAST_ARM = 1e-3
+#: singular values of naturally sized rows below this are zero.  It stands above what is left of a zero: an entry is a
+#: sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
+#: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it
+#: stands below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
+ZERO = 1e-7
+#: rounds of scaling; each halves the exponents by which rows and columns differ
+ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Motions:
+    """Unit motion of every column of a numbering: turn [rad], displacement [m] of the point `at`; (columns, 3) each."""
+
+    turn: np.ndarray
+    shift: np.ndarray
+    at: np.ndarray
+
+    @property
+    def twists(self) -> np.ndarray:
+        """Turn, and displacement of the point at the origin, shape (columns, 6)."""
+        return np.hstack([self.turn, self.shift + np.cross(self.at, self.turn)])
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Closure rows against unit motions of the free coordinates, J (rows, nv), and of the driven ones, (rows, drives).
+
+    Scaled by their natural sizes: by `row` and by `column`, which are shaped like one row and column of both.
+    """
+
+    J: np.ndarray
+    known: np.ndarray
+    row: np.ndarray
+    column: np.ndarray
+
+    @cached_property
+    def decomposed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """U, singular values, V^T of J, complete."""
+        return np.linalg.svd(self.J)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Singular values, descending."""
+        return self.decomposed[1]
+
+    @property
+    def rank(self) -> int:
+        """Number of independent rows."""
+        return int(np.sum(self.values > ZERO))
+
+    @property
+    def free(self) -> np.ndarray:
+        """Motions of the free coordinates that open nothing, shape (nv, nv - rank)."""
+        nv = self.J.shape[1]
+        return self.column[:nv, None] * self.decomposed[2][self.rank :].T
+
+    @property
+    def stresses(self) -> np.ndarray:
+        """Combinations of rows that no free motion opens: multipliers in balance; shape (rows - rank, rows)."""
+        return self.decomposed[0][:, self.rank :].T * self.row
+
+    @property
+    def tied(self) -> np.ndarray:
+        """Whether each driven coordinate takes part in what closures demand of driven ones alone; shape (drives,)."""
+        left = self.decomposed[0][:, self.rank :].T @ self.known
+        return np.asarray(np.max(np.abs(left), axis=0, initial=0.0) > ZERO)
+
+
+def rates(model: Model, poses: Sequence[Placement]) -> Rates:
+    """How the closures of a mechanism open at these poses of its links."""
+    numbering, L = model.numbering, model.mechanism.length
+    motion, speeds = motions(model, poses), numbering.nv + numbering.known
+    J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
+    first = 0
+    for line, k in zip(model.arrays.table(m.CLOSURES), model.closure_order, strict=True):
+        B = sites(model, poses, k)[1]
+        along, about, force = row_axes(model, poses, k)
+        route = uncommon(closure_route(numbering, int(line["site_a"]), int(line["site_b"])))
+        mine = slice(first, first + len(force))
+        for coordinate, column, sign in route:
+            turn, arm = motion.turn[column], B.p - motion.at[column]
+            shift = motion.shift[column] + np.cross(turn, arm)
+            J[mine, coordinate] += sign * np.where(force, along @ shift / L, about @ turn)
+            angle = float(np.linalg.norm(turn))
+            way = float(np.linalg.norm(motion.shift[column])) / L + angle * (np.linalg.norm(arm) / L + LEAST_ARM)
+            sizes[mine, coordinate] += np.where(force, way, angle)
+        first += len(force)
+    by_row, by_column = scales(sizes)
+    J *= by_row[:, None] * by_column
+    return Rates(J[:, : numbering.nv], J[:, numbering.nv :], by_row, by_column)
+
+
+def sites(model: Model, poses: Sequence[Placement], k: int) -> tuple[Placement, Placement]:
+    """Both frames of a closure."""
+    _, a, b = model.mechanism.closures[k]
+    return poses[a.link].of(a.place), poses[b.link].of(b.place)
+
+
+def row_axes(model: Model, poses: Sequence[Placement], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Directions along which the rows of a closure forbid displacement, about which turns; and which do the former."""
+    _, wrenches = demands(model.mechanism.closures[k][0].kind, *sites(model, poses, k))
+    force = np.any(wrenches[:, 3:] != 0.0, axis=1)
+    return wrenches[:, 3:], wrenches[:, :3], force
+
+
+def motions(model: Model, poses: Sequence[Placement]) -> Motions:
+    """Unit motions of all columns: a radian, the mechanism's size, or of modes that size times the root of the mass."""
+    numbering, mechanism = model.numbering, model.mechanism
+    turn, shift, at = (np.zeros((numbering.columns, 3)) for _ in range(3))
+    for i, link in enumerate(mechanism.links):
+        if link.inboard is None:
+            continue
+        F, G = poses[link.inboard.link].of(link.inboard.place), poses[i].of(outboard_place(mechanism, link))
+        turns, slides = freedoms(link.kind, F, G)
+        first, middle = numbering.c0[i], numbering.c0[i] + len(turns)
+        turn[first:middle], shift[middle : middle + len(slides)] = turns, mechanism.length * slides
+        at[first : middle + len(slides)] = G.p
+    for site, frame, first in numbering.ports:
+        on = numbering.sites[site].link
+        mine = slice(first, first + numbering.modes[on])
+        turn[mine], shift[mine], at[mine] = _shape_motions(model, on, frame, poses[on])
+    return Motions(turn, shift, at)
+
+
+def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Turn and displacement of a frame of a flexible link per mode, relative to its inboard frame, undeformed."""
+    mechanism = model.mechanism
+    branch, bundle = mechanism.links[link].branch, mechanism.bundles[str(mechanism.links[link].flexible)]
+    own = None if branch.edge is None else (branch.edge.frame_a if branch.reverse else branch.edge.frame_b)
+    unit = mechanism.length * float(bundle["mass"]) ** 0.5
+    turn, shift, at = _frame_motions(model, link, frame, pose)
+    if own is not None:
+        held, moved_by, place = _frame_motions(model, link, own, pose)
+        turn, shift = turn - held, shift - moved_by - np.cross(held, at - place)
+    return unit * turn, unit * shift, at
+
+
+def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    bundle = model.mechanism.bundles[str(model.mechanism.links[link].flexible)]
+    k = list(bundle["frame"].values).index(frame.partition(".")[2])
+    turn = (pose.R @ bundle["frame_rotation_shape"].values[k]).T
+    shift = (pose.R @ bundle["frame_translation_shape"].values[k]).T
+    return turn, shift, pose.of(Placement(bundle["frame_position"].values[k])).p
+
+
+def scales(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Factors of rows and columns that bring the largest of each to one; empty ones keep the factor one."""
+    row, column = np.ones(sizes.shape[0]), np.ones(sizes.shape[1])
+    for _ in range(ROUNDS):
+        now = sizes * row[:, None] * column
+        row /= _root(np.max(now, axis=1, initial=0.0))
+        column /= _root(np.max(now, axis=0, initial=0.0))
+    return row, column
+
+
+def _root(largest: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.where(largest > 0.0, largest, 1.0))

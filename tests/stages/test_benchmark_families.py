@@ -1,0 +1,216 @@
+"""The benchmarks as families: one entry, one log, pages that follow from the log alone."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from benchmarks import families, log, page
+from benchmarks.__main__ import main
+from benchmarks.families import solids
+from benchmarks.family import Case, Family
+from benchmarks.log import Session
+from pipeline.core.errors import InputError
+
+FAMILIES = {name: page.named(name) for name in families.NAMES}
+PAGES = sorted({family.page for family in FAMILIES.values()})
+
+
+def test_every_family_is_listed_with_what_it_measures_and_how_long_that_takes(capsys: pytest.CaptureFixture):
+    assert main(["--list"]) == 0
+    listed = [[cell.strip() for cell in line.strip("|").split("|")] for line in capsys.readouterr().out.splitlines()]
+    assert [row[0] for row in listed[2:]] == list(FAMILIES)
+    for row, family in zip(listed[2:], FAMILIES.values(), strict=True):
+        cases = family.cases(**family.settings)
+        assert row[1:5] == [family.what, str(len(cases)), family.takes, f"docs/{family.page}"]
+        assert len({case.name for case in cases}) == len(cases) > 0
+        assert not family.quick or family.quick in [case.name for case in cases]
+
+
+def test_every_module_of_the_families_is_one(root: Path):
+    """Adding a benchmark is a module and a line; neither is there without the other."""
+    there = {path.stem for path in (root / "benchmarks" / "families").glob("*.py")} - {"__init__"}
+    assert there == {module.partition(":")[0] for module in families.NAMES.values()}
+    assert {f"{name}.jsonl" for name in FAMILIES} == {path.name for path in log.FOLDER.iterdir()}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_is_that_of_the_log_to_the_byte(root: Path, name: str):
+    assert page.text(name).encode() == (root / "docs" / name).read_bytes()
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_a_page_says_when_and_where_once(root: Path, name: str):
+    text = (root / "docs" / name).read_text()
+    sessions = [s for family in page.of_page(name) for s in log.latest(log.FOLDER / f"{family}.jsonl")]
+    assert text.count(f"\nMeasured {sessions[0].measured} on ") == 1
+    assert text.count("<!-- begin measured -->") == 1
+    for said in {s.cpu for s in sessions if s.cpu}:
+        assert text.count(said) == 1
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "stability" else []) for name in FAMILIES]
+)
+def test_what_stands_beside_a_page_is_that_of_the_log(root: Path, name: str):
+    """Text to the byte; pictures but for how versions of matplotlib round at the edges of lines."""
+    family = FAMILIES[name]
+    for path, content in family.files(page.records(log.latest(log.FOLDER / f"{name}.jsonl"))).items():
+        if path.endswith(".png"):
+            there, made = imread(root / "docs" / path), imread(io.BytesIO(content))
+            assert there.shape == made.shape
+            # 0 with the pinned versions; one line of text elsewhere is 2e-3
+            assert np.abs(there - made).mean() < 2e-4
+            assert f"]({path})" in (root / "docs" / family.page).read_text()
+        else:
+            assert (root / "docs" / path).read_bytes() == content
+
+
+@pytest.mark.parametrize("name", [name for name, family in FAMILIES.items() if family.quick])
+def test_the_smallest_case_runs_from_end_to_end(root: Path, name: str, tmp_path: Path):
+    family = FAMILIES[name]
+    assert main([name, "--only", family.quick, "--into", str(tmp_path)]) == 0
+    (session,) = log.read(tmp_path / "log" / f"{name}.jsonl")
+    assert session.cpu == log.today().cpu
+    assert {record["case"] for record in session.records} == {family.quick}
+    written = (tmp_path / family.page).read_text()
+    shown = family.show(session.records)
+    assert all(part.strip() in written for part in ([shown] if isinstance(shown, str) else shown.values()))
+    assert f"Measured {session.measured} on {session.cpu}, python" in written
+    # what was measured elsewhere is not on a page that says it was measured here
+    places = (root / "docs" / family.page).read_text().count("<!-- begin ") - 1
+    assert written.count(page.NOTHING) == places - (1 if isinstance(shown, str) else len(shown))
+
+
+def test_the_parts_of_a_solid_s_work_add_up():
+    shape = {"type": "block", "size": [0.2, 0.1, 0.1], "element": "hex8", "cells": [6, 3, 3]}
+    ((_, [record]),) = solids.measure([Case("small", shape)], 1)
+    # what is outside of the parts is reading the clock
+    assert sum(record["seconds"].values()) == pytest.approx(record["together"], abs=0.05)
+    # so small a body has no sparse eigensolver, and hence nothing to count
+    idle = {part for part, seconds in record["seconds"].items() if seconds == 0.0}
+    assert idle == {"normal modes", "counting them, by another factorisation"}
+    assert record["displacements"] == 3 * 7 * 4 * 4
+    assert "336" in str(solids.FAMILY.show([{"case": "small", **record}]))
+
+
+def test_a_name_that_is_no_family_is_refused_with_those_there_are(capsys: pytest.CaptureFixture):
+    assert main(["speed"]) == 2
+    assert "evaluation, exudyn, growth" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (["growth", "--only", "6 loops"], "no case of growth has such a name"),
+        (["growth", "--set", "members=3"], "is no setting of growth"),
+        (["stability", "--set", "seed=7"], "say --into FOLDER"),
+    ],
+)
+def test_options_that_ask_for_nothing_are_refused(options: list[str], words: str, capsys: pytest.CaptureFixture):
+    assert main(options) == 2
+    assert words in capsys.readouterr().err
+
+
+def test_without_the_peer_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    monkeypatch.setitem(sys.modules, "exudyn", None)
+    assert main(["exudyn"]) == 0
+    said = capsys.readouterr().out
+    assert said.count("\n") == 1
+    assert "pip install" in said
+
+
+def session(day: int, *cases: str) -> Session:
+    return Session(
+        f"2026-01-0{day}", f"processor {day}", {"python": "3"}, records=[{"case": c, "s": day} for c in cases]
+    )
+
+
+def test_the_log_has_machine_and_date_once_and_the_last_of_each_case_counts(tmp_path: Path):
+    path = tmp_path / "family.jsonl"
+    log.append(path, session(1, "a", "b", "c"), history=True)
+    log.append(path, session(2, "b"), history=True)
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    assert [line for line in lines if "measured" not in line] == [
+        {"case": c, "s": s} for c, s in zip("abcb", (1, 1, 1, 2), strict=True)
+    ]
+    assert [set(line) for line in lines if "measured" in line] == [{"measured", "cpu", "versions"}] * 2
+    assert [(s.measured, s.records) for s in log.latest(path)] == [
+        ("2026-01-01", [{"case": "a", "s": 1}, {"case": "c", "s": 1}]),
+        ("2026-01-02", [{"case": "b", "s": 2}]),
+    ]
+    log.append(path, session(3, "a", "c"), history=False)
+    assert [s.measured for s in log.read(path)] == ["2026-01-02", "2026-01-03"]
+
+
+def test_a_page_of_several_sessions_says_which_case_is_whose():
+    told = page.where({"growth": [session(1, "a", "c"), session(2, "b")], "runs": [session(2, "d")]})
+    assert told.startswith("Measured:\n")
+    assert "- growth (a, c): 2026-01-01 on processor 1, python 3" in told
+    assert "- growth (b), runs: 2026-01-02 on processor 2, python 3" in told
+    assert page.where({"growth": [session(1, "a")], "runs": [session(1, "d")]}).count("processor 1") == 1
+
+
+def test_a_part_without_a_place_on_its_page_is_refused():
+    with pytest.raises(InputError, match=r"docs/x\.md: has no place for 'growth'"):
+        page.filled("<!-- begin runs -->\n<!-- end runs -->\n", {"growth": "table"}, "docs/x.md")
+
+
+def test_floats_of_the_log_have_the_digits_that_mean_something():
+    assert log.plain({"a": [1.23456789, 3, True, "x"], "b": float("nan")}, 4) == {"a": [1.235, 3, True, "x"], "b": None}
+    assert log.plain(1.23456789, None) == 1.23456789
+
+
+def counted(calls: list[str], fails: list[str], **more: Any) -> Family:
+    """A family that notes what it measures, and fails at some cases."""
+
+    def measure(cases, jobs):
+        for case in cases:
+            if case.name in fails:
+                raise KeyboardInterrupt
+            calls.append(case.name)
+            yield case, [{"s": len(calls)}]
+
+    measure.__module__ = "benchmarks.timing"
+    spec: dict[str, Any] = {
+        "what": "",
+        "takes": "no time",
+        "page": "benchmarks.md",
+        "cases": lambda: [Case(n) for n in "abc"],
+    }
+    return Family(**spec, measure=measure, show=lambda records: str(records), **more)
+
+
+def test_what_was_interrupted_goes_on_where_it_stopped_and_times_are_then_measured_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    calls: list[str] = []
+    fails = ["b"]
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    monkeypatch.setattr(page, "named", lambda name: counted(calls, fails))
+    monkeypatch.setattr(page, "write", lambda *places: tmp_path)
+    command = ["growth", "--into", str(tmp_path)]
+    assert main(command) == 130
+    fails.clear()
+    assert main(command) == 0
+    assert calls == ["a", "b", "c"]
+    assert [r["s"] for r in log.read(tmp_path / "log" / "growth.jsonl")[0].records] == [1, 2, 3]
+    assert main(command) == 0
+    assert calls == ["a", "b", "c"] * 2
+
+
+def test_a_case_that_went_wrong_makes_the_command_fail(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def measure(cases, jobs):
+        yield from ((case, [{"verdict": "wrong"}]) for case in cases)
+
+    measure.__module__ = "benchmarks.timing"
+    wrong = Family("", "", "benchmarks.md", lambda: [Case("a")], measure, lambda records: "")
+    monkeypatch.setattr(page, "named", lambda name: wrong)
+    assert main(["growth", "--dry"]) == 1
