@@ -35,7 +35,7 @@ def widest(h, w, values, solved):
 
     solved: whether only of the rows that are solved for.
     """
-    result, arm = 0.0, w[h[m.CONTROL] + m.LENGTH]
+    result, arm = 0.0, w[m.CONTROL.length(h)]
     for c in range(h[m.N_CLOSURES]):
         first = m.CLOSURES.row0(h, c)
         for k in range(first, first + (m.CLOSURES.n_kept(h, c) if solved else m.CLOSURES.n_rows(h, c))):
@@ -83,7 +83,7 @@ def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) 
         of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
         residual says little about the error behind it, nothing is changed.
         """
-        step, used, apart = h[m.CORRECTION], 0, APART * w[h[m.CONTROL] + m.LENGTH]
+        step, used, apart = h[m.CORRECTION], 0, APART * w[m.CONTROL.length(h)]
         if w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
             return 0
         for _ in range(ITERATIONS):

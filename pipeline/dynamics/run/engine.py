@@ -138,7 +138,7 @@ def prepare(model: Model, progress: Progress) -> Engine:
     entry.connect(h)
     end, rtol = scene.time.end, scene.solver.rtol
     engine = Engine(model, entry, method, h, kept, mobility, w, n, scene.time.start, end, rtol)
-    engine.view(m.CONTROL, m.N_CONTROLS)[m.LENGTH] = model.mechanism.length
+    engine.control["length"] = model.mechanism.length
     return engine
 
 
