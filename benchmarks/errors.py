@@ -13,8 +13,8 @@ from benchmarks.timing import once
 from pipeline import dynamics
 from pipeline.core.progress import silent
 from pipeline.core.scene.load import edited
-from pipeline.dynamics.run.engine import consistent_start
 from pipeline.dynamics.run.run import observed
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import integrate
 
 #: two codes are compared at multiples of this [s]
@@ -114,7 +114,7 @@ def _regular(run: xr.Dataset, body: str) -> Samples:
 
 def _timer(here: Mechanism) -> Callable[[], float]:
     engine = here.engine()
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     # with the rows evaluated, as the peer evaluates its samples
     return lambda: once(lambda: observed(engine, integrate(engine, start, silent)))
 

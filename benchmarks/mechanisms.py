@@ -17,8 +17,9 @@ from pipeline.core.scene.parts import IdealJoint
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from pipeline.dynamics.run.engine import Engine, consistent_start
+from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.run import engine_of, observed
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import Trajectory, integrate
 from stages.run import bundles, find_scene
 
@@ -95,30 +96,27 @@ def joint_laws(scene: Scene) -> dict[str, Pieces]:
 
 def trajectory(engine: Engine) -> Trajectory:
     """A whole run of an engine, from its consistent start."""
-    return integrate(engine, consistent_start(engine)[0], silent)
+    return integrate(engine, consistent_start(engine), silent)
 
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
     """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
-    contacts = engine.model.arrays.size(m.N_CONTACTS)
-    modes = run.rows[:, 1 : 1 + contacts]
-    found = {"free": np.flatnonzero(~np.any(modes == 1.0, axis=1))}
-    if contacts:
-        touches = observed(engine, run)["touch"].reshape(len(modes), contacts, m.TOUCH.size)
-        found["in contact"] = np.flatnonzero(np.all(touches[:, :, m.TOUCH.normal_force] > 0.0, axis=1))
+    record = m.record(run.rows, run.contacts)
+    found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
+    if run.contacts:
+        forces = observed(engine, run).touch["normal_force"]
+        found["in contact"] = np.flatnonzero(np.all(forces > 0.0, axis=1))
     # the middle of the candidates: at the very start much is zero
-    return {name: _state(run.rows[rows[len(rows) // 2]], contacts) for name, rows in found.items()}
-
-
-def _state(row: np.ndarray, contacts: int) -> State:
-    return State(float(row[0]), row[1 : 1 + contacts], row[1 + contacts : 1 + 2 * contacts], row[1 + 2 * contacts :])
+    middles = {name: rows[len(rows) // 2] for name, rows in found.items()}
+    return {
+        name: State(float(record.time[k]), record.modes[k], record.latched[k], record.state[k])
+        for name, k in middles.items()
+    }
 
 
 def set_state(engine: Engine, state: State) -> None:
     """Put contact modes, impact rates and the pieces of the drives as they are in a state."""
-    n, contacts = engine.n, len(state.modes)
-    n[n[m.MODE] : n[m.MODE] + contacts] = state.modes
-    engine.view(m.LATCHED, contacts)[:] = state.latched
+    engine.modes[:], engine.latched[:] = state.modes, state.latched
     engine.select_pieces(state.t)
 
 

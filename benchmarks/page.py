@@ -23,6 +23,8 @@ from pipeline.core.workflow.fingerprint import TREE
 from pipeline.post.plotting.table import pipe_table
 
 DOCS = TREE / "docs"
+#: of a table: heading, and the cell of a record
+Columns = Mapping[str, Callable[[Record], str]]
 #: what stands where nothing was measured
 NOTHING = "Not measured."
 
@@ -107,8 +109,8 @@ def _session(session: Session) -> str:
     return f"{machine} ({session.note})" if session.note else machine
 
 
-def table(records: Iterable[Record], columns: Mapping[str, Callable[[Record], str]]) -> str:
-    """A row for each record, and for each column its heading and the cell of a record."""
+def table(records: Iterable[Record], columns: Columns) -> str:
+    """A row for each record."""
     return pipe_table(tuple(columns), [[cell(record) for cell in columns.values()] for record in records])
 
 

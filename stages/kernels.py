@@ -58,7 +58,7 @@ def _processor_time() -> float:
 
 def warm(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
     """Compile or fetch the kernels and call them, so that no measurement contains it."""
-    from pipeline.dynamics.run.engine import consistent_start
     from pipeline.dynamics.run.run import engine_of
+    from pipeline.dynamics.run.start import consistent_start
 
     consistent_start(engine_of(scene, reduced, progress))

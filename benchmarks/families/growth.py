@@ -12,7 +12,7 @@ from typing import Any
 
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
-from benchmarks.page import percent, short, spread, table
+from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, slope
 from pipeline.core.errors import FlexclearError
 from pipeline.core.scene.schema import Scene
@@ -127,7 +127,7 @@ def four_bars(loops: int) -> Scene:
 def show(records: list[Record]) -> str:
     """Both tables, with the exponent of the growth."""
     loops = [r for r in records if "us" in r]
-    absent: dict[str, Callable[[Record], str]] = {
+    absent: Columns = {
         "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
         "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
         "never there [us]": lambda r: f"{r['without_us']:.2f}",
@@ -135,7 +135,7 @@ def show(records: list[Record]) -> str:
         "spread": lambda r: percent(r["spread"]),
         "same compiled code": lambda r: "yes" if r["same_code"] else "no",
     }
-    growth: dict[str, Callable[[Record], str]] = {
+    growth: Columns = {
         "loops": lambda r: str(r["loops"]),
         "us per evaluation": lambda r: spread(r, "us", 1),
         "us per loop": lambda r: short(r["us"] / r["loops"]),

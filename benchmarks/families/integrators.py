@@ -5,15 +5,16 @@ Errors are those of the largest force of every impact, because the paper prints 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
-from benchmarks.page import table
+from benchmarks.page import Columns, table
 from pipeline import dynamics
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.errors import SolverError
 from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.progress import silent
@@ -79,13 +80,13 @@ def _errors(run: xr.Dataset, known: xr.Dataset) -> Record:
 
 def _forces(run: xr.Dataset) -> np.ndarray:
     """Largest force [N] of every impact."""
-    hard = (run.event_kind.values == 1) & (run.event_approach_speed.values > IMPACT)
+    hard = (run.event_kind.values == CLOSING) & (run.event_approach_speed.values > IMPACT)
     return run.event_peak_force.values[hard]
 
 
 def show(records: list[Record]) -> str:
     """A row for each; a dash where forces cannot be compared."""
-    columns: dict[str, Callable[[Record], str]] = {
+    columns: Columns = {
         "integrator": lambda r: r["integrator"],
         "steps": steps,
         "evaluations": lambda r: str(r.get("evaluations", f"refused: {r.get('reason')}")),

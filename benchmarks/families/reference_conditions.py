@@ -3,52 +3,50 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from benchmarks.family import Family
 from benchmarks.family import Record as Row
-from benchmarks.reference_conditions import claims, figures, runs, sections
-from benchmarks.reference_conditions.claims import at
-from benchmarks.reference_conditions.design import CONDITIONS, COUNT, MOST_COMPLETE, PLACES
-from benchmarks.reference_conditions.sections import COMPLETE, RESOLVED, far_error, frequency_error, least, or_none
+from benchmarks.page import Columns, table
+from benchmarks.reference_conditions import claims, figures, runs
+from benchmarks.reference_conditions.claims import at, far_error
+from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
+from pipeline.post.plotting.table import pipe_table
 
-#: tables by group of rows
-SECTIONS = {
-    "statics": sections.statics,
-    "frequencies": sections.frequencies,
-    "far": sections.far,
-    "clearance": sections.clearance,
-    "mesh": sections.mesh,
-}
+#: a share of the compliance from which on a set counts as complete, and frequencies of the mechanism as right
+COMPLETE, RESOLVED = 0.99, 0.01
+SET: Columns = {"joint at": lambda r: f"{r['place_mm']} mm", "set": lambda r: _label(r)}
+COST: Columns = {"evaluations": lambda r: str(r["evaluations"]), "seconds": lambda r: f"{r['seconds']:.2f}"}
 
 
 def show(records: list[Row]) -> dict[str, str]:
     """In short, the paper's statements, and the tables of each group of rows that is there."""
-    rows = {name: of for name in SECTIONS if (of := [r for r in records if r["case"] == name])}
+    rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
     judged = {"claims": claims.told(rows)} if "far" in rows and "clearance" in rows else {}
-    return {"short": _short(rows)} | judged | {name: SECTIONS[name](rows) for name in rows}
+    return {"short": _short(rows)} | judged | {name: TABLES[name](rows) for name in rows}
 
 
 def _short(rows: dict[str, list[Row]]) -> str:
     """Which conditions are right in each respect, with the least whole count from COUNT at every place."""
     lines = [f"With {COUNT} coordinates (or the next whole count), at all three places:\n"]
     if "statics" in rows:
-        good = [c for c in CONDITIONS if least(rows["statics"], c, COUNT) >= COMPLETE]
-        lines.append(f"- static compliance complete to {100.0 * COMPLETE:g} %: {or_none(good)};")
+        good = [c for c in CONDITIONS if _least(rows["statics"], c, COUNT) >= COMPLETE]
+        lines.append(f"- static compliance complete to {100.0 * COMPLETE:g} %: {_or_none(good)};")
     if "frequencies" in rows:
-        good = [c for c in CONDITIONS if frequency_error(rows["frequencies"], c) < RESOLVED]
-        lines.append(f"- first three frequencies of the mechanism within {100.0 * RESOLVED:g} %: {or_none(good)};")
+        good = [c for c in CONDITIONS if _frequency_error(rows["frequencies"], c) < RESOLVED]
+        lines.append(f"- first three frequencies of the mechanism within {100.0 * RESOLVED:g} %: {_or_none(good)};")
     if "far" in rows:
         good = [
             c
             for c in CONDITIONS
             if all(far_error(rows["far"], at(rows["far"], place, c, COUNT)) < claims.AGREE for place in PLACES)
         ]
-        lines.append(f"- effects of the rod with ideal joints within {100.0 * claims.AGREE:g} %: {or_none(good)};")
+        lines.append(f"- effects of the rod with ideal joints within {100.0 * claims.AGREE:g} %: {_or_none(good)};")
     if "clearance" in rows:
         good = [c for c in CONDITIONS if all(_peak_right(rows["clearance"], place, c) for place in PLACES)]
         lines.append(
             f"- peak contact force within {100.0 * claims.AGREE:g} % of the most complete set's, beyond what that is "
-            f"unsettled by: {or_none(good)}."
+            f"unsettled by: {_or_none(good)}."
         )
         enough = _enough(rows["clearance"])
         if enough is not None:
@@ -89,6 +87,160 @@ def _peaks(rows: list[Row], place: int) -> str:
     settled = f"{100.0 * _unsettled(rows, place):.1f} %"
     return f"off by {errors}, the reference itself being settled to {settled}"
 
+
+def _statics(rows: dict[str, list[Row]]) -> str:
+    """Shares of the full rod's compliance, that compliance in the last line, and which sets are complete."""
+    found, body = rows["statics"], []
+    for condition in CONDITIONS:
+        for n in (7, COUNT, max(COUNTS)):
+            near = [_nearest(found, place, condition, n) for place in PLACES]
+            shares = [" ".join(_share(r[d]) for d in ("z", "x", "rz")) for r in near]
+            body.append([condition, "/".join(dict.fromkeys(str(r["count"]) for r in near)), *shares])
+    full = [", ".join(f"{at(found, place, FULL)[d]:.3g}" for d in ("z", "x", "rz")) for place in PLACES]
+    head = ("condition", "coordinates", *(f"{place} mm" for place in PLACES))
+    complete = [c for c in CONDITIONS if _least(found, c, COUNT) >= COMPLETE]
+    never = [c for c in CONDITIONS if _least(found, c, max(COUNTS)) < 0.5]
+    return (
+        f"{pipe_table(head, [*body, [FULL, '', *full]])}\n\n"
+        f"Complete (at least {100.0 * COMPLETE:g} % of each) with {COUNT} coordinates: {_or_none(complete)}. "
+        f"Below half with {max(COUNTS)} coordinates at some place: {_or_none(never)}."
+    )
+
+
+def _nearest(rows: list[Row], place: int, condition: str, count: int) -> Row:
+    of = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition)]
+    return max((r for r in of if r["count"] <= count + 1), key=lambda r: (r["count"] <= count, r["count"]))
+
+
+def _least(rows: list[Row], condition: str, count: int) -> float:
+    """The least share of the compliance, over places and directions."""
+    near = [_nearest(rows, place, condition, count) for place in PLACES]
+    return min(r[d] for r in near for d in ("z", "x", "rz"))
+
+
+def _share(value: float) -> str:
+    return f"{100.0 * value:.1f}" if value > 1e-9 else "0"
+
+
+def _frequencies(rows: dict[str, list[Row]]) -> str:
+    """Vibrations of the mechanism, and with which sets they are right."""
+    names = (FULL, *CONDITIONS)
+    found = sorted(rows["frequencies"], key=lambda r: (r["place_mm"], names.index(r["condition"]), r["time"]))
+    most = max(len(r["frequency"]) for r in found)
+    columns = {**SET, "time [s]": lambda r: f"{r['time']:g}", **{f"{k + 1}": _vibration(k) for k in range(most)}}
+    right = [c for c in CONDITIONS if _frequency_error(found, c) < RESOLVED]
+    return (
+        f"{table(found, columns)}\n\n"
+        f"The first three within {100.0 * RESOLVED:g} % of the full rod's at every place and time: {_or_none(right)}."
+    )
+
+
+def _vibration(k: int) -> Callable[[Row], str]:
+    return lambda r: f"{r['frequency'][k]:.1f}" if k < len(r["frequency"]) else "-"
+
+
+def _frequency_error(rows: list[Row], condition: str) -> float:
+    """Largest error of the first three, as a share; a set that has fewer of them is wholly wrong."""
+    worst = 0.0
+    for row in (r for r in rows if r["condition"] == condition):
+        same = (row["place_mm"], FULL, row["time"])
+        full = next(r for r in rows if (r["place_mm"], r["condition"], r["time"]) == same)["frequency"][:3]
+        off = [abs(a / b - 1.0) for a, b in zip(row["frequency"], full, strict=False)]
+        worst = max([worst, *off] if len(off) == len(full) else [1.0])
+    return worst
+
+
+def _far(rows: dict[str, list[Row]]) -> str:
+    """Ideal joints: effects of the rod, errors, cost."""
+    shown = [r for r in sorted(rows["far"], key=_order) if r["finer"] == 1 and r["condition"] != RIGID]
+    columns: Columns = {
+        "angle [rad]": lambda r: f"{r['angle']:.2e}",
+        "z [mm]": lambda r: f"{1e3 * r['displacement']:.2e}",
+        "v [mm/s]": lambda r: f"{1e3 * r['velocity']:.3g}",
+        "force [N]": lambda r: f"{r['force']:.2f}",
+        "off by": lambda r: f"{100.0 * far_error(rows['far'], r):.3g} %",
+        "pointwise": lambda r: f"{100.0 * r['velocity_error']:.3g} %",
+    }
+    return table(shown, {**SET, **columns, **COST})
+
+
+def _clearance(rows: dict[str, list[Row]]) -> str:
+    """Clearance: means and spreads over the members, and why the complete basis is not among the sets."""
+    columns: Columns = {
+        "members": lambda r: str(r["members"]),
+        "peak force [N]": lambda r: _spread(r, "peak_force", 1.0, 0),
+        "impacts": lambda r: _spread(r, "impacts", 1.0, 1),
+        "angle [mrad]": lambda r: _spread(r, "angle", 1e3, 3),
+        "z [mm]": lambda r: _spread(r, "displacement", 1e3, 4),
+        "v [mm/s]": lambda r: _spread(r, "velocity", 1e3, 2),
+        "acceleration [m/s²]": lambda r: _spread(r, "acceleration", 1.0, 0),
+    }
+    more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates beside {COUNT} show what more would change."
+    return f"{_why_not_all(rows)}{more}\n\n{table(sorted(rows['clearance'], key=_order), {**SET, **columns, **COST})}"
+
+
+def _why_not_all(rows: dict[str, list[Row]]) -> str:
+    """Why no ensemble has the complete basis, with the numbers."""
+    if "statics" not in rows or "far" not in rows:
+        return ""
+    highest = 1e-3 * at(rows["statics"], 0, FULL)["highest"]
+    full, best = at(rows["far"], 0, FULL), at(rows["far"], 0, "craig-bampton", COUNT)
+    return (
+        f"The complete basis reaches up to {highest:.0f} kHz, a run with it takes "
+        f"{full['seconds'] / best['seconds']:.0f} times that of {COUNT} Craig-Bampton coordinates, and with ideal "
+        f"joints those are within {100.0 * far_error(rows['far'], best):.2g} % of it; it has no ensemble here. "
+    )
+
+
+def _mesh(rows: dict[str, list[Row]]) -> str:
+    """Frequencies of coarser meshes against the finest, and what the mesh changes in a run."""
+    *coarse, finest = rows["mesh"]
+    n = len(finest["frequency"])
+    columns = {"elements": lambda r: str(r["elements"]), **{f"{k + 1}": _finer(k, finest) for k in range(n)}}
+    parts = [f"{COUNT} coordinates, against those of {finest['elements']} elements:", table(coarse, columns)]
+    runs = [r for r in rows.get("far", []) if _is_mesh_study(r)]
+    effects: Columns = {
+        "elements": lambda r: str(rows["mesh"][0]["elements"] * r["finer"]),
+        "angle [rad]": lambda r: f"{r['angle']:.6e}",
+        "z [mm]": lambda r: f"{1e3 * r['displacement']:.6e}",
+        "v [mm/s]": lambda r: f"{1e3 * r['velocity']:.6f}",
+    }
+    if runs:
+        parts.append("Deviation of the platform from ideal, ideal joints:")
+        parts.append(table(sorted(runs, key=lambda r: r["finer"]), effects))
+    return "\n\n".join(parts)
+
+
+def _finer(k: int, finest: Row) -> Callable[[Row], str]:
+    return lambda r: f"{100.0 * (r['frequency'][k] / finest['frequency'][k] - 1.0):.4f} %"
+
+
+def _is_mesh_study(row: Row) -> bool:
+    return (row["place_mm"], row["condition"], row["count"]) == (next(iter(PLACES)), "craig-bampton", COUNT)
+
+
+def _label(row: Row) -> str:
+    """Name of a mode set."""
+    return row["condition"] if row["condition"] in (FULL, RIGID) else f"{row['condition']} {row['count']}"
+
+
+def _order(row: Row) -> tuple[int, int, int]:
+    names = (RIGID, *CONDITIONS, FULL)
+    return row["place_mm"], names.index(row["condition"]), row["count"]
+
+
+def _spread(row: Row, name: str, factor: float, digits: int) -> str:
+    mean = f"{factor * row[name]:.{digits}f}"
+    return mean if row["members"] == 1 else f"{mean} ± {factor * row[f'{name}_std']:.{digits}f}"
+
+
+def _or_none(names: list[str]) -> str:
+    """Names in a sentence."""
+    return ", ".join(names) or "none"
+
+
+#: by group of rows
+TABLES = {"statics": _statics, "frequencies": _frequencies, "far": _far, "clearance": _clearance, "mesh": _mesh}
 
 FAMILY = Family(
     what="which mode sets of a rod give the answers of the full rod, and at what cost",

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import SCENES, Mechanism, mechanism
-from benchmarks.page import spread, table
+from benchmarks.page import Columns, spread, table
 from benchmarks.timing import interleaved, once
 from pipeline import dynamics
 from pipeline.core.progress import silent
-from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import integrate
 
 ROUNDS = 5
@@ -39,7 +39,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _integration(here: Mechanism) -> tuple[Callable[[], float], int]:
     engine = here.engine()
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     evaluations = integrate(engine, start, silent).counters["evaluations"]
     return lambda: once(lambda: integrate(engine, start, silent)), evaluations
 
@@ -50,7 +50,7 @@ def _stage(here: Mechanism) -> Callable[[], float]:
 
 def show(records: list[Record]) -> str:
     """The table; the rest of the stage is the evaluation of every recorded row, and the dataset."""
-    columns: dict[str, Callable[[Record], str]] = {
+    columns: Columns = {
         "scene": lambda r: r["case"],
         "integration [s]": lambda r: spread(r["integration"], "s", 4),
         "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline import dynamics
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.scene.load import edited
 from stages.s4_simulate import bundles, rebuild
 
@@ -30,7 +31,7 @@ def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
     kept = kept.sel(time=regular, method="nearest", tolerance=1e-9).assign_coords(time=regular).drop_vars("joint")
     if "event_peak_force" in run:
         kept.attrs["peak_force"] = float(run["event_peak_force"].max())
-        kept.attrs["impacts"] = int(((run["event_kind"] == 1) & (run["event_approach_speed"] > 1e-4)).sum())
+        kept.attrs["impacts"] = int(((run["event_kind"] == CLOSING) & (run["event_approach_speed"] > 1e-4)).sum())
     return {"nc": kept.assign_attrs(evaluations=int(run.attrs["evaluations"]), seconds=seconds)}
 
 

@@ -74,6 +74,11 @@ def off(row: Row, full: Row) -> dict[str, float]:
     return {name: abs(row[name] / full[name] - 1.0) for name in EFFECTS}
 
 
+def far_error(rows: list[Row], row: Row) -> float:
+    """The worst of the largest effects of a set, as a share of the full rod's."""
+    return max(off(row, at(rows, row["place_mm"], FULL)).values())
+
+
 def verdicts(groups: dict[str, list[Row]]) -> list[tuple[Claim, dict[int, tuple[bool, str]]]]:
     """Every claim with its outcome at each place [mm]."""
     found = []

@@ -13,7 +13,7 @@ from matplotlib import pyplot as plt
 
 from benchmarks.family import Record as Row
 from benchmarks.page import png
-from benchmarks.reference_conditions.claims import Rows, at
+from benchmarks.reference_conditions.claims import Rows, at, far_error
 from benchmarks.reference_conditions.design import (
     CLEARANCE_COUNTS,
     CONDITIONS,
@@ -23,7 +23,6 @@ from benchmarks.reference_conditions.design import (
     PLACES,
     RIGID,
 )
-from benchmarks.reference_conditions.sections import far_error
 
 COLORS = dict(zip(CONDITIONS, ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000"), strict=True))
 MARKERS = dict(zip(CONDITIONS, "osDv^", strict=True))

@@ -16,6 +16,7 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.stability.scenes import Parameters, scene, sweep
 from pipeline import dynamics
 from pipeline.core import quantities
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.errors import FlexclearError, SolverError
 from pipeline.core.progress import silent
 from pipeline.core.scene.wanted import parse
@@ -118,7 +119,7 @@ def judge(run: xr.Dataset, deviation: float, seconds: float) -> Record:
     closure = float(run["constraint_error"].max())
     start, end = float(run["time"][0]), float(run["time"][-1])
     reason = fault(run, ledger, closure, deviation)
-    closings = run["event_kind"].values == 1
+    closings = run["event_kind"].values == CLOSING
     return dict(
         verdict=WRONG if reason else FINISHED,
         reason=reason,

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.algebra import rotation_between
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.scene.wanted import KINDS, Quantity
 
 #: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
@@ -38,7 +39,7 @@ def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.nda
     if quantity.kind == "impulse":
         return series(run, quantity)[-1]
     contacts = [str(name) for name in run["contact"].values]
-    mine = (run["event_contact"].values == contacts.index(quantity.owner)) & (run["event_kind"].values == 1)
+    mine = (run["event_contact"].values == contacts.index(quantity.owner)) & (run["event_kind"].values == CLOSING)
     mine &= run["event_time"].values <= until
     if quantity.kind == "peak_force":
         return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])

@@ -58,9 +58,10 @@ def equilibrium(
     name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
     """
-    from pipeline.dynamics.linear import dataset, solve
+    from pipeline.dynamics.linear import dataset
+    from pipeline.dynamics.linear.equilibrium import equilibrium as find
 
-    return dataset.equilibrium(*solve.equilibrium(scene, bundles, progress, time, drives, moving), moving)
+    return dataset.equilibrium(*find(scene, bundles, progress, time, drives, moving), moving)
 
 
 def frequencies(
@@ -72,7 +73,9 @@ def frequencies(
     moving: bool = False,
 ) -> xr.Dataset:
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
-    from pipeline.dynamics.linear import dataset, solve, vibrations
+    from pipeline.dynamics.linear import dataset
+    from pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from pipeline.dynamics.linear.vibrations import vibrations
 
-    bench, rest = solve.equilibrium(scene, bundles, progress, time, drives, moving)
-    return dataset.linear(bench, rest, vibrations.vibrations(bench, rest.at), moving)
+    bench, rest = find(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)

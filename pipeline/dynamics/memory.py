@@ -28,16 +28,23 @@ from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
-from typing import Any
+from math import prod
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from pipeline.core.artifacts.event_kinds import CLOSING as CLOSING
+from pipeline.core.artifacts.event_kinds import COMPRESSION as COMPRESSION
+from pipeline.core.artifacts.event_kinds import OPENING as OPENING
+from pipeline.core.artifacts.event_kinds import SLIPPING as SLIPPING
+from pipeline.core.artifacts.event_kinds import STICKING as STICKING
 from pipeline.dynamics.kernels import kernel
 
 _place = count()
 #: tables in h, f and w, in their order there
 TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
-_ROWS: dict[int, np.dtype[Any]] = {}
+#: rows of tables and layouts as NumPy has them, by the class of what declares them
+_ROWS: dict[type, np.dtype[Any]] = {}
 
 
 def _places(number: int) -> list[int]:
@@ -69,37 +76,38 @@ def _field_place(place: int, field: int) -> Callable[[Any], Any]:
     return where
 
 
-def _fields(declared: str) -> tuple[dict[str, int], int]:
-    """Where the fields of a row begin ("name" or "name:length"), and how long a row is."""
-    begins, end = dict[str, int](), 0
-    for field in declared.split():
-        name, _, length = field.partition(":")
-        begins[name] = end
-        end += int(length or 1)
-    return begins, end
+def _fields(declared: str) -> dict[str, tuple[int, ...]]:
+    """Shapes of the fields of a row: "name", "name:length" or "name:rowsxcolumns"."""
+    parts = (field.partition(":") for field in declared.split())
+    return {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
 
 
-def record(declared: str) -> Any:
+def _begins(fields: dict[str, tuple[int, ...]]) -> dict[str, int]:
+    """Where the fields of a row begin, and as `size` how long it is."""
+    ends = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
+    return dict(zip([*fields, "size"], ends, strict=True))
+
+
+def layout(declared: str) -> Any:
     """Where the fields of a row begin, and its `size`."""
-    begins, size = _fields(declared)
+    fields = _fields(declared)
     make: Any = namedtuple
-    kind = make("Record", [*begins, "size"])
-    return kind(*begins.values(), size)
+    kind = make("Layout", [*fields, "size"])
+    _ROWS[kind] = np.dtype([(name, np.float64, shape) for name, shape in fields.items()])
+    return kind(**_begins(fields))
 
 
-def _table(array: str, declared: str, fields: Callable[[int, int, int], Any]) -> Any:
-    (place,), (begins, size) = _places(1), _fields(declared)
+def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) -> Any:
+    (place,), fields = _places(1), _fields(declared)
+    begins = _begins(fields)
+    size = begins.pop("size")
     make: Any = namedtuple
-    kind = make("Table", ["place", "size", "row", *begins])
-    table = kind(place, size, _row_reader(place, size), *(fields(place, size, begin) for begin in begins.values()))
+    kind = make("Table", ["place", "size", "row", *fields])
+    table = kind(place, size, _row_reader(place, size), *(access(place, size, begin) for begin in begins.values()))
     TABLES[array].append(table)
-    _ROWS[place] = _named_fields(begins, size, np.int64 if array == "h" else np.float64)
+    number = np.int64 if array == "h" else np.float64
+    _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
     return table
-
-
-def _named_fields(begins: dict[str, int], size: int, number: Any) -> np.dtype[Any]:
-    widths = np.diff([*begins.values(), size])
-    return np.dtype([(name, number, (int(k),) if k > 1 else ()) for name, k in zip(begins, widths, strict=True)])
 
 
 def wiring(declared: str) -> Any:
@@ -118,22 +126,24 @@ def work(declared: str) -> Any:
 
 
 def single(declared: str) -> Any:
-    """One record in w: its `place` in the header, its `size`, and for each field field(h), where w holds it."""
-    (place,), (begins, size) = _places(1), _fields(declared)
+    """One row in w: its `place` in the header, its `size`, and for each field field(h), where w holds it."""
+    (place,), fields = _places(1), _fields(declared)
+    begins = _begins(fields)
+    size = begins.pop("size")
     make: Any = namedtuple
-    kind = make("Single", ["place", "size", *begins])
-    _ROWS[place] = _named_fields(begins, size, np.float64)
+    kind = make("Single", ["place", "size", *fields])
+    _ROWS[kind] = np.dtype([(name, np.float64, shape) for name, shape in fields.items()])
     return kind(place, size, *(_field_place(place, begin) for begin in begins.values()))
 
 
-def named(table: Any, entries: np.ndarray) -> np.ndarray:
-    """Rows of a table that stand one after the other along the last axis, with named fields; shape (..., rows)."""
-    return np.ascontiguousarray(entries).view(row_type(table))
+def named(rows: Any, entries: np.ndarray) -> np.ndarray:
+    """Entries with named fields, a view; rows of a table or layout stand one after the other along the last axis."""
+    return entries.view(_ROWS[type(rows)])
 
 
-def row_type(table: Any) -> np.dtype[Any]:
-    """Rows of a table as NumPy has them, with named fields."""
-    return _ROWS[table.place]
+def row_type(rows: Any) -> np.dtype[Any]:
+    """Rows of a table or layout as NumPy has them, with named fields."""
+    return _ROWS[type(rows)]
 
 
 @dataclass(frozen=True)
@@ -187,11 +197,11 @@ GROUPS = wiring("group")  # error group of each state variable
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
 LINK_NUMBERS = numbers("mass com:3 inertia:6")  # inertia about the centre of mass (xx yy zz xy xz yz), link axes
-SITE_NUMBERS = numbers("origin:3 axes:9")  # in the link
-FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:9")
+SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
+FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
 FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
 MOMENT_VALUES = numbers("value")
-PORT_NUMBERS = numbers("origin:3 axes:9")  # undeformed
+PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
 #: radius: of the inner surface
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6")
@@ -203,8 +213,8 @@ FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutel
 
 # Work space in w -----------------------------------------------------------------------------------------------------
 #: a frame in world axes; the velocity is that of its origin
-_FRAME = "origin:3 axes:9 omega:3 velocity:3 alpha:3 acceleration:3"
-FRAME = record(_FRAME)
+_FRAME = "origin:3 axes:3x3 omega:3 velocity:3 alpha:3 acceleration:3"
+FRAME = layout(_FRAME)
 X, U, DU = _places(3)
 LINK_FRAMES, SITE_FRAMES = work(_FRAME), work(_FRAME)
 #: the motion subspace S of one joint: a twist per freedom, axes of its first frame
@@ -255,8 +265,8 @@ HEADER = next(_place)
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
 # work of drives, loss of modal damping
 DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
-# a contact's slots: losses of its damping and of friction, impulse of its normal force
-DAMPING_LOSS, FRICTION_LOSS, IMPULSE, PER_CONTACT = range(4)
+#: a contact's slots there: losses of its damping and of friction, impulse of its normal force
+CONTACT_LEDGER = layout("damping friction impulse")
 # what an evaluation reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 
@@ -275,10 +285,41 @@ SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, L
 NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER = range(8, 13)
 
 # The record ----------------------------------------------------------------------------------------------------------
-#: a row of the event table
-EVENT = record("contact kind time speed peak_force peak_depth duration")
-CLOSING, OPENING, COMPRESSION, STICKING, SLIPPING = range(5)
+#: a row of the event table; speed: rate of penetration at a closing, minus it at an opening [m/s]
+EVENT = layout("contact kind time speed peak_force peak_depth duration")
 #: free rows that one step may need: of the record; of the events, per contact
 ROOM, EVENTS_OF_A_CONTACT = 8, 4
 #: rate of the force of a contact that begins: grows, who knows how fast
 STEEPLY = 1e300
+
+
+def _record_columns(contacts: int) -> tuple[int, int, int]:
+    """Where a row of the record has the contacts' modes, their impact rates and the state; its time stands first."""
+    return 1, 1 + contacts, 1 + 2 * contacts
+
+
+record_columns = kernel(_record_columns)
+
+
+class Record(NamedTuple):
+    """Rows of the record by what they hold, all views.
+
+    time: [s], shape (rows,).  modes, latched: 1 of closed contacts and 0 of open ones, and their impact rates [m/s];
+    shape (rows, contacts).  state: shape (rows, NY).
+    """
+
+    time: np.ndarray
+    modes: np.ndarray
+    latched: np.ndarray
+    state: np.ndarray
+
+
+def record(rows: np.ndarray, contacts: int) -> Record:
+    """Rows of the record, shape (rows, columns), by what they hold."""
+    mode, latched, state = _record_columns(contacts)
+    return Record(rows[:, 0], rows[:, mode:latched], rows[:, latched:state], rows[:, state:])
+
+
+def empty_record(rows: int, contacts: int, ny: int) -> np.ndarray:
+    """Rows of the record, all zero, shape (rows, columns)."""
+    return np.zeros((rows, _record_columns(contacts)[-1] + ny))

@@ -10,7 +10,8 @@ import numpy as np
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.run.engine import Engine, consistent_start, prepare
+from pipeline.dynamics.run.engine import Engine, prepare
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: a tolerance at which no projection is made within these short runs, so that the method alone is seen
@@ -96,7 +97,7 @@ def engine_with(scene: Scene) -> Engine:
 def trajectory(table: dict[str, Any], solver: dict[str, Any]) -> Trajectory:
     """The run with this solver table."""
     engine = engine_with(Scene.model_validate({**table, "solver": solver}))
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     return integrate(engine, start, lambda share, text: None)
 
 

@@ -10,6 +10,7 @@ import pytest
 import xarray as xr
 
 from pipeline import dynamics
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.errors import InputError
 from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
@@ -97,7 +98,7 @@ def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
     """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
     asked = carried(actuators=["rail"])
     known, members = dynamics.simulate(asked, {}, silent), dynamics.ensemble(asked, {}, silent)
-    closings = known.event_kind.values == 1
+    closings = known.event_kind.values == CLOSING
     assert 2 <= closings.sum() < 20
     assert members.impact_count.values.tolist() == [[closings.sum()]] * 2
     peak = float(np.nanmax(known.event_peak_force.values[closings]))

@@ -7,14 +7,14 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.run.engine import consistent_start
+from pipeline.dynamics.run.start import consistent_start
 from tests.analytic.integrator_scenes import double_pendulum, engine_with, ledger_free, trajectory
 
 
 def test_radau_goes_where_scipys_goes() -> None:
     scene = Scene.model_validate({**double_pendulum(), "solver": {"integrator": "radau"}})
     engine = engine_with(scene)
-    start, _ = consistent_start(engine)
+    start = consistent_start(engine)
     engine.select_pieces(0.5)
     known = solve_ivp(
         lambda t, y: engine.evaluate(y, t), (engine.start, engine.end), start, "Radau", rtol=1e-10, atol=1e-10

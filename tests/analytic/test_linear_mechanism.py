@@ -9,7 +9,7 @@ from pipeline import dynamics
 from pipeline.core.progress import silent
 from pipeline.core.scene.load import load_scene
 from pipeline.dynamics.linear.bench import state
-from pipeline.dynamics.linear.solve import equilibrium
+from pipeline.dynamics.linear.equilibrium import equilibrium
 from pipeline.dynamics.linear.vibrations import vibrations
 from pipeline.dynamics.run.trajectory import integrate
 from tests.analytic.mechanism_runs import TREE, bundles

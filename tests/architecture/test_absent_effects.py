@@ -175,6 +175,11 @@ def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
     return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
 
 
+def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
+    """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
+    assert "pipeline.core.artifacts.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
+
+
 def digest(scene: Scene) -> str:
     return " ".join(digests(parts_of(scene), scheme_of(scene.solver)).values())
 

@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from pipeline.core import quantities
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.errors import SolverError
 from pipeline.core.scene.wanted import Quantity
 from pipeline.post.cost import causes, page, price, split, work_precision
@@ -28,7 +29,7 @@ def run(error: float, *, seconds=(0.2, 0.1, 0.3), evaluations=100, impacts=3, ho
         "position": (("time", "body", "axis"), position),
         "event_time": (("event",), 0.2 * (1 + np.arange(impacts)) + error),
         "event_contact": (("event",), np.zeros(impacts, dtype=int)),
-        "event_kind": (("event",), np.ones(impacts)),
+        "event_kind": (("event",), np.full(impacts, CLOSING)),
         "event_approach_speed": (("event",), np.full(impacts, 0.5)),
         "cpu_repeat": (("repeat",), np.array(seconds)),
     }

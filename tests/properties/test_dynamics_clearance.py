@@ -79,7 +79,7 @@ class Touch:
     def __init__(self, laws: Laws, seed: int, depth: float, slip: float, together: bool = False) -> None:
         random = np.random.default_rng(seed)
         packed = tables_of(laws).arrays
-        h, w, n = packed.work_space(lambda nq, nv, ny: m.Room(1, 1, 0))
+        h, w, n, _ = packed.work_space(lambda nq, nv, ny: m.Room(1, 1, 0))
         n[n[m.MODE]] = 1
         turned = rotation_vector_to_matrix(random.normal(size=3))
         self.axis = random.normal(size=3)
@@ -114,7 +114,7 @@ class Touch:
         self.losses = w[losses : losses + 2]
         self.bending = 0.0  # power that bends the bristles at this normal force
         if self.place >= 0:
-            rate = turned @ w[losses + m.PER_CONTACT :][:3]
+            rate = turned @ w[losses + m.CONTACT_LEDGER.size :][:3]
             self.bending = 1e5 * self.touch[m.TOUCH.normal_force] * float(self.bent @ rate)
             self.out_of_plane = float(rate @ self.axis)
 

@@ -136,7 +136,7 @@ def test_evaluations_in_contact_are_of_states_that_press():
     engine = mechanism("csj").engine()
     for label, state in states(engine, trajectory(engine)).items():
         assert evaluation_time(engine, state, 1) > 0.0
-        force = engine.view(m.TOUCH.place, m.TOUCH.size)[m.TOUCH.normal_force]
+        force = engine.table(m.TOUCH)["normal_force"][0]
         assert (force > 0.0) == (label == "in contact")
 
 

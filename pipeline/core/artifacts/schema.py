@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
+from pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from pipeline.core.scene.output import VARIABLES
 from pipeline.core.variable import Schema, Variable
 
@@ -132,7 +133,11 @@ RUN: Schema = {
     "event_time": _V(("event",), "s", "time of the event", optional=True),
     "event_contact": _V(("event",), "1", "index of the contact", optional=True),
     "event_kind": _V(
-        ("event",), "1", "opening, closing, maximum compression, begin of sticking or slipping", optional=True
+        ("event",),
+        "1",
+        "opening, closing, maximum compression, begin of sticking or slipping",
+        optional=True,
+        flags=EVENT_KINDS,
     ),
     "event_approach_speed": _V(
         ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening, 0 at compression", optional=True
@@ -207,6 +212,9 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}
+        if variable.flags:
+            kinds = np.arange(len(variable.flags), dtype=values.dtype)
+            result[name].attrs |= {"flag_values": kinds, "flag_meanings": " ".join(variable.flags)}
     for dim in ("axis", "axis2"):
         if dim in result.dims:
             result = result.assign_coords({dim: list(AXES)})

@@ -44,6 +44,8 @@ WORDS = {
 ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 #: what this process compiles first and the second one last: the others have kernels in common, compiled once each
 OURS = "advance"
+#: where the code of kernels stands, and what they number by
+CODE = ("pipeline.dynamics", "pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 
 
@@ -148,7 +150,7 @@ def digest(source: str) -> str:
 
 
 def reached(source: str) -> dict[str, str]:
-    """Digests of this tower's modules that a generated source imports, directly or not.
+    """Digests of the modules with `CODE` that a generated source imports, directly or not.
 
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
@@ -158,7 +160,7 @@ def reached(source: str) -> dict[str, str]:
         name = waiting.pop()
         module = SOURCES.module(name)
         package = (SOURCES.root / Path(*name.split("."))).is_dir()
-        if module is None or name in found or not name.startswith("pipeline.dynamics"):
+        if module is None or name in found or not name.startswith(CODE):
             continue
         if not package:
             found[name] = module.digest

@@ -24,7 +24,7 @@ from pipeline.dynamics.vectors import add, at, at9, cross, dot, put, scale, sub,
 @kernel
 def contact_slots(h, c):
     """Where w holds the rates of contact c's slots in the ledger."""
-    return h[m.LEDGER_RATE] + m.CONTACT_SLOTS + m.PER_CONTACT * c
+    return h[m.LEDGER_RATE] + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * c
 
 
 @kernel
@@ -98,7 +98,7 @@ def rubbing(traction: Callable) -> Callable:
         if place >= 0:
             bristle_rate(h, w, n, c, axes, normal, turning, z, z_rate)
         w[o + m.TOUCH.friction_power], w[o + m.TOUCH.bent], w[o + m.TOUCH.slip] = -loss, bent, np.sqrt(dot(slip, slip))
-        w[contact_slots(h, c) + m.FRICTION_LOSS] = -dot(force, slip)
+        w[contact_slots(h, c) + m.CONTACT_LEDGER.friction] = -dot(force, slip)
         return force
 
     return rub
@@ -153,7 +153,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
         w[o + m.TOUCH.normal_force], w[o + m.TOUCH.stored] = f_n, stored(kind, depth, law)
         w[o + m.TOUCH.damping_power] = damping * rate
         slots = contact_slots(h, c)
-        w[slots + m.DAMPING_LOSS], w[slots + m.IMPULSE] = damping * rate, f_n
+        w[slots + m.CONTACT_LEDGER.damping], w[slots + m.CONTACT_LEDGER.impulse] = damping * rate, f_n
         outer, inner = m.CONTACTS.outer(h, c), m.CONTACTS.inner(h, c)
         p_WQ = add(
             at(w, m.SITE_FRAMES.row(h, inner) + m.FRAME.origin), scale(f[numbers + m.CONTACT_NUMBERS.radius], axis)

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.bodies import rigid
@@ -13,27 +16,75 @@ from pipeline.dynamics.equations.right_hand_side import make_forces, nothing
 from pipeline.dynamics.kernels import kernel
 from pipeline.dynamics.vectors import accumulate, at, dot
 
+#: kinetic energy, potential energy of gravity, energy stored in bodies, springs and contacts [J]
+ENERGY = m.layout("kinetic potential elastic")
 
-def widths(size: Callable[[int], int]) -> dict[str, int]:
-    """Number of columns of each observed field, in their order; size: of a place in the header."""
+
+@dataclass(frozen=True)
+class Observed:
+    """What is observed of rows of the record; all over the rows, world axes, from the kernels' origin.
+
+    state: with its loops closed, (rows, NY).  positions, speeds, accelerations: of all coordinates, free ones first.
+    links, sites: their frames (LINK_FRAMES), of which accelerations are true ones less gravity; (rows, links or sites).
+    link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
+    about the kernels' origin (WRENCH).  touch, loads: what contacts and loads do (TOUCH, LOAD).
+    drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY.
+    jacobian: of the closure rows solved for, as the kernels store it.
+    residual: largest violation of a closure, shape (rows,).  status: what an evaluation reports there, shape (rows,).
+    """
+
+    state: np.ndarray
+    positions: np.ndarray
+    speeds: np.ndarray
+    accelerations: np.ndarray
+    links: np.ndarray
+    sites: np.ndarray
+    link_wrenches: np.ndarray
+    closure_wrenches: np.ndarray
+    touch: np.ndarray
+    loads: np.ndarray
+    drive_force: np.ndarray
+    energy: np.ndarray
+    jacobian: np.ndarray
+    residual: np.ndarray
+    status: np.ndarray
+
+
+def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
+    """What `observe` writes, in its order: rows of which table, or floats (None), and how many of them."""
     drives = size(m.N_DRIVES)
     return {
-        "state": size(m.NY),
-        "coordinate": size(m.NQ) + drives,
-        "speed": size(m.NV) + drives,
-        "acceleration": size(m.NV) + drives,
-        "link_frame": m.FRAME.size * size(m.N_LINKS),
-        "site_frame": m.FRAME.size * size(m.N_SITES),
-        "link_wrench": 6 * size(m.N_LINKS),
-        "closure_wrench": 6 * size(m.N_CLOSURES),
-        "touch": m.TOUCH.size * size(m.N_CONTACTS),
-        "load": m.LOAD.size * size(m.N_LOADS),
-        "drive_force": drives,
-        "energy": 3,  # kinetic, potential of gravity, elastic
-        "jacobian": size(m.JACOBIAN_SIZE),
-        "residual": 1,
-        "status": 1,
+        "state": (None, size(m.NY)),
+        "positions": (None, size(m.NQ) + drives),
+        "speeds": (None, size(m.NV) + drives),
+        "accelerations": (None, size(m.NV) + drives),
+        "links": (m.LINK_FRAMES, size(m.N_LINKS)),
+        "sites": (m.SITE_FRAMES, size(m.N_SITES)),
+        "link_wrenches": (m.WRENCH, size(m.N_LINKS)),
+        "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
+        "touch": (m.TOUCH, size(m.N_CONTACTS)),
+        "loads": (m.LOAD, size(m.N_LOADS)),
+        "drive_force": (None, drives),
+        "energy": (ENERGY, 1),
+        "jacobian": (None, size(m.JACOBIAN_SIZE)),
+        "residual": (None, 1),
+        "status": (None, 1),
     }
+
+
+def room(rows: int, size: Callable[[int], int]) -> np.ndarray:
+    """Zeros that `observe` can write on, shape (rows, columns); size: of a place in the header."""
+    return np.zeros((rows, sum((table.size if table else 1) * count for table, count in _columns(size).values())))
+
+
+def by_name(out: np.ndarray, size: Callable[[int], int]) -> Observed:
+    """Views of what `observe` has written."""
+    fields, end = dict[str, np.ndarray](), 0
+    for name, (table, count) in _columns(size).items():
+        begin, end = end, end + (table.size if table else 1) * count
+        fields[name] = m.named(table, out[:, begin:end]) if table else out[:, begin:end]
+    single = {name: fields[name][:, 0] for name in ("energy", "residual", "status")}
+    return Observed(**fields | single)
 
 
 @kernel
@@ -121,14 +172,14 @@ def make_observation(
 
     @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):
-        contacts_count = h[m.N_CONTACTS]
+        mode, latched, state = m.record_columns(h[m.N_CONTACTS])
         for r in range(rows.shape[0]):
             row, line = rows[r], out[r]
-            for c in range(contacts_count):
-                n[n[m.MODE] + c] = int(row[1 + c])
-                w[h[m.LATCHED] + c] = row[1 + contacts_count + c]
+            for c in range(h[m.N_CONTACTS]):
+                n[n[m.MODE] + c] = int(row[mode + c])
+                w[h[m.LATCHED] + c] = row[latched + c]
             for k in range(h[m.NY]):
-                w[h[m.Y] + k] = row[1 + 2 * contacts_count + k]
+                w[h[m.Y] + k] = row[state + k]
             for k in range(h[m.N_LAWS]):
                 n[n[m.ACTIVE] + k] = pieces[r, k]
             evaluate_closed(h, f, w, n, row[0], tolerance)
@@ -143,7 +194,7 @@ def make_observation(
             o = joint_wrenches(h, f, w, n, line, o + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES]))
             frames = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], line, frames)
             _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], line, frames)
-            o = _copy(w, h[m.TOUCH.place], m.TOUCH.size * contacts_count, line, o)
+            o = _copy(w, h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS], line, o)
             o = _copy(w, h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS], line, o)
             o = _copy(w, h[m.DRIVE_FORCE], h[m.N_DRIVES], line, o)
             o = energies(h, f, w, line, o)

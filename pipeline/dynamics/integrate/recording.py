@@ -23,14 +23,14 @@ def hold_modes(h, w, n):
 @kernel
 def snapshot(h, w, n, rows, t, y):
     """Append a row of the motion: time, modes and impact rates of the contacts as held, state."""
-    row, contacts = rows[n[m.N_RECORDED]], h[m.N_CONTACTS]
+    row, (mode, latched, state) = rows[n[m.N_RECORDED]], m.record_columns(h[m.N_CONTACTS])
     row[0] = t
-    for c in range(contacts):
+    for c in range(h[m.N_CONTACTS]):
         o = m.WATCH.row(h, c)
-        row[1 + c] = w[o + m.WATCH.mode0]
-        row[1 + contacts + c] = w[o + m.WATCH.latched0]
+        row[mode + c] = w[o + m.WATCH.mode0]
+        row[latched + c] = w[o + m.WATCH.latched0]
     for k in range(h[m.NY]):
-        row[1 + 2 * contacts + k] = w[y + k]
+        row[state + k] = w[y + k]
     n[m.N_RECORDED] += 1
 
 

@@ -8,14 +8,13 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
+from pipeline.core.scene.parts import RigidBody
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.linear.bench import NO_IMPACT, Bench, seen, state
+from pipeline.dynamics.linear.bench import Bench, observe, rows, state
 from pipeline.dynamics.linear.equilibrium import Equilibrium
-from pipeline.dynamics.linear.shares import by_body
 from pipeline.dynamics.linear.vibrations import Vibrations
 from pipeline.dynamics.record.dataset import attributes, dataset
-from pipeline.dynamics.record.frames import frame_velocities
-from pipeline.dynamics.record.motion import link_motions
+from pipeline.dynamics.record.motion import Motion, Motions
 from pipeline.dynamics.run.run import Run
 from pipeline.dynamics.run.trajectory import Trajectory
 
@@ -24,16 +23,10 @@ PARTS = ("real", "imaginary")
 
 def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     """The pose and what holds it (schema EQUILIBRIUM)."""
-    rows = seen(bench, state(bench, rest.at.q)[None, :])
-    contacts = bench.contacts
-    ahead = [np.full((1, 1), bench.time), np.ones((1, contacts)), np.full((1, contacts), NO_IMPACT)]
-    once = Trajectory(
-        np.hstack([*ahead, rows["state"]]),
-        np.zeros((0, m.EVENT.size)),
-        {},
-        ((bench.time, bench.engine.kept.copy()),),
-    )
-    still = dataset(Run(bench.scene, bench.engine, once, rows, 0.0, None)).isel(time=0, drop=True)
+    seen = observe(bench, state(bench, rest.at.q)[None, :])
+    contacts, none = len(bench.model.contacts), m.named(m.EVENT, np.zeros((0, m.EVENT.size)))[:, 0]
+    once = Trajectory(rows(bench, seen.state), none, contacts, {}, ((bench.time, bench.engine.kept.copy()),))
+    still = dataset(Run(bench.scene, bench.engine, once, seen)).isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]
     result = still[kept].assign_coords({n: still[n].variable for n in names})
@@ -70,18 +63,16 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
         "frame_translation": (("vibration", "part", "frame", "axis"), _split(translation)),
         "frame_rotation": (("vibration", "part", "frame", "axis"), _split(rotation)),
     }
-    numbering = bench.engine.model.numbering
-    if numbering.modes:
-        modal = np.concatenate(
-            [np.arange(numbering.flex_c0[i], numbering.flex_c0[i] + n) for i, n in sorted(numbering.modes.items())]
-        )
-        data["modal_shape"] = (("vibration", "part", "mode"), _split(w[modal].T))
+    numbering = bench.model.numbering
+    if numbering.flexible:
+        shapes = np.concatenate([w[modes] for modes in numbering.modal_coordinates.values()])
+        data["modal_shape"] = (("vibration", "part", "mode"), _split(shapes.T))
     made = still.assign({n: xr.Variable(*v) for n, v in data.items()})
     made = made.assign_coords(
         vibration=np.arange(1, len(value) + 1),
         part=list(PARTS),
         moving_body=parts,
-        frame=list(bench.engine.model.mechanism.frames),
+        frame=list(bench.model.mechanism.frames),
     )
     return conform(made, LINEAR, **still.attrs, motions_without_stiffness=small.free)
 
@@ -91,18 +82,18 @@ def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).
     """
-    model, n = bench.engine.model, w.shape[1]
+    model, n = bench.model, w.shape[1]
     speeds = np.concatenate([np.zeros((1, len(w))), w.real.T, w.imag.T])
-    rows = seen(bench, np.array([state(bench, rest.at.q, v) for v in speeds]))
-    links = link_motions(model, rows["link_frame"])
-    velocities = frame_velocities(model, rows, links)
+    seen = observe(bench, np.array([state(bench, rest.at.q, v) for v in speeds]))
+    motions = Motions(model, seen)
+    velocities = motions.frame_velocities
 
     def part(which: int) -> np.ndarray:
-        every = np.array([m[which] for m in velocities.values()]).reshape(len(velocities), len(speeds), 3)
+        every = np.array([velocity[which] for velocity in velocities.values()]).reshape(len(velocities), len(speeds), 3)
         moved = np.swapaxes(every - every[:, :1], 0, 1)[1:]
         return moved[:n] + 1j * moved[n:]
 
-    energy = {name: values[:n] + values[n:] for name, values in by_body(model, rows, links).items()}
+    energy = {name: values[:n] + values[n:] for name, values in _energies(motions).items()}
     whole = np.sum(list(energy.values()), axis=0)
     return part(0), part(1), {name: values / whole for name, values in energy.items()}
 
@@ -123,3 +114,44 @@ def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.n
 def _split(values: np.ndarray) -> np.ndarray:
     """Complex values (vibration, ...) as real and imaginary part along a second dimension."""
     return np.stack([values.real, values.imag], axis=1)
+
+
+def _energies(motions: Motions) -> dict[str, np.ndarray]:
+    """Twice the kinetic energy of every moving body in states, by name, shape (rows - 1,) each.
+
+    motions: of the pose with its drives' motion alone, which is taken off, then with the speeds of vibrations.
+    The shortening of bent beams, which is of second order here, is left out.
+    """
+    energies = {name: _rigid(body, motions.bodies[name]) for name, body in motions.model.scene.rigid().items()}
+    for i in motions.model.numbering.flexible:
+        link, state = motions.model.links[i], motions.modal(i)
+        assert link.bundle is not None
+        energies[str(link.flexible)] = _flexible(link.bundle, motions.links[i], state.q[0], state.u[1:] - state.u[0])
+    return energies
+
+
+def _relative(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and angular velocity in body axes, the first row's taken off."""
+    parts = (motion.v[1:] - motion.v[0], motion.omega[1:] - motion.omega[0])
+    return parts[0] @ motion.R[0], parts[1] @ motion.R[0]
+
+
+def _rigid(body: RigidBody, motion: Motion) -> np.ndarray:
+    v, omega = _relative(motion)
+    return body.mass * np.sum(v * v, axis=1) + np.einsum("ti,ij,tj->t", omega, np.array(body.inertia), omega)
+
+
+def _flexible(bundle: xr.Dataset, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
+    v, omega = _relative(frame)
+    E, F, C = (bundle[n].values for n in ("position_mode_moment", "mode_mode_moment", "modal_first_moment"))
+    P = E + np.einsum("klij,i->klj", F, q)
+    half = np.einsum("klj,j->kl", E, q)
+    second = bundle["second_moment"].values + half + half.T + np.einsum("klij,i,j->kl", F, q, q)
+    inertia = np.trace(second) * np.eye(3) - second
+    first, rate = bundle["first_moment"].values + C @ q, u @ C.T
+    spin = np.array([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
+    energy = float(bundle["mass"]) * np.sum(v * v, axis=1)
+    energy += 2.0 * np.sum(v * (np.cross(omega, first) + rate), axis=1)
+    energy += np.einsum("ti,ij,tj->t", omega, inertia, omega) + 2.0 * np.sum(omega * (u @ spin.T), axis=1)
+    return energy + np.einsum("ti,ij,tj->t", u, bundle["modal_mass"].values, u)

@@ -11,15 +11,20 @@ Source: line search by the power: Crisfield, *Non-linear Finite Element Analysis
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import xarray as xr
 
 from pipeline.core.errors import SolverError
+from pipeline.core.progress import Progress
+from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.linear.bench import Bench, closed
-from pipeline.dynamics.linear.names import leading
+from pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
 from pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.run.singular import built_rows
 
 #: iterations before giving up
 MOST = 200
@@ -33,15 +38,36 @@ ROUNDING = 1e-8
 LIMP = 1e-12
 #: a step may end with this share of the starting power turned against it
 OVERSHOOT = 0.5
+#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
+STEADY = 1e-9
+#: how far the drives are moved to see whether the forces stay the same, in radians or shares of the mechanism's size
+PROBE = 0.1
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """An equilibrium. residual: largest unbalanced force, moments divided by the mechanism's size [N]."""
+    """A pose in balance. residual: largest unbalanced force, moments divided by the mechanism's size [N]."""
 
     at: Tangent
     residual: float
     iterations: int
+
+
+def equilibrium(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    time: float | None,
+    drives: Mapping[str, float] | None,
+    moving: bool,
+) -> tuple[Bench, Equilibrium]:
+    """The bench of a scene and its equilibrium; see `pipeline.dynamics.equilibrium`."""
+    bench, q = hold(scene, bundles, progress, time, drives, moving)
+    progress(None, "looking for the equilibrium")
+    rest = find_equilibrium(bench, q)
+    if moving:
+        _require_steady(bench, rest.at)
+    return bench, rest
 
 
 def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
@@ -56,10 +82,10 @@ def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
         if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):
             return Equilibrium(at, residual(bench, at), iteration)
         step = _step(bench, at, BALANCED * largest)
-        if float(np.max(np.abs(at.Z @ step) / bench.engine.model.speed_scales)) <= SHORT:
+        if float(np.max(np.abs(at.Z @ step) / bench.model.speed_scales)) <= SHORT:
             return Equilibrium(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
-    loose = leading(bench, at.Z @ at.unbalanced, at.mass)
+    loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
         f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
         f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
@@ -68,18 +94,14 @@ def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
 
 def weight(bench: Bench) -> float:
     """Norm of gravity's force in the metric of the mass, as if all bodies fell [kg^0.5 m/s^2]."""
-    arrays = bench.engine.model.arrays
-    mass = arrays.table(m.LINK_NUMBERS)["mass"].sum() + arrays.table(m.FLEX_NUMBERS)["mass"].sum()
-    return float(np.sqrt(mass) * np.linalg.norm(arrays.table(m.GRAVITY)["acceleration"][0]))
+    mass = sum(link.mass for link in bench.model.links)
+    return float(np.sqrt(mass) * np.linalg.norm(bench.model.gravity))
 
 
 def residual(bench: Bench, at: Tangent) -> float:
     """Largest unbalanced force of a coordinate, moments divided by the mechanism's size [N]."""
     forces = at.mass @ at.Z @ at.unbalanced
-    return (
-        float(np.max(np.abs(forces) * bench.engine.model.speed_scales, initial=0.0))
-        / bench.engine.model.mechanism.length
-    )
+    return float(np.max(np.abs(forces) * bench.model.speed_scales, initial=0.0)) / bench.model.length
 
 
 def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
@@ -89,7 +111,7 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     force = axes.T @ at.unbalanced
     floor = max(LIMP * float(np.max(np.abs(k))), 1e-30)
     along = np.where(np.abs(force) > negligible / len(k), -force / np.maximum(np.abs(k), floor), 0.0)
-    size = bench.engine.model.speed_scales[:, None]
+    size = bench.model.speed_scales[:, None]
     reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
     along = np.clip(along, -LONGEST / reach, LONGEST / reach)
     step = axes @ along
@@ -110,3 +132,53 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
             return new
         share *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
+
+
+def _require_steady(bench: Bench, at: Tangent) -> None:
+    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
+    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.units, initial=0.0))
+    if fastest == 0.0:
+        return
+    model, before, forces = bench.model, balance(bench, at.q), _forces(bench)
+    along = built_rows(model, bench.engine.h) == 0
+    loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
+    if loops <= STEADY * fastest:
+        onward = bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, np.zeros(len(bench.drives))], axis=1)
+        set_drives(bench, onward)
+        after = balance(bench, at.q)
+        forces = max(forces, _forces(bench))
+        set_drives(bench, bench.drives)
+        change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
+        if change <= STEADY * forces:
+            return
+    raise SolverError(
+        f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
+        "as they go on; hold the drives instead"
+    )
+
+
+def _forces(bench: Bench) -> float:
+    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
+
+    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
+    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
+    """
+    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
+    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
+    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])
+
+
+def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
+    """What has most of the kinetic energy of a motion: a joint, a body held by none, or the deformation of one.
+
+    motion: speeds, shape (nv,).
+    """
+    energy, shares = motion * (mass @ motion), dict[str, float]()
+    for i, link in enumerate(model.links[1:], start=1):
+        edge, mine = link.branch.edge, model.numbering.coordinates[i]
+        name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
+        if not link.drives:
+            shares[name] = shares.get(name, 0.0) + float(energy[mine].sum())
+        if link.flexible:
+            shares[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
+    return max(shares, key=lambda name: shares[name])

@@ -69,7 +69,7 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and an error estimate of each column."""
-    size = bench.engine.model.speed_scales
+    size = bench.model.speed_scales
     noise = EPSILON * magnitude(motions, at)
 
     def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
@@ -87,7 +87,7 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and errors."""
-    size, noise = bench.engine.model.speed_scales, Rounding(EPSILON * magnitude(motions, at))
+    size, noise = bench.model.speed_scales, Rounding(EPSILON * magnitude(motions, at))
 
     def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
         def force(s: float) -> np.ndarray:

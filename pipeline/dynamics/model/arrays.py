@@ -4,11 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from pipeline.dynamics import memory as m
+
+
+class WorkSpace(NamedTuple):
+    """What kernels of one run may change. h: wiring that knows where w keeps what; w, n: floats and integers.
+
+    lengths: of the stretches of w, by their places in the header.
+    """
+
+    h: np.ndarray
+    w: np.ndarray
+    n: np.ndarray
+    lengths: Mapping[int, int]
 
 
 @dataclass(frozen=True)
@@ -23,26 +35,23 @@ class Arrays:
         """A size in the header."""
         return int(self.h[place])
 
-    def offset(self, place: int) -> int:
-        """Where a table or a stretch begins in its array."""
-        return int(self.h[place])
-
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
         """A view of a wiring or number table with named fields, shape (rows,); of the wiring in another h if given."""
         wiring = table in m.TABLES["h"]
         array = (self.h if h is None else h) if wiring else self.f
         tables = m.TABLES["h" if wiring else "f"]
-        k, start = tables.index(table), self.offset(table.place)
-        end = self.offset(tables[k + 1].place) if k + 1 < len(tables) else len(array)
-        return array[start:end].view(m.row_type(table))
+        k = tables.index(table)
+        end = self.h[tables[k + 1].place] if k + 1 < len(tables) else len(array)
+        return m.named(table, array[self.h[table.place] : end])
 
-    def work_space(self, room: Callable[[int, int, int], m.Room]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """A copy of h that knows where w keeps what, w zeroed with the ground in place, and the integers n.
+    def work_space(self, room: Callable[[int, int, int], m.Room]) -> WorkSpace:
+        """A work space with a copy of h, the ground in place and all else zero.
 
         room: room(NQ, NV, NY) that the integration method needs.
         """
         h, end = self.h.copy(), 0
-        for place, length in _work_lengths(h, room, self.columns).items():
+        lengths = _work_lengths(h, room, self.columns)
+        for place, length in lengths.items():
             h[place] = end
             end += length
         laws, contacts = self.size(m.N_LAWS), self.size(m.N_CONTACTS)
@@ -50,7 +59,7 @@ class Arrays:
         axes = h[m.LINK_FRAMES.place] + m.FRAME.axes
         w[axes : axes + 9] = np.eye(3).ravel()
         n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + laws
-        return h, w, n
+        return WorkSpace(h, w, n, lengths)
 
 
 def rows(table: Any, entries: Any) -> np.ndarray:
@@ -74,10 +83,10 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
     arrays: dict[str, list[np.ndarray]] = {"h": [h], "f": []}
     for array, start in (("h", m.HEADER), ("f", 0)):
         for table in m.TABLES[array]:
-            found = rows(table, tables[table])
-            counts[table], h[table.place] = len(found), start
-            start += found.size
-            arrays[array].append(found.ravel())
+            filled = rows(table, tables[table])
+            counts[table], h[table.place] = len(filled), start
+            start += filled.size
+            arrays[array].append(filled.ravel())
     for place, size in (_sizes(counts, tables) | dict(sizes)).items():
         h[place] = size
     return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), columns)

@@ -1,4 +1,4 @@
-"""From the poses that a scene gives to poses in which all joints fit, or a refusal in words."""
+"""What joints demand of the poses of links; from the poses that a scene gives to some that fit, or a refusal."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from pipeline.core.algebra import rotation_vector_to_matrix, skew
 from pipeline.core.errors import InputError
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.chain import path_positions
-from pipeline.dynamics.model.constraints import NONE, Constraint, constraints, demands, massless, prescribed
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.laws import NONE, drive_laws
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.tree import PATH
+from pipeline.dynamics.model.tree import PATH, Edge
 
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
@@ -33,6 +33,101 @@ ROUNDING = 1e-15
 SAME_WAY = 0.5
 #: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
 LEAST_GYRATION = 0.01
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A joint between frames on two links; `values`: what drives prescribe at the start, by number of coordinate."""
+
+    edge: Edge
+    link_a: int
+    place_a: Placement
+    link_b: int
+    place_b: Placement
+    values: Mapping[int, float]
+
+    @property
+    def name(self) -> str:
+        """Name of the joint."""
+        return self.edge.name
+
+    def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
+        """Both frames in the world, from the poses of all links."""
+        return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
+
+
+def constraints(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> list[Constraint]:
+    """All joints but contacts and paths: those of the tree in the order of its links, then the closures."""
+    t = mechanism.scene.time.start
+    laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
+    tree = [link.branch.edge for link in mechanism.links if link.branch.edge is not None and not link.massless]
+    joints = []
+    for edge in [*tree, *(closure.edge for closure in mechanism.closures)]:
+        if edge.kind == PATH:
+            continue
+        a, b = mechanism.site(edge.frame_a), mechanism.site(edge.frame_b)
+        values = {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
+        joints.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
+    return joints
+
+
+def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
+    """A link's own side of its inboard joint, in the link's frame."""
+    frame = link.branch.frame
+    return Placement() if frame is None or not link.flexible else mechanism.frames[frame].place
+
+
+def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals (n,) [m or -] of a joint, and the wrenches (n, 6) (moment about the origin, force) that resist them.
+
+    A wrench times the twist of B relative to A (angular velocity; velocity of the point at the origin) is the
+    residual's rate.
+    """
+    declared = joint_class(kind)
+    residuals, wrenches = [], []
+    for k in declared.TRANSLATIONS:
+        along = A.R[:, k]
+        residuals.append(along @ (B.p - A.p))
+        wrenches.append([*_cross(B.p, along), *along])
+    for k, other in declared.ROTATIONS:
+        residuals.append(A.R[:, k] @ B.R[:, other])
+        wrenches.append([*_cross(B.R[:, other], A.R[:, k]), 0.0, 0.0, 0.0])
+    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
+
+
+def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> tuple[np.ndarray, np.ndarray]:
+    """The same for the driven coordinates of a joint."""
+    declared, relative = joint_class(kind), A.inverse().of(B)
+    now = declared.coordinates(relative.R, relative.p)
+    residuals, wrenches = [], []
+    for k, value in values.items():
+        coordinate = declared.COORDINATES[k]
+        along, miss = (A, B)[coordinate.side].R[:, coordinate.axis], float(now[k]) - value
+        if coordinate.turning:
+            miss = (miss + np.pi) % (2.0 * np.pi) - np.pi
+            wrenches.append([*along, 0.0, 0.0, 0.0])
+        else:
+            wrenches.append([*_cross(B.p, along), *along])
+        residuals.append(miss)
+    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
+    """Vector product; numpy's own costs fifty times as much for one pair, and there are thousands."""
+    ax, ay, az = a.tolist()
+    bx, by, bz = b.tolist()
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+
+
+def freedoms(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
+    """What a joint leaves free of the motion of B relative to A: axes of turns about B's origin, and of slides.
+
+    Shapes (turns, 3) and (slides, 3), orthonormal each; turns come first in the joint's speeds.
+    """
+    declared, (_, wrenches) = joint_class(kind), demands(kind, A, B)
+    turning = wrenches[len(declared.TRANSLATIONS) :, :3]
+    turns = np.linalg.svd(turning)[2][len(turning) :] if len(turning) else np.eye(3)
+    return np.asarray(turns), A.R.T[[k for k in range(3) if k not in declared.TRANSLATIONS]]
 
 
 @dataclass(frozen=True)
@@ -63,8 +158,7 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     _refuse_apart(mechanism, joints, poses)
     _refuse_opposite(joints, poses)
     mechanism = replace(mechanism, start_residual=max(residuals(joints, poses).values(), default=0.0))
-    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in mechanism.links)
-    if paths or any(link.flexible for link in mechanism.links):
+    if mechanism.has_paths or not mechanism.all_rigid:
         return settled(mechanism, poses)
     closed = close(mechanism, joints, poses)
     if closed is None:
@@ -147,27 +241,20 @@ def _sparse(blocks: list[tuple[np.ndarray, int, int]], shape: tuple[int, int]) -
 
 
 def _centre(link: Link) -> np.ndarray:
-    return link.inertia[1] if link.inertia is not None else np.zeros(3)
+    return link.inertia.com if link.inertia is not None else np.zeros(3)
 
 
 def _mobilities(mechanism: Mechanism, poses: Sequence[Placement]) -> np.ndarray:
     """Inverse of mass and least principal moment of inertia per motion, shape (6 (links - 1),)."""
     L, result = mechanism.length, []
-    masses = [_mass(mechanism, link) for link in mechanism.links[1:]]
-    largest = max(masses, default=1.0)
-    for link, mass in zip(mechanism.links[1:], masses, strict=True):
-        if massless(link):
+    largest = max((link.mass for link in mechanism.links[1:]), default=1.0)
+    for link in mechanism.links[1:]:
+        if link.massless:
             result += [0.0] * 6
             continue
-        moment = float(np.linalg.eigvalsh(link.inertia[2])[0]) if link.inertia is not None else 0.0
-        result += [largest / max(moment / L**2, mass * LEAST_GYRATION**2)] * 3 + [largest / mass] * 3
+        moment = float(np.linalg.eigvalsh(link.inertia.moments)[0]) if link.inertia is not None else 0.0
+        result += [largest / max(moment / L**2, link.mass * LEAST_GYRATION**2)] * 3 + [largest / link.mass] * 3
     return np.array(result)
-
-
-def _mass(mechanism: Mechanism, link: Link) -> float:
-    if link.inertia is not None:
-        return link.inertia[0]
-    return 0.0 if massless(link) else float(mechanism.bundles[str(link.flexible)]["mass"])
 
 
 def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> list[Placement]:
@@ -184,7 +271,7 @@ def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
     """The system with these starts; massless links within joints stand where the joints' coordinates put them."""
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):
-        if massless(link) and i:
+        if link.massless and i:
             settled_poses[i] = _between(mechanism, link, poses, settled_poses)
         links.append(replace(link, start=settled_poses[i]))
     return replace(mechanism, links=links)
@@ -194,34 +281,44 @@ def _between(
     mechanism: Mechanism, link: Link, poses: Sequence[Placement], settled_poses: Sequence[Placement]
 ) -> Placement:
     """Pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
-    edge, stage, inboard = link.branch.edge, link.stage, link.inboard
-    assert edge is not None
-    assert stage is not None
-    assert inboard is not None
-    F = settled_poses[inboard.link].of(inboard.place)
-    if not stage.positions:
+    assert link.inboard is not None
+    F = settled_poses[link.inboard.link].of(link.inboard.place)
+    if not link.joint.positions:
         return F
-    site = mechanism.site(edge.frame_b)
-    G = poses[site.link].of(site.place)
-    if edge.kind == PATH:
-        whole = path_positions(edge, G.R, G.p + mechanism.origin)
-    else:
-        near = mechanism.site(edge.frame_a)
-        relative = poses[near.link].of(near.place).inverse().of(G)
-        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
-    value = stage.sign * float(whole[stage.positions[0]])
-    if stage.kind == "revolute":
+    value = float(chain_positions(mechanism, link, poses)[0])
+    if link.kind == "revolute":
         return F.of(Placement(R=rotation_vector_to_matrix(np.array([0.0, 0.0, value]))))
     return F.of(Placement(np.array([0.0, 0.0, value])))
 
 
+def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]) -> np.ndarray:
+    """Those positions of a joint that is a chain, or of a path, which are its link's own, in the tree's sense.
+
+    poses: of the links that have mass.
+    """
+    edge, joint = link.branch.edge, link.joint
+    assert edge is not None
+
+    def at(frame: str) -> Placement:
+        site = mechanism.site(frame)
+        return poses[site.link].of(site.place)
+
+    G = at(edge.frame_b)
+    if link.on_path:
+        whole = path_positions(edge, G.R, G.p + mechanism.origin)
+    else:
+        relative = at(edge.frame_a).inverse().of(G)
+        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
+    return np.asarray(joint.sign * whole[list(joint.positions)])
+
+
 def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:
     """Largest residual per joint [m, or the sine of an angle], drives not looked at."""
-    found = {}
+    worst = {}
     for joint in joints:
         values, _ = demands(joint.edge.kind, *joint.frames(poses))
-        found[joint.name] = float(np.max(np.abs(values), initial=0.0))
-    return found
+        worst[joint.name] = float(np.max(np.abs(values), initial=0.0))
+    return worst
 
 
 def _refuse_apart(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> None:
@@ -280,9 +377,9 @@ def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[P
 
 
 def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> InputError:
-    found = residuals(joints, poses)
-    worst = max(found, key=lambda name: found[name])
-    listed = ", ".join(f"{name} {value:.3g}" for name, value in found.items() if value > EXACT * mechanism.length)
+    left = residuals(joints, poses)
+    worst = max(left, key=lambda name: left[name])
+    listed = ", ".join(f"{name} {value:.3g}" for name, value in left.items() if value > EXACT * mechanism.length)
     slight = misfit(mechanism, joints, poses).worst < SLIGHT
     return InputError(
         f"[joint.{worst}.between]",

@@ -7,7 +7,7 @@ between: each freedom is then a coordinate by itself, free or known. The pose of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -21,64 +21,70 @@ TURNS = tuple(Coordinate(axis, True, axis=k) for k, axis in enumerate("xyz"))
 
 
 @dataclass(frozen=True)
-class Stage:
-    """One link of a chain: joint type, axes of its frames in the joint's frames (columns), drives if prescribed.
+class InboardJoint:
+    """The joint between a link and its parent: a joint of the scene, or one step of the chain that stands for it.
 
-    positions: which of the joint's positions are its own.  sign: -1 where it is met from its far side.
+    kind: joint type.  axes: of its frames, in the frames of the scene's joint (columns).
+    positions: which of that joint's positions are its own.
+    drives: prescribed coordinates, none or as many as it has speeds.
+    sign: -1 where the tree meets the joint from its second frame: its coordinates are then minus the scene's.
     """
 
     kind: str
-    axes: np.ndarray
-    positions: tuple[int, ...]
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3))
+    positions: tuple[int, ...] = ()
     drives: tuple[str, ...] = ()
     sign: float = 1.0
 
+    @property
+    def straight(self) -> bool:
+        """Whether its frames have the axes of those of the scene's joint."""
+        return bool(np.array_equal(self.axes, np.eye(3)))
 
-def stages(edge: Edge, reverse: bool, port_near: bool, port_far: bool) -> list[Stage]:
+
+def chain(edge: Edge, reverse: bool, port_near: bool, port_far: bool) -> list[InboardJoint]:
     """The chain of a joint, from the parent on; a link at a port of a flexible body keeps the port's axes."""
-    found = _path(edge) if edge.kind == PATH else _joint(edge, reverse)
-    if port_near and not _straight(found[0]):
-        found.insert(0, Stage("fixed", np.eye(3), ()))
-    if port_far and not _straight(found[-1]):
-        found.append(Stage("fixed", np.eye(3), ()))
-    return found
+    joints = _path(edge) if edge.kind == PATH else _joint(edge, reverse)
+    if port_near and not joints[0].straight:
+        joints.insert(0, InboardJoint("fixed"))
+    if port_far and not joints[-1].straight:
+        joints.append(InboardJoint("fixed"))
+    return joints
 
 
-def _straight(stage: Stage) -> bool:
-    return bool(np.array_equal(stage.axes, np.eye(3)))
-
-
-def _joint(edge: Edge, reverse: bool) -> list[Stage]:
+def _joint(edge: Edge, reverse: bool) -> list[InboardJoint]:
     declared, sign = joint_class(edge.kind), -1.0 if reverse else 1.0
-    count, driven = len(declared.POSITIONS), [d for d in edge.drives if d is not None]
+    count, driven = len(declared.POSITIONS), tuple(d for d in edge.drives if d is not None)
     one_axis = len({c.axis for c in declared.COORDINATES}) <= 1
     if count <= 1 or (not driven and (one_axis or not reverse)):
-        return [Stage(edge.kind, np.eye(3), tuple(range(count)), tuple(driven), sign)]
-    parts = [
-        Stage(c.part, c.axes, (k,), (drive,) if drive is not None else (), sign)
-        for k, (c, drive) in enumerate(zip(declared.COORDINATES, edge.drives or (None,) * count, strict=True))
-    ]
+        return [InboardJoint(edge.kind, positions=tuple(range(count)), drives=driven, sign=sign)]
+    parts = _single(declared.COORDINATES, edge.drives or (None,) * count, 0, sign)
     return parts[::-1] if reverse else parts
 
 
-def _path(edge: Edge) -> list[Stage]:
-    """Slides to the frame's origin; then Cardan angles, a rotation vector, or a free rotation."""
-    slides, turns = edge.drives[:3], edge.drives[3:]
-    found = [
-        Stage(c.part, c.axes, (k,), (d,) if d else ()) for k, (c, d) in enumerate(zip(SLIDES, slides, strict=True))
+def _single(
+    coordinates: tuple[Coordinate, ...], drives: tuple[str | None, ...], first: int, sign: float
+) -> list[InboardJoint]:
+    """A hinge or slide per coordinate; first: position of the first one in the joint."""
+    return [
+        InboardJoint(c.part, c.axes, (first + k,), (drive,) if drive else (), sign)
+        for k, (c, drive) in enumerate(zip(coordinates, drives, strict=True))
     ]
+
+
+def _path(edge: Edge) -> list[InboardJoint]:
+    """Slides to the frame's origin; then Cardan angles, a rotation vector, or a free rotation."""
+    turns = edge.drives[3:]
+    slides = _single(SLIDES, edge.drives[:3], 0, 1.0)
     if edge.vector:
-        return [*found, Stage("rotation-vector", np.eye(3), (3, 4, 5), tuple(d for d in turns if d))]
+        return [*slides, InboardJoint("rotation-vector", positions=(3, 4, 5), drives=tuple(d for d in turns if d))]
     if not any(turns):
-        return [*found, Stage("spherical", np.eye(3), (3, 4, 5, 6))]
-    angles = (
-        Stage(c.part, c.axes, (3 + k,), (d,) if d else ()) for k, (c, d) in enumerate(zip(TURNS, turns, strict=True))
-    )
-    return [*found, *angles]
+        return [*slides, InboardJoint("spherical", positions=(3, 4, 5, 6))]
+    return [*slides, *_single(TURNS, turns, 3, 1.0)]
 
 
 def path_positions(edge: Edge, R: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """Positions of a path's chain for a pose in the world: origin, then quaternion or Cardan angles."""
+    """Positions of a path's chain for a pose in the world: origin [m], then quaternion or Cardan angles [rad]."""
     if not any(edge.drives[3:]):
         return np.concatenate([p, joint_class("spherical").coordinates(R, p)])
     # R = Rx(a) Ry(b) Rz(c)

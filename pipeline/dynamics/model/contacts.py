@@ -9,31 +9,27 @@ from pipeline.core.errors import InputError
 from pipeline.core.registry import lookup
 from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.effects import Parts
-from pipeline.dynamics.model.mechanism import Mechanism, Site
+from pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
+from pipeline.dynamics.model.mechanism import Contact, Mechanism
 from pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
 
-NORMAL = "pipeline.dynamics.contact.normal"
-FRICTION = "pipeline.dynamics.contact.friction"
-SURFACES = "pipeline.dynamics.contact"
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]
 
 
 def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     """The normal law of every contact with its numbers; InputError for a law that cannot be had."""
-    return tuple(_resolve(mechanism, name, joint, (a, b)) for name, joint, a, b in mechanism.contacts)
+    return tuple(_resolve(mechanism, contact) for contact in mechanism.contacts)
 
 
 def fill(numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching) -> dict[Any, Any]:
     """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact."""
-    mechanism = numbering.mechanism
-    places = bristle_places(numbering)
+    contacts = numbering.mechanism.contacts
     rows, reals = [], []
-    for (name, joint, _, _), law, sites, place in zip(mechanism.contacts, laws, touching, places, strict=True):
+    for (name, joint, *_), law, sites, place in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
             friction = _friction(name, joint)
@@ -59,45 +55,39 @@ def ledger_size(mechanism: Mechanism) -> int:
 
 def bristle_places(numbering: Numbering) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    place = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.PER_CONTACT * len(numbering.mechanism.contacts)
-    found = []
+    place = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
+    places = []
     for size in _bristles(numbering.mechanism):
-        found.append(-1 if size is None else place)
+        places.append(-1 if size is None else place)
         place += 0 if size is None else 3
-    return found
+    return places
 
 
 def _bristles(mechanism: Mechanism) -> list[float | None]:
     return [
         None if joint.friction is None else _friction(name, joint).bristle(joint.friction)
-        for name, joint, _, _ in mechanism.contacts
+        for name, joint, *_ in mechanism.contacts
     ]
 
 
 def _friction(name: str, joint: Clearance) -> Any:
     assert joint.friction is not None
-    return lookup(FRICTION, joint.friction.law, where=f"[joint.{name}.friction]")
+    return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
-def _resolve(mechanism: Mechanism, name: str, joint: Clearance, sites: tuple[Site, Site]) -> Resolved:
-    place = f"[joint.{name}.normal]"
-    normal = lookup(NORMAL, joint.normal.law, where=place)
-    surfaces = lookup(SURFACES, joint.type, where=place)
+def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
+    joint, place = contact.joint, f"[joint.{contact.name}.normal]"
+    masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
+    normal = lookup(NORMAL_LAWS, joint.normal.law, where=place)
+    surfaces = lookup(CONTACTS, joint.type, where=place)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
-        return normal.resolve(joint.normal, surfaces.stiffness(joint, exponent), _reduced_mass(mechanism, sites))
+        return normal.resolve(joint.normal, surfaces.stiffness(joint, exponent), _reduced_mass(masses))
     except ValueError as error:
         raise InputError(place, str(error)) from None
 
 
-def _reduced_mass(mechanism: Mechanism, sites: tuple[Site, Site]) -> float | None:
-    """Of the links on both sides [kg], the ground's being infinite; None when both are."""
-    inverse = sum(1.0 / mass for mass in (_mass(mechanism, site.link) for site in sites) if mass > 0.0)
+def _reduced_mass(masses: Sequence[float]) -> float | None:
+    """Of the links on both sides [kg], the ground's (0 here) being infinite; None when both are."""
+    inverse = sum(1.0 / mass for mass in masses if mass > 0.0)
     return 1.0 / inverse if inverse > 0.0 else None
-
-
-def _mass(mechanism: Mechanism, i: int) -> float:
-    link = mechanism.links[i]
-    if link.inertia is not None:
-        return float(link.inertia[0])
-    return float(mechanism.bundles[link.flexible]["mass"]) if link.flexible else 0.0

@@ -1,4 +1,4 @@
-"""Tables of the flexible bodies, from their bundles."""
+"""Tables of the flexible bodies, from their bundles; how their points move with the modes."""
 
 from __future__ import annotations
 
@@ -21,20 +21,17 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
     """The tables FLEXES, MOMENTS, PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
     flex, flex_real, data, index, value = [], [], [], [], []
     data0 = moment0 = 0
-    any_shortened = any(b.stiffening is not None for b in numbering.mechanism.scene.flexible().values())
-    order = sorted(numbering.modes)
-    for i in order:
-        link = numbering.mechanism.links[i]
-        body = numbering.mechanism.scene.body[str(link.flexible)]
-        assert isinstance(body, FlexibleBody)
-        bundle = numbering.mechanism.bundles[str(link.flexible)]
-        n = numbering.modes[i]
+    mechanism, bodies = numbering.mechanism, numbering.mechanism.scene.flexible()
+    any_shortened = any(b.stiffening is not None for b in bodies.values())
+    for i in numbering.flexible:
+        name, bundle = _body(mechanism, i)
+        q, c = numbering.modal_positions[i], numbering.modal_coordinates[i]
         moments, where = _moments(bundle)
-        chunk = _data(bundle, _damping(str(link.flexible), body, bundle))
+        chunk = _data(bundle, _damping(name, bodies[name], bundle))
         if any_shortened:
-            chunk = np.concatenate([chunk, *_forms(numbering.mechanism, str(link.flexible), n)])
-        moves = int(_inboard_moves(numbering, i, bundle))
-        flex.append((i, n, numbering.flex_q0[i], numbering.flex_c0[i], data0, moment0, len(moments), moves))
+            chunk = np.concatenate([chunk, *_forms(mechanism, i, len(q))])
+        moves = int(_inboard_moves(mechanism, i))
+        flex.append((i, len(q), q.start, c.start, data0, moment0, len(moments), moves))
         flex_real.append(
             [float(bundle["mass"]), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
         )
@@ -43,7 +40,7 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         index.append(where)
         data0 += len(chunk)
         moment0 += len(moments)
-    port, port_real, port_data = _ports(numbering, order, any_shortened)
+    port, port_real, port_data = _ports(numbering, any_shortened)
     return {
         m.FLEXES: flex,
         m.MOMENTS: np.concatenate([*index, np.zeros((0, 2), dtype=np.int64)]),
@@ -56,15 +53,22 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
     }
 
 
-def bow(mechanism: Mechanism, body: str, frame: str | None = None) -> np.ndarray | None:
+def _body(mechanism: Mechanism, link: int) -> tuple[str, xr.Dataset]:
+    """Name and bundle of a flexible link's body."""
+    name, bundle = mechanism.links[link].flexible, mechanism.links[link].bundle
+    assert name is not None
+    assert bundle is not None
+    return name, bundle
+
+
+def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray | None:
     """Shortening of a bent body per pair of modes at a frame [1/(kg m)], or its first moment [1/m]; shape (mode, mode).
 
-    None where the scene does not ask for it.
+    link: a flexible one.  frame: its name in the bundle.  None where the scene does not ask for it.
     """
-    part = mechanism.scene.body[body]
-    if not isinstance(part, FlexibleBody) or part.stiffening is None:
+    body, bundle = _body(mechanism, link)
+    if mechanism.scene.flexible()[body].stiffening is None:
         return None
-    bundle = mechanism.bundles[body]
     if "frame_shortening" not in bundle:
         raise InputError(
             f"[body.{body}.stiffening]",
@@ -74,6 +78,23 @@ def bow(mechanism: Mechanism, body: str, frame: str | None = None) -> np.ndarray
     if frame is None:
         return bundle["shortening_first_moment"].values
     return bundle["frame_shortening"].sel(frame=frame).values
+
+
+def shift(
+    shape: np.ndarray, bow: np.ndarray | None, q: np.ndarray, u: np.ndarray, du: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    r"""Displacement :math:`S q + \tfrac12 q^T B q\, e_x` of a point in the body frame, and its two rates.
+
+    shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
+    q, u, du: modal coordinates, rates and second rates, (time, mode).
+    """
+    place, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
+    if bow is not None:
+        bent, turning = q @ bow, u @ bow
+        place[:, 0] += 0.5 * np.sum(bent * q, axis=1)
+        rate[:, 0] += np.sum(bent * u, axis=1)
+        second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
+    return place, rate, second
 
 
 def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:
@@ -92,10 +113,10 @@ def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:
     return 2.0 * np.asarray(ratios) * np.sqrt(square)
 
 
-def _forms(mechanism: Mechanism, body: str, n: int) -> list[np.ndarray]:
+def _forms(mechanism: Mechanism, link: int, n: int) -> list[np.ndarray]:
     """Int rho B and int rho x B (n n each) of a body, zeros where it does not ask for stiffening."""
-    first = bow(mechanism, body)
-    second = None if first is None else mechanism.bundles[body]["shortening_second_moment"].values
+    first = bow(mechanism, link)
+    second = None if first is None else _body(mechanism, link)[1]["shortening_second_moment"].values
     return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
 
 
@@ -138,51 +159,38 @@ def _frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarra
     return pose, shapes[0], shapes[1]
 
 
-def _inboard_frame(numbering: Numbering, i: int) -> str | None:
-    """Name of the frame by which a flexible link hangs in the tree; None for a free body."""
-    branch = numbering.mechanism.links[i].branch
-    if branch.edge is None:
-        return None
-    name = branch.edge.frame_a if branch.reverse else branch.edge.frame_b
-    return name.partition(".")[2]
+def _inboard_frame(mechanism: Mechanism, link: int) -> str | None:
+    """Name in the bundle of the frame by which a flexible link hangs in the tree; None for a free body."""
+    frame = mechanism.links[link].branch.frame
+    return None if frame is None else frame.partition(".")[2]
 
 
-def _inboard_moves(numbering: Numbering, i: int, bundle: xr.Dataset) -> bool:
-    frame = _inboard_frame(numbering, i)
+def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
+    """Whether modes move the frame by which a flexible link hangs in the tree."""
+    frame = _inboard_frame(mechanism, link)
     if frame is None:
         return False
-    _, translation, rotation = _frame_shapes(bundle, frame)
-    drawn = bow(numbering.mechanism, str(numbering.mechanism.links[i].flexible), frame)
-    return bool(np.any(translation) or np.any(rotation) or (drawn is not None and np.any(drawn)))
+    _, *shapes = _frame_shapes(_body(mechanism, link)[1], frame)
+    drawn = bow(mechanism, link, frame)
+    return any(np.any(shape) for shape in [*shapes, *([] if drawn is None else [drawn])])
 
 
-def _ports(numbering: Numbering, order: list[int], shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:
-    """Ports of sites first, then one inboard port per flexible link (Layout.port_of_inboard)."""
-    rows, reals, data, start = [], [], [], 0
-
-    def add(link: int, frame: str | None, column: int) -> None:
-        nonlocal start
-        bundle = numbering.mechanism.bundles[str(numbering.mechanism.links[link].flexible)]
-        n = numbering.modes[link]
+def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:
+    """Ports of sites first, then one inboard port per flexible link (`Numbering.port_of_inboard`)."""
+    mechanism = numbering.mechanism
+    rows, reals, data, start = list[Any](), list[Any](), list[np.ndarray](), 0
+    ports = [(numbering.sites[p.site].link, p.frame.partition(".")[2], p.column) for p in numbering.ports]
+    for link, frame, column in [*ports, *((i, _inboard_frame(mechanism, i), -1) for i in numbering.flexible)]:
+        n = len(numbering.modal_positions[link])
         if frame is None:
-            pose, shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), [np.zeros(3 * n)] * 2
+            pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros(3 * n), np.zeros(3 * n)
         else:
-            pose, *found = _frame_shapes(bundle, frame)
-            shapes = [s.ravel() for s in found]
+            pose, *shapes = _frame_shapes(_body(mechanism, link)[1], frame)
         if shortened:
-            drawn = (
-                None
-                if frame is None
-                else bow(numbering.mechanism, str(numbering.mechanism.links[link].flexible), frame)
-            )
-            shapes.append(np.zeros(n * n) if drawn is None else drawn.ravel())
-        rows.append((order.index(link), column, start))
+            drawn = None if frame is None else bow(mechanism, link, frame)
+            shapes.append(np.zeros(n * n) if drawn is None else drawn)
+        rows.append((numbering.flexible.index(link), column, start))
         reals.append(pose)
-        data.extend(shapes)
-        start += sum(len(s) for s in shapes)
-
-    for site, frame, column in numbering.ports:
-        add(numbering.sites[site].link, frame.partition(".")[2], column)
-    for i in order:
-        add(i, _inboard_frame(numbering, i), -1)
+        data += [shape.ravel() for shape in shapes]
+        start += sum(shape.size for shape in shapes)
     return rows, reals, np.concatenate([*data, np.zeros(0)])

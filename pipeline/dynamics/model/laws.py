@@ -1,14 +1,58 @@
-"""The tables of the laws of time."""
+"""Laws of time: those of drives and loads, checked, and their tables."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
+from pipeline.core.errors import InputError
+from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
+from pipeline.dynamics.model.driving import prescribed
+
+#: no laws in the place of the scene's
+NONE: Mapping[str, Pieces] = MappingProxyType({})
+
+
+def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
+    """The law of every prescribed coordinate; `given` ones are taken as they are.
+
+    Raises InputError where a value has the wrong dimension, a law does not cover the run, or value
+    or rate jump: no finite force could follow.
+    """
+    laws = []
+    for one in prescribed(scene):
+        law = given[one.name] if one.name in given else checked_law(scene, one.law, one.dimension, one.place)
+        broken = None if one.name in given else jump(law, scene.time.start, scene.time.end)
+        if broken is not None:
+            raise InputError(
+                one.place,
+                f"the {broken[1]} of the prescribed motion jumps at {broken[0]:.6g} s",
+                "let value and rate go on without a jump; the second derivative may have one",
+            )
+        laws.append(law)
+    return laws
+
+
+def checked_law(scene: Scene, law: Any, dimension: str, place: str) -> Pieces:
+    """The pieces of a law; InputError for the wrong dimension, or when it does not cover the run."""
+    try:
+        made = pieces_of(law, dimension)
+    except ValueError as error:
+        raise InputError(place, str(error)) from None
+    start, end = scene.time.start, scene.time.end
+    if not covers(made, start, end):
+        low, high = made.span
+        raise InputError(
+            place,
+            f"its points reach from {low:.6g} s to {high:.6g} s, the run from {start:.6g} s to {end:.6g} s",
+            "add points, or shorten the run",
+        )
+    return made
 
 
 def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,24 +13,32 @@ from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.effects import LOADS
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.model.driving import checked_law, coordinate_of
+from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.laws import checked_law
 from pipeline.dynamics.model.mechanism import Mechanism
 from pipeline.dynamics.model.merge import find_frame
 from pipeline.dynamics.model.numbering import Numbering
 
-LOADS = "pipeline.dynamics.loads"
 #: what loads add to the ledger, before the turns that they count: work done, energy lost
 LEDGER = 2
 
 
+class Load(NamedTuple):
+    """A load by name, and the frame that it acts on, or the two between which it acts."""
+
+    name: str
+    frames: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Loaded:
-    """Tables of the loads, ordered by kind; `laws` are theirs, `turns` counts the angles that they follow."""
+    """Tables of the loads, kind after kind; `laws` are theirs, `turns` counts the angles that they follow."""
 
     kinds: tuple[str, ...]
-    names: tuple[str, ...]
+    loads: tuple[Load, ...]
     tables: dict[Any, Any]
     laws: list[Pieces] = field(default_factory=list)
     turns: int = 0
@@ -44,21 +52,19 @@ def gravity(scene: Scene) -> np.ndarray:
     return field
 
 
-def order(scene: Scene) -> list[str]:
-    """Names of the loads as the tables hold them: kind after kind."""
-    forces = scene.forces()
-    return sorted(forces, key=lambda name: (forces[name].type, list(forces).index(name)))
-
-
 def tabulate(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pieces]) -> Loaded:
-    """Check the loads of a system, give their frames sites, and fill their tables; `given`: as `numbers.tabulate`."""
-    scene, names = mechanism.scene, order(mechanism.scene)
-    kinds = tuple(sorted({load.type for load in scene.forces().values()}))
+    """Check the loads of a mechanism, give their frames sites, and fill their tables; `given`: as `model.tabulate`."""
+    scene, forces = mechanism.scene, mechanism.scene.forces()
+    names = sorted(forces, key=lambda name: forces[name].type)  # stable: within a kind as the scene has them
+    kinds = tuple(sorted({load.type for load in forces.values()}))
+    loads: list[Load] = []
     rows: list[tuple[int, ...]] = []
     numbers, laws, turns = list[list[float]](), list[Pieces](), 0
     for name in names:
-        row, coordinate = describe(scene, name)
-        a, b = _sites(mechanism, numbering, name, row)
+        row, coordinate = _describe(scene, name)
+        frames = row.frames if row.joint is None else tuple(scene.joint[row.joint].between)
+        loads.append(Load(name, frames))
+        a, b = _sites(mechanism, numbering, loads[-1])
         turn = -1
         if row.counts_turns:
             turn, turns = turns, turns + 1
@@ -69,17 +75,17 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pie
             laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
         rows.append((a, b, first, turn, int(row.follows), *_motion(coordinate)))
         numbers.append([*row.numbers, *[0.0] * (m.LOAD_NUMBERS.size - len(row.numbers))])
-    counts = [sum(scene.load[n].type == kind for n in names) for kind in kinds]
+    counts = [sum(forces[n].type == kind for n in names) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     tables = {
         m.LOADS: rows,
         m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
         m.LOAD_NUMBERS: numbers,
     }
-    return Loaded(kinds, tuple(names), tables, laws, turns)
+    return Loaded(kinds, tuple(loads), tables, laws, turns)
 
 
-def describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
+def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
     """What a load acts on and with; InputError for what cannot be."""
     load: Any = scene.load[name]
     place = f"[load.{name}]"
@@ -94,13 +100,13 @@ def describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
     return row, coordinate
 
 
-def _sites(mechanism: Mechanism, numbering: Numbering, name: str, row: Row) -> tuple[int, int]:
-    place = f"[load.{name}]"
-    frames = mechanism.scene.joint[row.joint].between if row.joint is not None else row.frames
-    found = [find_frame(mechanism.frames, frame, place) for frame in frames]
-    if len(found) == 2 and mechanism.link_of[found[0].body] == mechanism.link_of[found[1].body]:
+def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int, int]:
+    """Numbers of its sites a and b; a is -1 where the world holds against it."""
+    place, frames = f"[load.{load.name}]", load.frames
+    links = [mechanism.link_of[find_frame(mechanism.frames, frame, place).body] for frame in frames]
+    if len(links) == 2 and links[0] == links[1]:
         raise InputError(place, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
-    if len(found) == 1 and mechanism.link_of[found[0].body] == 0:
+    if links == [0]:
         raise InputError(place, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
     sites = [numbering.site(mechanism.site(frame)) for frame in frames]
     return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])

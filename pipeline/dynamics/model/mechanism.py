@@ -1,9 +1,11 @@
-"""The merged mechanism as Python objects: what `layout` turns into tables."""
+"""A scene as a mechanism: links in the order of a spanning tree, closures, contacts; before anything is numbered."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -11,12 +13,13 @@ import xarray as xr
 from pipeline.core.errors import InputError
 from pipeline.core.scene.clearance import Clearance
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.chain import Stage, stages
+from pipeline.dynamics.model.chain import InboardJoint, chain
 from pipeline.dynamics.model.driving import prescribed
 from pipeline.dynamics.model.merge import (
     Frame,
     Group,
     Placement,
+    RigidInertia,
     find_frame,
     frames_of,
     merge,
@@ -38,58 +41,115 @@ class Site:
     frame: str | None
 
 
+class Closure(NamedTuple):
+    """A joint that closes a loop of the tree, between sites at its first and second frame."""
+
+    edge: Edge
+    a: Site
+    b: Site
+
+
+class Contact(NamedTuple):
+    """A clearance joint: its name and part of the scene, the site of the socket or journal, and of the ball or pin."""
+
+    name: str
+    joint: Clearance
+    outer: Site
+    inner: Site
+
+
 @dataclass(frozen=True)
 class Link:
     """One link of the tree, in its own frame.
 
     A rigid link's frame is its inboard joint frame; a flexible one's is its body frame.
     places: frame of each of its bodies; none for a massless link within a joint (see `chain`).
-    start: pose in the world.  stage: its part of the joint; None for a body that nothing holds.
+    start: pose in the world, from the kernels' origin.  inboard: where its joint sits on the parent; None for the
+    ground.  inertia: of a rigid link, in its frame.  bundle: of a flexible one.
     """
 
     branch: Branch
     group: Group
     places: dict[str, Placement]
     start: Placement
-    inertia: tuple[float, np.ndarray, np.ndarray] | None
-    kind: str
+    joint: InboardJoint
     inboard: Site | None
-    stage: Stage | None = None
+    inertia: RigidInertia | None = None
+    bundle: xr.Dataset | None = None
+
+    @property
+    def kind(self) -> str:
+        """Type of its inboard joint."""
+        return self.joint.kind
 
     @property
     def drives(self) -> tuple[str, ...]:
         """Names of its prescribed coordinates: none, or all that it has."""
-        return () if self.stage is None else self.stage.drives
+        return self.joint.drives
 
     @property
     def flexible(self) -> str | None:
         """Name of the flexible body that this link is, or None."""
         return self.group.host if self.group.flexible else None
 
+    @cached_property
+    def mass(self) -> float:
+        """Mass [kg]; 0 for the ground and for massless links within a joint."""
+        if self.bundle is not None:
+            return float(self.bundle["mass"])
+        return 0.0 if self.inertia is None else self.inertia.mass
+
+    @property
+    def massless(self) -> bool:
+        """Whether it only stands between two freedoms of a joint, or is the ground."""
+        return self.inertia is None and self.bundle is None
+
+    @property
+    def on_path(self) -> bool:
+        """Whether a prescribed pose in the world takes the place of its joint."""
+        return self.branch.edge is not None and self.branch.edge.kind == PATH
+
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Links in tree order, closures, contacts and drives of a scene; lengths in the world's axes.
+    """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
     origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
     start_residual: largest residual of a joint in the poses that the scene gives [m, or the sine of an angle].
     """
 
     scene: Scene
-    bundles: Mapping[str, xr.Dataset]
     frames: dict[str, Frame]
     links: list[Link]
     link_of: dict[str, int]
-    closures: list[tuple[Edge, Site, Site]]
-    contacts: list[tuple[str, Clearance, Site, Site]]
+    closures: list[Closure]
+    contacts: list[Contact]
     origin: np.ndarray
     length: float
     start_residual: float = 0.0
 
+    @cached_property
+    def drives(self) -> tuple[str, ...]:
+        """Names of the prescribed coordinates, in the order of the scene."""
+        return tuple(one.name for one in prescribed(self.scene))
+
+    @cached_property
+    def drive_signs(self) -> np.ndarray:
+        """What a drive's coordinate in the tree is times the scene's: -1 where the tree meets its joint from the far
+        side, otherwise 1; shape (drives,).
+        """
+        signs = {name: link.joint.sign for link in self.links for name in link.drives}
+        return np.array([signs[name] for name in self.drives])
+
     @property
-    def drives(self) -> list[str]:
-        """Names of the prescribed coordinates, in their order."""
-        return [one.name for one in prescribed(self.scene)]
+    def has_paths(self) -> bool:
+        """Whether the pose of some frame in the world is prescribed."""
+        return any(link.on_path for link in self.links)
+
+    @property
+    def all_rigid(self) -> bool:
+        """Whether no body is flexible."""
+        return not any(link.flexible for link in self.links)
 
     def site(self, frame: str) -> Site:
         """The site at a named frame."""
@@ -104,7 +164,10 @@ def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, 
 
 
 def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
-    """The system that a scene describes; InputError for what cannot be built."""
+    """The mechanism that a scene describes; InputError for what cannot be built.
+
+    bundles: reduced flexible bodies by name.
+    """
     require_bodies(scene)
     frames = frames_of(scene, bundles)
     groups, group_of = merge(scene, frames)
@@ -117,20 +180,20 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
     for branch in branches:
         group, start = groups[branch.group], Placement(starts[branch.group].p - origin, starts[branch.group].R)
         placed = replace(branch, parent=carried[branch.parent] if branch.parent >= 0 else -1)
+        body = _Body(scene, group, start, bundles[group.host] if group.flexible else None)
         if branch.edge is None:
-            links.append(_unjoined(scene, group, placed, start))
+            links.append(_unjoined(body, placed))
         else:
-            links += _joined(scene, group, placed, start, frames, links, link_of, origin)
+            links += _joined(body, placed, frames, links, link_of, origin)
         carried.append(len(links) - 1)
         link_of.update(dict.fromkeys(group.places, len(links) - 1))
 
     def at(frame: str) -> Site:
         return _site(frames, links, link_of, frame)
 
-    closures = [(e, at(e.frame_a), at(e.frame_b)) for e in closing]
-    contacts = [(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
-    length = _length(scene, links, frames)
-    return Mechanism(scene, bundles, frames, links, link_of, closures, contacts, origin, length)
+    closures = [Closure(e, at(e.frame_a), at(e.frame_b)) for e in closing]
+    contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
+    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, _length(scene, links, frames))
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:
@@ -139,72 +202,63 @@ def _centre(starts: list[Placement]) -> np.ndarray:
     return np.mean(moving, axis=0) if moving else np.zeros(3)
 
 
-def _unjoined(scene: Scene, group: Group, branch: Branch, start: Placement) -> Link:
-    """The ground, or a body that nothing holds."""
+@dataclass(frozen=True)
+class _Body:
+    """A group of bodies that becomes a link: where its host frame starts, and its bundle if it is flexible."""
+
+    scene: Scene
+    group: Group
+    start: Placement
+    bundle: xr.Dataset | None
+
+    def link(self, branch: Branch, own: Placement, inboard: Site, joint: InboardJoint) -> Link:
+        """The link, its bodies in its frame, which is `own` in the host's unless it is flexible."""
+        if self.bundle is not None:
+            places = dict(self.group.places)
+            return Link(branch, self.group, places, self.start, joint, inboard, bundle=self.bundle)
+        inertia, outward = rigid_inertia(self.scene, self.group, own), own.inverse()
+        places = {n: outward.of(p) for n, p in self.group.places.items()}
+        return Link(branch, self.group, places, self.start.of(own), joint, inboard, inertia)
+
+
+def _unjoined(body: _Body, branch: Branch) -> Link:
+    """The ground, or a body that nothing holds; its frame is at its centre of mass, so that turning and moving part."""
     if branch.parent < 0:
-        places = {n: start.of(p) for n, p in group.places.items()}
-        return Link(branch, group, places, Placement(), None, "fixed", None)
-    return _carrier(scene, group, branch, start, _centre_frame(scene, group), Site(0, Placement(), None), "free", None)
+        places = {n: body.start.of(p) for n, p in body.group.places.items()}
+        return Link(branch, body.group, places, Placement(), InboardJoint("fixed"), None)
+    rigid = body.bundle is None
+    own = Placement(rigid_inertia(body.scene, body.group, Placement()).com) if rigid else Placement()
+    return body.link(branch, own, Site(0, Placement(), None), InboardJoint("free"))
 
 
 def _joined(
-    scene: Scene,
-    group: Group,
+    body: _Body,
     branch: Branch,
-    start: Placement,
     frames: Mapping[str, Frame],
     links: list[Link],
     link_of: Mapping[str, int],
     origin: np.ndarray,
 ) -> list[Link]:
     """The link of a group, preceded by the massless ones of a joint that is a chain."""
-    edge = branch.edge
+    edge, far = branch.edge, branch.frame
     assert edge is not None
-    near, far = (edge.frame_b, edge.frame_a) if branch.reverse else (edge.frame_a, edge.frame_b)
-    inboard = Site(0, Placement(-origin), None) if edge.kind == PATH else _site(frames, links, link_of, near)
-    parts = stages(edge, branch.reverse, inboard.frame is not None, group.flexible)
+    assert far is not None
+    path = edge.kind == PATH
+    inboard = Site(0, Placement(-origin), None) if path else _site(frames, links, link_of, str(branch.parent_frame))
+    joints = chain(edge, branch.reverse, inboard.frame is not None, body.group.flexible)
     here = links[inboard.link].start.of(inboard.place)
-    axes, made = np.eye(3), list[Link]()
-    for k, part in enumerate(parts):
-        turned = Placement(R=axes.T @ part.axes)
+    axes, between = np.eye(3), list[Link]()
+    for joint in joints:
+        turned = Placement(R=axes.T @ joint.axes)
         site = Site(inboard.link, inboard.place.of(turned), inboard.frame)
-        if k == len(parts) - 1:
-            own = group.places[frames[far].body].of(frames[far].place).of(Placement(R=part.axes))
-            last = replace(branch, parent=site.link)
-            return [*made, _carrier(scene, group, last, start, own, site, part.kind, part)]
-        axes = part.axes
+        placed, axes = replace(branch, parent=site.link), joint.axes
+        if joint is joints[-1]:
+            break
         pose = here.of(Placement(R=axes))
-        between = replace(branch, parent=site.link)
-        made.append(Link(between, Group("", {}, False), {}, pose, None, part.kind, site, part))
-        inboard = Site(len(links) + k, Placement(), None)
-    raise AssertionError("a joint has at least one stage")
-
-
-def _carrier(
-    scene: Scene,
-    group: Group,
-    branch: Branch,
-    start: Placement,
-    own: Placement,
-    inboard: Site,
-    kind: str,
-    stage: Stage | None,
-) -> Link:
-    """Choose the link's frame, `own` in the group's host unless it is flexible, and express its bodies in it."""
-    if group.flexible:
-        return Link(branch, group, dict(group.places), start, None, kind, inboard, stage)
-    inertia = rigid_inertia(scene, group, own)
-    outward = own.inverse()
-    places = {n: outward.of(p) for n, p in group.places.items()}
-    return Link(branch, group, places, start.of(own), inertia, kind, inboard, stage)
-
-
-def _centre_frame(scene: Scene, group: Group) -> Placement:
-    """Frame of a free group: at its centre of mass, so that rotation and translation part."""
-    if group.flexible:
-        return Placement()
-    _, com, _ = rigid_inertia(scene, group, Placement())
-    return Placement(com, np.eye(3))
+        between.append(Link(placed, Group("", {}, False), {}, pose, joint, site))
+        inboard = Site(len(links) + len(between) - 1, Placement(), None)
+    own = body.group.places[frames[far].body].of(frames[far].place).of(Placement(R=axes))
+    return [*between, body.link(placed, own, site, joint)]
 
 
 def _length(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
@@ -214,7 +268,7 @@ def _length(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> flo
         for name, place in link.places.items():
             points += [link.start.of(place.of(f.place)).p for f in frames.values() if f.body == name]
             if link.inertia is not None:
-                points.append(link.start.of(Placement(link.inertia[1])).p)
+                points.append(link.start.of(Placement(link.inertia.com)).p)
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -50,20 +51,28 @@ class Group:
     flexible: bool
 
 
+class RigidInertia(NamedTuple):
+    """Mass [kg], centre of mass [m], shape (3,), and inertia about it [kg m^2], shape (3, 3), in one frame."""
+
+    mass: float
+    com: np.ndarray
+    moments: np.ndarray
+
+
 def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Frame]:
     """Every named frame of the scene by ``body.FRAME``."""
-    found: dict[str, Frame] = {}
+    frames: dict[str, Frame] = {}
     for name, body in scene.body.items():
         if isinstance(body, FlexibleBody):
             bundle = bundles[name]
             for k, frame in enumerate(bundle["frame"].values):
                 place = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
-                found[f"{name}.{frame}"] = Frame(name, place)
+                frames[f"{name}.{frame}"] = Frame(name, place)
         else:
             for frame, pose in body.frames.items():
                 R = quaternion_to_matrix(pose.as_quaternion())
-                found[f"{name}.{frame}"] = Frame(name, Placement(np.array(pose.position), R))
-    return found
+                frames[f"{name}.{frame}"] = Frame(name, Placement(np.array(pose.position), R))
+    return frames
 
 
 def find_frame(frames: Mapping[str, Frame], name: str, place: str) -> Frame:
@@ -142,8 +151,8 @@ def _flexible(scene: Scene, body: str) -> bool:
     return isinstance(scene.body[body], FlexibleBody)
 
 
-def rigid_inertia(scene: Scene, group: Group, link: Placement) -> tuple[float, np.ndarray, np.ndarray]:
-    """Mass, centre of mass and inertia about it of a group, in the frame `link` (given in the host's)."""
+def rigid_inertia(scene: Scene, group: Group, link: Placement) -> RigidInertia:
+    """Of a group of rigid bodies, in the frame `link` (given in the host's)."""
     inward = link.inverse()
     mass, first = 0.0, np.zeros(3)
     parts = []
@@ -161,7 +170,7 @@ def rigid_inertia(scene: Scene, group: Group, link: Placement) -> tuple[float, n
     for m, c, J in parts:
         d = c - com
         inertia += J + m * (d @ d * np.eye(3) - np.outer(d, d))
-    return mass, com, inertia
+    return RigidInertia(mass, com, inertia)
 
 
 def start_places(

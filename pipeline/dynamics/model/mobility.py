@@ -2,7 +2,8 @@
 
 All of it follows from the directions in which the joints leave the links free: the closures'
 Jacobian in any basis of them.  Whether a loss of rank belongs to the mechanism (a planar loop in
-space) or to the pose alone is seen from poses nearby.
+space) or to the pose alone is seen from poses nearby.  Motions that no mass resists are refused here too: a rod without
+inertia about its axis that is free to spin, a point on a ball joint.
 """
 
 from __future__ import annotations
@@ -11,17 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model import weightless
-from pipeline.dynamics.model.assembly import close, settled
-from pipeline.dynamics.model.constraints import constraints
+from pipeline.dynamics.model.assembly import LEAST_GYRATION, close, constraints, settled
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, sites
-from pipeline.dynamics.model.tree import PATH
 
 #: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
 #: how many are enough; share of the displacement that such a pose must keep when its loops are closed
@@ -32,6 +31,10 @@ CARRIES = 1e-6
 INFINITE = 1e15
 #: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
 SLIGHT = 1e-3
+#: a motion has no mass when it has this share of what it would have if every body resisted turning about all axes alike
+WEIGHTLESS = 1e-14
+#: share of the largest by which a link takes part in such a motion
+TAKES_PART = 1e-3
 
 
 @dataclass(frozen=True)
@@ -70,18 +73,18 @@ def analyse(model: Model) -> Mobility:
     Raises InputError for a mechanism that cannot move at all, drives that contradict each other and motions that no
     mass resists.
     """
-    poses, singular = [link.start for link in model.mechanism.links], ""
+    poses, singular = [link.start for link in model.links], ""
     here = rates(model, poses)
     regular = _regular_poses(model, here) if here.rank < len(here.J) else None
     if regular is not None:
         poses, singular = regular, _singular_start(model, here)
         here = rates(model, poses)
-    found = Mobility(model.numbering.nv, len(here.J), here.rank, _undetermined(model, here, poses), singular)
-    _refuse_locked(model, found, here)
+    mobility = Mobility(model.nv, len(here.J), here.rank, _undetermined(model, here, poses), singular)
+    _refuse_locked(model, mobility, here)
     _refuse_contradiction(model, here)
-    if here.rank < model.numbering.nv:
-        weightless.refuse(model, poses, motions(model, poses).twists, here.free)
-    return found
+    if here.rank < model.nv and model.mechanism.all_rigid:
+        _refuse_weightless(model, poses, motions(model, poses).twists, here.free)
+    return mobility
 
 
 def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
@@ -90,11 +93,9 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     Of a redundant mechanism all poses nearby have the rank of the start.  From a singular pose a random way need not
     lead onto a branch of the motion: it may not close, or close back to where it began, which tells nothing.
     """
-    flexible = any(link.flexible for link in model.mechanism.links)
-    paths = any(link.branch.edge is not None and link.branch.edge.kind == PATH for link in model.mechanism.links)
-    if here.rank == model.numbering.nv or flexible or paths:
+    if here.rank == model.nv or model.mechanism.has_paths or not model.mechanism.all_rigid:
         return None
-    joints, start = constraints(model.mechanism), [link.start for link in model.mechanism.links]
+    joints, start = constraints(model.mechanism), [link.start for link in model.links]
     random = np.random.default_rng(0)
     left, stayed, told = [(here.rank, start)], [(here.rank, start)], 0
     for k in range(TRIES):
@@ -105,12 +106,12 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         if closed is None:
             continue
         there = [link.start for link in settled(model.mechanism, closed).links]
-        away = _distance(start, there, model.mechanism.length) > LEFT * NEARBY[k % 2]
+        away = _distance(start, there, model.length) > LEFT * NEARBY[k % 2]
         (left if away else stayed).append((rates(model, there).rank, there))
         told += away
         if told == ENOUGH:
             break
-    rank, poses = max(left if told else stayed, key=lambda found: found[0])
+    rank, poses = max(left if told else stayed, key=lambda pose: pose[0])
     return poses if rank > here.rank else None
 
 
@@ -122,7 +123,7 @@ def _distance(one: Sequence[Placement], other: Sequence[Placement], length: floa
 
 def _singular_start(model: Model, here: Rates) -> str:
     """What is said of a start in a singular pose."""
-    names = {model.mechanism.closures[k][0].name: None for k in model.closure_order}
+    names = {closure.edge.name: None for closure in model.closures}
     values = here.values
     ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
     return (
@@ -147,14 +148,14 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     """Joints that carry part of a self-stress: reactions in balance with each other, without any load."""
     if here.rank == len(here.J):
         return frozenset()
-    mechanism, L = model.mechanism, model.mechanism.length
+    mechanism, L = model.mechanism, model.length
     stresses = here.stresses / np.max(np.abs(here.stresses), axis=1, keepdims=True)
     carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
-    found, row = set(), 0
-    for k in model.closure_order:
-        edge, a, b = mechanism.closures[k]
-        along, about, force = row_axes(model, poses, k)
-        point = sites(model, poses, k)[1].p
+    joints, row = set[str](), 0
+    for closure in model.closures:
+        edge, a, b = closure
+        along, about, force = row_axes(closure, poses)
+        point = sites(closure, poses)[1].p
         wrenches = np.where(
             force[:, None], np.hstack([np.cross(point, along) / L, along]), np.hstack([about, 0 * along])
         )
@@ -163,18 +164,18 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
         carried[a.link] -= wrench
         carried[b.link] += wrench
         if np.max(np.abs(share), initial=0.0) > CARRIES:
-            found.add(edge.name)
+            joints.add(edge.name)
         row += len(wrenches)
     for i in range(len(mechanism.links) - 1, 0, -1):
         branch = mechanism.links[i].branch
         carried[branch.parent] += carried[i]
         if branch.edge is not None and np.max(np.abs(carried[i])) > CARRIES:
-            found.add(branch.edge.name)
-    return frozenset(found)
+            joints.add(branch.edge.name)
+    return frozenset(joints)
 
 
-def _refuse_locked(model: Model, found: Mobility, here: Rates) -> None:
-    if found.mobility > 0 or model.numbering.known > 0:
+def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
+    if mobility.mobility > 0 or model.drives:
         return
     least = float(np.min(here.values[: here.rank], initial=1.0))
     hardly = (
@@ -184,7 +185,7 @@ def _refuse_locked(model: Model, found: Mobility, here: Rates) -> None:
     )
     raise InputError(
         "[joint]",
-        f"the mechanism is locked: {found.coordinates} free coordinates of its tree against {found.rank} "
+        f"the mechanism is locked: {mobility.coordinates} free coordinates of its tree against {mobility.rank} "
         f"independent closure rows leave it no motion{hardly}",
         "write frames and poses with more digits, or let one of the joints give way"
         if hardly
@@ -194,21 +195,69 @@ def _refuse_locked(model: Model, found: Mobility, here: Rates) -> None:
 
 def _refuse_contradiction(model: Model, here: Rates) -> None:
     """Drives that the loops tie to each other can follow their laws only if these happen to agree."""
-    drives = [name for name, tied in zip(model.mechanism.drives, here.tied, strict=True) if tied]
+    drives = [name for name, tied in zip(model.drives, here.tied, strict=True) if tied]
     moving = [name for name in drives if _moves(model, name)]
     if not moving:
         return
     raise InputError(
         f"[drive.{moving[0].partition('.')[0]}]",
         f"the mechanism is over-driven: its loops tie the coordinates of {', '.join(drives)} to each other ("
-        f"{model.numbering.nv} free coordinates, {here.rank} independent closure rows, {model.numbering.known} drives)",
+        f"{model.nv} free coordinates, {here.rank} independent closure rows, {len(model.drives)} drives)",
         "remove a drive, or a joint",
     )
 
 
 def _moves(model: Model, name: str) -> bool:
-    first, count = model.arrays.table(m.LAWS)[model.mechanism.drives.index(name)]
+    first, count = model.arrays.table(m.LAWS)[model.drives.index(name)]
     pieces = slice(first, first + count)
     values = model.arrays.table(m.PIECES)["coefficients"][pieces]
     harmonics = model.arrays.table(m.PIECE_HARMONICS)["n_harmonics"][pieces]
     return bool(np.any(values[:, 1:] != 0.0) or np.ptp(values[:, 0]) > 0.0 or np.any(harmonics > 0))
+
+
+def _refuse_weightless(model: Model, poses: Sequence[Placement], twists: np.ndarray, free: np.ndarray) -> None:
+    """InputError when rigid bodies can move without any of their masses moving.
+
+    twists: unit motions of every column of the numbering, (columns, 6); free: those of them that open no closure,
+    (nv, mobility).  Flexible bodies are left to the engine, whose mass matrix knows their modes.
+    """
+    links, nv, L = model.links, model.nv, model.length
+    moved = np.zeros((len(links), 6, nv))
+    own, even = np.zeros((nv, nv)), np.zeros((nv, nv))
+    for i, link in enumerate(links[1:], start=1):
+        for coordinate, column in model.numbering.joint_route(i):
+            if coordinate < nv:
+                moved[i, :, coordinate] = twists[column] / ([1.0] * 3 + [L] * 3)
+        if link.inertia is not None:
+            mass, com, inertia = link.inertia
+            turning, R = moved[i, :3], poses[i].R
+            moving = moved[i, 3:] + np.cross(turning, poses[i].of(Placement(com)).p / L, axis=0)
+            most = np.linalg.eigvalsh(inertia)[-1] / L**2 + mass * LEAST_GYRATION**2
+            own += mass * moving.T @ moving + turning.T @ (R @ inertia @ R.T / L**2) @ turning
+            even += mass * moving.T @ moving + most * turning.T @ turning
+    motion = _without_mass(free.T @ own @ free, free.T @ even @ free)
+    if motion is not None:
+        _refuse_motion(model, moved @ (free @ motion))
+
+
+def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
+    """A motion for which a mass matrix has nothing of what another one has, or None."""
+    sizes = np.sqrt(even.diagonal())
+    scaled = even / np.outer(sizes, sizes) if sizes.all() else np.zeros_like(even)
+    if not np.linalg.eigvalsh(scaled)[0] > WEIGHTLESS:
+        return None  # of links within a joint, which have no mass, in a singular pose: the engine says so
+    values, vectors = scipy.linalg.eigh(own / np.outer(sizes, sizes), scaled)
+    return vectors[:, 0] / sizes if values[0] <= WEIGHTLESS else None
+
+
+def _refuse_motion(model: Model, twists: np.ndarray) -> None:
+    """InputError for a motion without mass; twists: of every link in it, (links, 6)."""
+    sizes = np.abs(twists).max(axis=1)
+    links = [link for link, size in zip(model.links, sizes, strict=True) if size > TAKES_PART * sizes.max()]
+    names = sorted({name for link in links for name in link.places})
+    raise InputError(
+        f"[body.{names[0]}.inertia]",
+        f"nothing resists a motion of {', '.join(names)}: about some axis about which the joints let it turn "
+        "it has no inertia, so that its acceleration is not determined",
+        "give it an inertia about every axis, or a joint that stops this motion",
+    )

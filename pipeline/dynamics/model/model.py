@@ -1,10 +1,9 @@
-"""The tables of a system: all its wiring and numbers."""
+"""A mechanism ready to be evaluated: numbered, with all its wiring and numbers in tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,103 +12,131 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.effects import Parts
-from pipeline.dynamics.model import contacts as contact_numbers
-from pipeline.dynamics.model import flexible_bodies as flexible
-from pipeline.dynamics.model import laws as lawful
+from pipeline.dynamics.model import contacts as contacting
+from pipeline.dynamics.model import flexible_bodies, laws, wiring
 from pipeline.dynamics.model import loads as loading
-from pipeline.dynamics.model import wiring
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.driving import drive_laws, joint_class
-from pipeline.dynamics.model.mechanism import Link, Mechanism
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.loads import Load
+from pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.numbering import Numbering, number
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
 
-NONE: Mapping[str, Pieces] = MappingProxyType({})
-
 
 @dataclass(frozen=True)
 class Model:
-    """A system ready to be evaluated. `closure_order`: row of the closure table -> closure of the system.
+    """A mechanism ready to be evaluated, and what is asked of it again and again.
 
-    laws: the normal law of every contact.
+    links: parents first; link 0 is the ground.  closures, loads: as their tables have them.
+    laws: the normal law of every contact.  drives: names of the prescribed coordinates; drive_signs: see `Mechanism`.
+    gravity: acceleration [m/s^2], shape (3,).  length: size of the mechanism [m].
+    nq, nv, ny: number of free positions, free coordinates and state variables.
     """
 
     mechanism: Mechanism
     numbering: Numbering
     parts: Parts
     arrays: Arrays
-    closure_order: np.ndarray
+    scene: Scene
+    links: list[Link]
+    closures: tuple[Closure, ...]
+    contacts: list[Contact]
     laws: tuple[Resolved, ...]
+    loads: tuple[Load, ...]
+    drives: tuple[str, ...]
+    drive_signs: np.ndarray
+    gravity: np.ndarray
+    length: float
+    nq: int
+    nv: int
+    ny: int
 
     @property
-    def scene(self) -> Scene:
-        """The scene that the mechanism was built from."""
-        return self.mechanism.scene
+    def speeds(self) -> slice:
+        """Speeds of the free coordinates in the state; the positions stand before, the ledger after them."""
+        return slice(self.nq, self.nq + self.nv)
 
     @property
     def speed_scales(self) -> np.ndarray:
         """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
-        nq, nv = self.numbering.nq, self.numbering.nv
-        groups = self.arrays.table(m.GROUPS)["group"][nq : nq + nv]
+        groups = self.arrays.table(m.GROUPS)["group"][self.speeds]
         return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][groups])
 
 
-def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:
-    """Place a system's links so that its joints fit, number it and fill its tables.
+def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
+    """Place a mechanism's links so that its joints fit, number it and fill its tables.
 
     given: laws of prescribed coordinates, and of loads along joints as ``load.NAME``, that replace the scene's.
+    Raises InputError for what cannot be built.
     """
     mechanism = assembled(mechanism, given)
     numbering = number(mechanism)
-    normals = contact_numbers.resolve(mechanism)
+    normals = contacting.resolve(mechanism)
     site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
-    touching = [(numbering.site(a), numbering.site(b)) for _, _, a, b in mechanism.contacts]
+    touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
     closures, order = wiring.closures(numbering, site_pairs)
     loaded = loading.tabulate(mechanism, numbering, given)
-    laws = drive_laws(mechanism.scene, given)
-    signs = {name: link.stage.sign for link in mechanism.links if link.stage for name in link.drives}
-    signed = [law.times(signs[name]) for name, law in zip(mechanism.drives, laws, strict=True)]
-    law_tables = lawful.fill([*signed, *loaded.laws])
-    turns, slot = loaded.turns, contact_numbers.ledger_size(mechanism)
-    loads = loading.LEDGER if mechanism.scene.forces() else 0
-    groups, floors = _error_groups(numbering, loads, turns)
-    sites = [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)]
-    parts = _parts(mechanism, normals, any(law.harmonic for law in [*laws, *loaded.laws]), loaded.kinds)
+    drive_laws = laws.drive_laws(mechanism.scene, given)
+    in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
+    contact_ledger = contacting.ledger_size(mechanism)
+    gravity = loading.gravity(mechanism.scene)
+    ledger = loading.LEDGER if mechanism.scene.forces() else 0
+    groups, floors = _error_groups(numbering, ledger, loaded.turns)
+    parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     arrays = pack(
         {
             m.NQ: numbering.nq,
-            m.N_LEDGER: slot + loads + turns,
+            m.N_LEDGER: contact_ledger + ledger + loaded.turns,
             m.N_DRIVES: numbering.known,
-            m.N_TURNS: turns,
-            m.LOAD_SLOT: slot,
-            m.MOST_MODES: max(numbering.modes.values(), default=0),
+            m.N_TURNS: loaded.turns,
+            m.LOAD_SLOT: contact_ledger,
+            m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
             m.LINKS: _links(numbering, parts),
             m.LINK_NUMBERS: [_link_numbers(link) for link in mechanism.links],
-            m.SITES: sites,
+            m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
             m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
-            **flexible.fill(numbering),
+            **flexible_bodies.fill(numbering),
             **wiring.mass_entries(numbering),
             **closures,
-            **contact_numbers.fill(numbering, parts, normals, touching),
-            **law_tables,
+            **contacting.fill(numbering, parts, normals, touching),
+            **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
-            m.GRAVITY: loading.gravity(mechanism.scene),
+            m.GRAVITY: gravity,
             m.GROUPS: groups,
             m.FLOORS: floors,
         },
         numbering.columns,
     )
-    return Model(mechanism, numbering, parts, arrays, order, normals)
+    return Model(
+        mechanism,
+        numbering,
+        parts,
+        arrays,
+        mechanism.scene,
+        mechanism.links,
+        tuple(mechanism.closures[k] for k in order),
+        mechanism.contacts,
+        normals,
+        loaded.loads,
+        mechanism.drives,
+        mechanism.drive_signs,
+        gravity,
+        mechanism.length,
+        numbering.nq,
+        numbering.nv,
+        len(groups),
+    )
 
 
 def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
-    contacts = [joint for _, joint, _, _ in mechanism.contacts]
+    """The kinds of parts that there are."""
+    contacts = [contact.joint for contact in mechanism.contacts]
     return Parts(
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
         surfaces=tuple(sorted({joint.type for joint in contacts})),
@@ -117,7 +144,7 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
         loads=loads,
         closures=bool(mechanism.closures),
-        flexible=any(link.flexible for link in mechanism.links),
+        flexible=not mechanism.all_rigid,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,
     )
@@ -128,21 +155,22 @@ def _pose_row(place: Placement) -> np.ndarray:
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
+    """Rows of the table LINKS."""
     rows: list[tuple[int, ...]] = []
-    flexible = sorted(numbering.modes)
     for i, link in enumerate(numbering.mechanism.links):
         joint = parts.joints.index(link.kind) if i else -1
-        flex = flexible.index(i) if i in numbering.modes else -1
-        inboard = numbering.port_of_inboard(i) if flex >= 0 else -1
+        flex = numbering.flexible.index(i) if link.flexible else -1
+        inboard = numbering.port_of_inboard(i) if link.flexible else -1
         port = numbering.port_of(i - 1) if i else -1
-        speeds = numbering.n_speeds(i)
-        rows.append((link.branch.parent, joint, numbering.q0[i], numbering.c0[i], speeds, flex, inboard, port))
+        q, c = numbering.positions[i], numbering.coordinates[i]
+        rows.append((link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port))
     return rows
 
 
 def _link_numbers(link: Link) -> np.ndarray:
+    """Row of the table LINK_NUMBERS; flexible links have their numbers elsewhere."""
     if link.inertia is None:
-        return np.zeros(10)
+        return np.zeros(m.LINK_NUMBERS.size)
     mass, com, J = link.inertia
     return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
@@ -154,39 +182,29 @@ def _error_groups(numbering: Numbering, loads: int, turns: int) -> tuple[np.ndar
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
     loads: number of the loads' energies; turns: number of angles after them.
     """
-    L = numbering.mechanism.length
-    groups: list[int] = []
-    floors: list[float] = []
-    nq = numbering.nq
-    q_group, v_group = np.zeros(nq, dtype=np.int64), np.zeros(numbering.nv, dtype=np.int64)
+    mechanism, floors = numbering.mechanism, list[float]()
+    L = mechanism.length
+    q_group, v_group = np.zeros(numbering.nq, dtype=np.int64), np.zeros(numbering.nv, dtype=np.int64)
 
-    def fill(target: np.ndarray, first: int, letters: str) -> None:
+    def fill(target: np.ndarray, places: range, letters: str) -> None:
         for k, letter in enumerate(letters):
             if k == 0 or letters[k - 1] != letter:
                 floors.append(L if letter == "t" else 1.0)
-            target[first + k] = len(floors) - 1
+            target[places[k]] = len(floors) - 1
 
-    for i, link in enumerate(numbering.mechanism.links[1:], start=1):
+    for i, link in enumerate(mechanism.links[1:], start=1):
         declared = joint_class(link.kind)
-        if numbering.driven(i) < 0:
-            fill(q_group, numbering.q0[i], declared.POSITIONS)
-            fill(v_group, numbering.c0[i], declared.SPEEDS)
-        if i in numbering.modes:
-            mass = float(numbering.mechanism.bundles[str(link.flexible)]["mass"])
-            for target, first in ((q_group, numbering.flex_q0[i]), (v_group, numbering.flex_c0[i])):
-                floors.append(L * mass**0.5)
-                target[first : first + numbering.modes[i]] = len(floors) - 1
+        if not link.drives:
+            fill(q_group, numbering.positions[i], declared.POSITIONS)
+            fill(v_group, numbering.coordinates[i], declared.SPEEDS)
+        if link.flexible:
+            for target, mine in ((q_group, numbering.modal_positions[i]), (v_group, numbering.modal_coordinates[i])):
+                floors.append(L * link.mass**0.5)
+                target[mine] = len(floors) - 1
     groups = [*q_group, *v_group]
-    energy = _mass(numbering.mechanism) * L**2
-    tail = [*contact_numbers.ledger_groups(numbering.mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * turns]
+    energy = sum(link.mass for link in mechanism.links) * L**2
+    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * turns]
     for floor, count in tail:
         floors.append(floor)
         groups += [len(floors) - 1] * count
     return np.array(groups, dtype=np.int64), np.array(floors)
-
-
-def _mass(mechanism: Mechanism) -> float:
-    rigid = sum(link.inertia[0] for link in mechanism.links if link.inertia is not None)
-    return rigid + sum(
-        float(mechanism.bundles[str(link.flexible)]["mass"]) for link in mechanism.links if link.flexible
-    )

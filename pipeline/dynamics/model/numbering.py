@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,26 +13,42 @@ from pipeline.dynamics.model.mechanism import Link, Mechanism, Site
 Route = list[tuple[int, int]]  #: (coordinate, column) pairs that move a site
 
 
+class Port(NamedTuple):
+    """A site on a flexible link: its number, the name of its frame, the first column that modes have there."""
+
+    site: int
+    frame: str
+    column: int
+
+
 @dataclass
 class Numbering:
-    """Numbering of a system. Coordinates: free ones 0..nv-1 in elimination order, then prescribed."""
+    """Numbering of a mechanism. Coordinates: free ones 0..nv-1 in elimination order, then prescribed ones.
+
+    positions, coordinates: of each link's joint; prescribed ones after all free ones.
+    modal_positions, modal_coordinates: modes of flexible links.  Site k - 1 is the inboard site of link k.
+    """
 
     mechanism: Mechanism
     nq: int = 0
     nv: int = 0
-    q0: list[int] = field(default_factory=list)
-    c0: list[int] = field(default_factory=list)
-    flex_q0: dict[int, int] = field(default_factory=dict)
-    flex_c0: dict[int, int] = field(default_factory=dict)
-    modes: dict[int, int] = field(default_factory=dict)
+    positions: list[range] = field(default_factory=list)
+    coordinates: list[range] = field(default_factory=list)
+    modal_positions: dict[int, range] = field(default_factory=dict)
+    modal_coordinates: dict[int, range] = field(default_factory=dict)
     sites: list[Site] = field(default_factory=list)
-    ports: list[tuple[int, str, int]] = field(default_factory=list)  #: site, frame, first column
+    ports: list[Port] = field(default_factory=list)
     columns: int = 0
 
     @property
     def known(self) -> int:
         """Number of prescribed coordinates."""
         return len(self.mechanism.drives)
+
+    @property
+    def flexible(self) -> list[int]:
+        """Links that are flexible, in their order in the tables."""
+        return list(self.modal_positions)
 
     def site(self, site: Site) -> int:
         """Number of a site; of one that is there already when the place is the same."""
@@ -45,77 +62,66 @@ class Numbering:
         """Number of a new site, with a port of its own where the link is flexible."""
         self.sites.append(site)
         if site.frame is not None:
-            self.ports.append((len(self.sites) - 1, site.frame, self.columns))
-            self.columns += self.modes[site.link]
+            self.ports.append(Port(len(self.sites) - 1, site.frame, self.columns))
+            self.columns += len(self.modal_positions[site.link])
         return len(self.sites) - 1
 
     def port_of(self, site: int) -> int:
         """Port of a site, or -1."""
-        return next((k for k, (s, _, _) in enumerate(self.ports) if s == site), -1)
+        return next((k for k, port in enumerate(self.ports) if port.site == site), -1)
 
     def port_of_inboard(self, link: int) -> int:
         """Port of a flexible link's own inboard frame: these follow those of the sites."""
-        return len(self.ports) + sorted(self.modes).index(link)
+        return len(self.ports) + self.flexible.index(link)
 
     def route(self, site: int) -> Route:
         """What moves a site, from itself to the ground."""
-        link = self.sites[site].link
-        port = self.port_of(site)
-        found: Route = []
-        if port >= 0:
-            first, c0 = self.ports[port][2], self.flex_c0[link]
-            found += [(c0 + j, first + j) for j in range(self.modes[link])]
-        return found + self.joint_route(link)
+        link, port = self.sites[site].link, self.port_of(site)
+        modes = self.modal_coordinates[link] if port >= 0 else ()
+        return [(c, self.ports[port].column + j) for j, c in enumerate(modes)] + self.joint_route(link)
 
     def joint_route(self, link: int) -> Route:
         """What moves a link's inboard joint: its own coordinates, then its parent's."""
         if link == 0:
             return []
-        own = range(self.c0[link], self.c0[link] + self.n_speeds(link))
-        return [(c, c) for c in own] + self.route(link - 1)
-
-    def n_speeds(self, link: int) -> int:
-        """Coordinates of a link's joint, prescribed ones included."""
-        return len(joint_class(self.mechanism.links[link].kind).SPEEDS) if link else 0
-
-    def driven(self, link: int) -> int:
-        """Number of the first prescribed coordinate of a link, or -1; it has all prescribed or none."""
-        drives = self.mechanism.links[link].drives
-        return self.mechanism.drives.index(drives[0]) if drives else -1
+        return [(c, c) for c in self.coordinates[link]] + self.route(link - 1)
 
 
 def number(mechanism: Mechanism) -> Numbering:
-    """The layout of a system. Site k - 1 is the inboard site of link k."""
+    """The numbering of a mechanism, with the inboard sites of its links."""
     numbering = Numbering(mechanism)
-    links = mechanism.links
-    numbering.q0, numbering.c0 = [0] * len(links), [0] * len(links)
-    for i, link in enumerate(links):
-        if link.flexible:
-            numbering.modes[i] = mechanism.bundles[link.flexible].sizes["mode"]
-    _number_positions(numbering, links)
-    _number_coordinates(numbering, links)
+    _number_positions(numbering, mechanism.links)
+    _number_coordinates(numbering, mechanism.links)
     numbering.columns = numbering.nv + numbering.known
-    for link in links[1:]:
+    for link in mechanism.links[1:]:
         assert link.inboard is not None
         numbering.add_site(link.inboard)
     return numbering
 
 
+def _drive(mechanism: Mechanism, link: Link) -> int:
+    """Number of the first drive of a link whose joint is prescribed."""
+    return mechanism.drives.index(link.drives[0])
+
+
 def _number_positions(numbering: Numbering, links: list[Link]) -> None:
+    numbering.positions = [range(0)] * len(links)
     for i, link in enumerate(links[1:], start=1):
-        if numbering.driven(i) < 0:
-            numbering.q0[i] = numbering.nq
-            numbering.nq += len(joint_class(link.kind).POSITIONS)
-        if i in numbering.modes:
-            numbering.flex_q0[i] = numbering.nq
-            numbering.nq += numbering.modes[i]
-    for i in range(1, len(links)):
-        if numbering.driven(i) >= 0:
-            numbering.q0[i] = numbering.nq + numbering.driven(i)
+        if not link.drives:
+            numbering.positions[i] = range(numbering.nq, numbering.nq + len(joint_class(link.kind).POSITIONS))
+            numbering.nq = numbering.positions[i].stop
+        if link.bundle is not None:
+            numbering.modal_positions[i] = range(numbering.nq, numbering.nq + link.bundle.sizes["mode"])
+            numbering.nq = numbering.modal_positions[i].stop
+    for i, link in enumerate(links):
+        if link.drives:
+            first = numbering.nq + _drive(numbering.mechanism, link)
+            numbering.positions[i] = range(first, first + len(joint_class(link.kind).POSITIONS))
 
 
 def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
     """Descendants before ancestors: then the factor of the mass matrix has no fill."""
+    numbering.coordinates = [range(0)] * len(links)
     children: dict[int, list[int]] = {}
     for i, link in enumerate(links[1:], start=1):
         children.setdefault(link.branch.parent, []).append(i)
@@ -123,14 +129,15 @@ def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
     def visit(i: int) -> None:
         for child in children.get(i, []):
             visit(child)
-        if i in numbering.modes:
-            numbering.flex_c0[i] = numbering.nv
-            numbering.nv += numbering.modes[i]
-        if i and numbering.driven(i) < 0:
-            numbering.c0[i] = numbering.nv
-            numbering.nv += numbering.n_speeds(i)
+        if i in numbering.modal_positions:
+            numbering.modal_coordinates[i] = range(numbering.nv, numbering.nv + len(numbering.modal_positions[i]))
+            numbering.nv = numbering.modal_coordinates[i].stop
+        if i and not links[i].drives:
+            numbering.coordinates[i] = range(numbering.nv, numbering.nv + len(joint_class(links[i].kind).SPEEDS))
+            numbering.nv = numbering.coordinates[i].stop
 
     visit(0)
-    for i in range(1, len(links)):
-        if numbering.driven(i) >= 0:
-            numbering.c0[i] = numbering.nv + numbering.driven(i)
+    for i, link in enumerate(links):
+        if link.drives:
+            first = numbering.nv + _drive(numbering.mechanism, link)
+            numbering.coordinates[i] = range(first, first + len(joint_class(link.kind).SPEEDS))

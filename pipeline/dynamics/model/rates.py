@@ -24,7 +24,8 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
+from pipeline.dynamics.model.assembly import demands, freedoms, outboard_place
+from pipeline.dynamics.model.mechanism import Closure
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.wiring import closure_route, uncommon
@@ -101,13 +102,13 @@ class Rates:
 
 def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     """How the closures of a mechanism open at these poses of its links."""
-    numbering, L = model.numbering, model.mechanism.length
-    motion, speeds = motions(model, poses), numbering.nv + numbering.known
+    numbering, L = model.numbering, model.length
+    motion, speeds = motions(model, poses), model.nv + len(model.drives)
     J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
     first = 0
-    for line, k in zip(model.arrays.table(m.CLOSURES), model.closure_order, strict=True):
-        B = sites(model, poses, k)[1]
-        along, about, force = row_axes(model, poses, k)
+    for line, closure in zip(model.arrays.table(m.CLOSURES), model.closures, strict=True):
+        B = sites(closure, poses)[1]
+        along, about, force = row_axes(closure, poses)
         route = uncommon(closure_route(numbering, int(line["site_a"]), int(line["site_b"])))
         mine = slice(first, first + len(force))
         for coordinate, column, sign in route:
@@ -120,18 +121,18 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
         first += len(force)
     by_row, by_column = scales(sizes)
     J *= by_row[:, None] * by_column
-    return Rates(J[:, : numbering.nv], J[:, numbering.nv :], by_row, by_column)
+    return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
 
 
-def sites(model: Model, poses: Sequence[Placement], k: int) -> tuple[Placement, Placement]:
+def sites(closure: Closure, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
     """Both frames of a closure."""
-    _, a, b = model.mechanism.closures[k]
+    _, a, b = closure
     return poses[a.link].of(a.place), poses[b.link].of(b.place)
 
 
-def row_axes(model: Model, poses: Sequence[Placement], k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def row_axes(closure: Closure, poses: Sequence[Placement]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Directions along which the rows of a closure forbid displacement, about which turns; and which do the former."""
-    _, wrenches = demands(model.mechanism.closures[k][0].kind, *sites(model, poses, k))
+    _, wrenches = demands(closure.edge.kind, *sites(closure, poses))
     force = np.any(wrenches[:, 3:] != 0.0, axis=1)
     return wrenches[:, 3:], wrenches[:, :3], force
 
@@ -145,22 +146,20 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
             continue
         F, G = poses[link.inboard.link].of(link.inboard.place), poses[i].of(outboard_place(mechanism, link))
         turns, slides = freedoms(link.kind, F, G)
-        first, middle = numbering.c0[i], numbering.c0[i] + len(turns)
+        first = numbering.coordinates[i].start
+        middle = first + len(turns)
         turn[first:middle], shift[middle : middle + len(slides)] = turns, mechanism.length * slides
         at[first : middle + len(slides)] = G.p
     for site, frame, first in numbering.ports:
         on = numbering.sites[site].link
-        mine = slice(first, first + numbering.modes[on])
+        mine = slice(first, first + len(numbering.modal_positions[on]))
         turn[mine], shift[mine], at[mine] = _shape_motions(model, on, frame, poses[on])
     return Motions(turn, shift, at)
 
 
 def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Turn and displacement of a frame of a flexible link per mode, relative to its inboard frame, undeformed."""
-    mechanism = model.mechanism
-    branch, bundle = mechanism.links[link].branch, mechanism.bundles[str(mechanism.links[link].flexible)]
-    own = None if branch.edge is None else (branch.edge.frame_a if branch.reverse else branch.edge.frame_b)
-    unit = mechanism.length * float(bundle["mass"]) ** 0.5
+    own, unit = model.links[link].branch.frame, model.length * model.links[link].mass ** 0.5
     turn, shift, at = _frame_motions(model, link, frame, pose)
     if own is not None:
         held, moved_by, place = _frame_motions(model, link, own, pose)
@@ -169,7 +168,8 @@ def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
 
 
 def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    bundle = model.mechanism.bundles[str(model.mechanism.links[link].flexible)]
+    bundle = model.links[link].bundle
+    assert bundle is not None
     k = list(bundle["frame"].values).index(frame.partition(".")[2])
     turn = (pose.R @ bundle["frame_rotation_shape"].values[k]).T
     shift = (pose.R @ bundle["frame_translation_shape"].values[k]).T

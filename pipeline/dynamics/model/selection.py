@@ -66,9 +66,9 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
     """
     from scipy.linalg import solve_triangular
 
-    arrays, found = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
+    arrays, lengths = model.arrays, np.zeros(model.arrays.size(m.N_CLOSURE_ROWS))
     if not np.all(factor.diagonal() > 0.0):
-        return found
+        return lengths
     kinds, entries = arrays.table(m.CLOSURE_ROWS)["kind"], arrays.table(m.ENTRIES)
     support = arrays.table(m.SUPPORT)["coordinate"]
     inverse = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
@@ -77,12 +77,12 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
         mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
         turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
         angle = np.linalg.norm(turn, axis=1)
-        way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.mechanism.length * angle
+        way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.length * angle
         share = mobility[support[c["support0"] + mine["slot"]]]
         rows = slice(c["row0"], c["row0"] + c["n_rows"])
         along, about = (np.sqrt(np.sum(size**2 * share)) for size in (way, angle))
-        found[rows] = np.where(kinds[rows] == 0, along, about)
-    return found
+        lengths[rows] = np.where(kinds[rows] == 0, along, about)
+    return lengths
 
 
 def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
@@ -113,7 +113,7 @@ def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).
     """
     support = model.arrays.table(m.SUPPORT)["coordinate"]
-    full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.numbering.nv))
+    full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.nv))
     for c in model.arrays.table(m.CLOSURES, h):
         count, slots = int(c["n_kept"]), int(c["n_support"])
         columns = support[c["support0"] : c["support0"] + slots]
@@ -131,6 +131,5 @@ def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
 
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
     """Name of the joint to which each kept row belongs."""
-    names = [model.mechanism.closures[k][0].name for k in model.closure_order]
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
-    return [name for name, count in zip(names, counts, strict=True) for _ in range(count)]
+    return [closure.edge.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

@@ -22,22 +22,20 @@ def mass_entries(numbering: Numbering) -> dict[Any, Any]:
     """
     products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
     for i in range(1, len(numbering.mechanism.links)):
-        own = list(range(numbering.c0[i], numbering.c0[i] + numbering.n_speeds(i)))
-        above = numbering.route(i - 1)
+        own, above = numbering.coordinates[i], numbering.route(i - 1)
         for n, c in enumerate(own):
             products += [(c, d, c, d) for d in own[: n + 1]]
             products += [(c, col, c, d) for d, col in above]
-        if i in numbering.modes:
-            modal = range(numbering.flex_c0[i], numbering.flex_c0[i] + numbering.modes[i])
-            products += [(c, col, c, d) for c in modal for d, col in numbering.joint_route(i)]
+        modal = numbering.modal_coordinates.get(i, ())
+        products += [(c, col, c, d) for c in modal for d, col in numbering.joint_route(i)]
         products += _port_products(numbering, i)
     first = list(range(numbering.nv))
     for _, _, c, d in products:
         if c < numbering.nv and d < numbering.nv:
             first[max(c, d)] = min(first[max(c, d)], c, d)
-    for i, n in numbering.modes.items():
-        for j in range(n):
-            first[numbering.flex_c0[i] + j] = min(first[numbering.flex_c0[i] + j], numbering.flex_c0[i])
+    for modes in numbering.modal_coordinates.values():
+        for c in modes:
+            first[c] = min(first[c], modes.start)
     start, rows = 0, []
     for i, f in enumerate(first):
         rows.append((f, start))
@@ -58,9 +56,8 @@ def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, in
     port = numbering.port_of(i - 1)
     if port < 0:
         return []
-    link = numbering.sites[i - 1].link
-    first, c0, n = numbering.ports[port][2], numbering.flex_c0[link], numbering.modes[link]
-    return [(first + j, first + k, c0 + j, c0 + k) for j in range(n) for k in range(j + 1)]
+    modes, first = numbering.modal_coordinates[numbering.sites[i - 1].link], numbering.ports[port].column
+    return [(first + j, first + k, modes[j], modes[k]) for j in range(len(modes)) for k in range(j + 1)]
 
 
 def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tuple[dict[Any, Any], np.ndarray]:

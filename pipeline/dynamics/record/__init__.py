@@ -2,7 +2,7 @@
 
 What is recorded only where a scene's ``[output]`` asks for it is a module called like its key there, which
 core/scene/output declares together with the variables that it adds. The module has
-``record(model, seen, asked, variables, coordinates)``, which adds them; asked is the key's value.
+``record(motions, asked)``, which returns them and their coordinates; asked is the key's value.
 """
 
 from pipeline.core.scene.output import VARIABLES

@@ -12,9 +12,10 @@ import xarray as xr
 from pipeline.core.artifacts.schema import RUN, conform
 from pipeline.core.registry import lookup
 from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
+from pipeline.dynamics.effects import RECORDS
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal, quaternions
+from pipeline.dynamics.record.motion import Motions, quaternions
 from pipeline.dynamics.record.topology import topology
 from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.run import ledger
@@ -22,51 +23,32 @@ from pipeline.dynamics.run.coordinates import joint_coordinates
 from pipeline.dynamics.run.run import Run
 from pipeline.dynamics.run.trajectory import Trajectory
 
-#: event kinds by their flag values; 0 and 1 as ever
-EVENT_KINDS = ("opening", "closing", "compression", "sticking", "slipping")
-_FLAGS = {
-    m.OPENING: "opening",
-    m.CLOSING: "closing",
-    m.COMPRESSION: "compression",
-    m.STICKING: "sticking",
-    m.SLIPPING: "slipping",
-}
-
-Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+Part = tuple[Variables, dict[str, object]]  #: variables and coordinates
 
 
 def dataset(run: Run) -> xr.Dataset:
     """All that is recorded of a run (schema RUN)."""
-    model, trajectory, seen = run.engine.model, run.trajectory, run.observed
-    variables: Variables = {}
-    coordinates: dict[str, object] = {"time": trajectory.time}
-    _motion(model, seen, variables, coordinates)
-    _modes(model, seen, variables, coordinates)
-    _drives(model, seen, run.scene, variables, coordinates)
-    _joint_coordinates(model, seen, variables, coordinates)
-    if model.scene.forces():
-        _loads(model, seen, variables, coordinates)
-    if model.mechanism.contacts:
-        _contacts(model, seen, variables, coordinates)
-        _events(trajectory, variables)
+    model, trajectory, seen = run.model, run.trajectory, run.observed
+    motions = Motions(model, seen)
+    parts = [_motion(motions), _modes(motions), _drives(run), _joint_coordinates(model, seen)]
+    if model.loads:
+        parts.append(_loads(model, seen))
+    if model.contacts:
+        parts += [_contacts(model, seen), (_events(trajectory), {})]
     if run.twin is not None:
-        coordinates["twin_time"] = run.twin.time
-        variables["twin_separation"] = (("twin_time",), run.twin.separation)
-        variables["horizon"] = ((), np.array(run.twin.horizon))
+        horizon: Variables = {"horizon": ((), np.array(run.twin.horizon))}
+        separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}
+        parts.append((separation | horizon, {"twin_time": run.twin.time}))
     for name, asked in run.scene.output.requests().items():
-        record = lookup("pipeline.dynamics.record", name, where="[output]")
-        record(model, seen, asked, variables, coordinates)
-    variables.update(ledger.series(model, seen))
-    topological, named = topology(run.engine, trajectory, seen, list(run.scene.joint))
-    made = xr.Dataset(variables | topological, coords=coordinates | named)
-    result = conform(made, RUN, **attributes(run.scene), **_report(run), **_counts(run), **_told(model, trajectory))
-    if "event_kind" in result:
-        result["event_kind"].attrs |= {
-            "flag_values": np.arange(len(EVENT_KINDS), dtype=np.int8),
-            "flag_meanings": " ".join(EVENT_KINDS),
-        }
-    return result
+        record = lookup(RECORDS, name, where="[output]")
+        parts.append(record(motions, asked))
+    parts += [(ledger.series(model, seen), {}), topology(run)]
+    variables, coordinates = Variables(), dict[str, object](time=trajectory.time)
+    for part in parts:
+        variables |= part[0]
+        coordinates |= part[1]
+    return conform(xr.Dataset(variables, coords=coordinates), RUN, **attributes(run.scene), **_report(run))
 
 
 def attributes(scene: Scene) -> dict[str, str]:
@@ -81,16 +63,6 @@ def attributes(scene: Scene) -> dict[str, str]:
         "sources": json.dumps(scene.sources(), sort_keys=True),
         "versions": " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
     }
-
-
-def _told(model: Model, trajectory: Trajectory) -> dict[str, str]:
-    """Laws of the contacts, and in words what is to be doubted."""
-    told = "\n".join(warnings(model, trajectory))
-    if not model.mechanism.contacts:
-        return {"warnings": told} if told else {}
-    from pipeline.dynamics.contact import validity
-
-    return {"contacts": validity.laws(model.mechanism.contacts, model.laws), "warnings": told}
 
 
 def warnings(model: Model, trajectory: Trajectory) -> list[str]:
@@ -112,148 +84,150 @@ def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
 
 def _contact_warnings(model: Model, trajectory: Trajectory) -> list[str]:
     """Sentences about contacts that left the range for which their laws were made."""
-    if not model.mechanism.contacts:
+    if not model.contacts:
         return []
     from pipeline.dynamics.contact import validity
 
-    e, found = trajectory.events, []
-    for c, ((name, joint, _, _), law) in enumerate(zip(model.mechanism.contacts, model.laws, strict=True)):
-        mine = e[e[:, m.EVENT.contact] == c]
-        depth, force = np.fmax.reduce(mine[:, [m.EVENT.peak_depth, m.EVENT.peak_force]], axis=0, initial=0.0)
-        found += validity.warnings(name, joint, law, float(depth), float(force))
-    return found
+    sentences = list[str]()
+    for c, ((name, joint, *_), law) in enumerate(zip(model.contacts, model.laws, strict=True)):
+        mine = trajectory.events[trajectory.events["contact"] == c]
+        depth, force = (float(np.fmax.reduce(mine[peak], initial=0.0)) for peak in ("peak_depth", "peak_force"))
+        sentences += validity.warnings(name, joint, law, depth, force)
+    return sentences
 
 
-def _report(run: Run) -> dict[str, float | int]:
-    counters = run.trajectory.counters
-    found: dict[str, float | int] = {
+def _report(run: Run) -> dict[str, float | int | str]:
+    """How the run was made, for the attributes; and in words what is to be doubted."""
+    counters, redundant = run.trajectory.counters, run.engine.mobility.redundant
+    told: dict[str, float | int | str] = {
         **counters,
         "stiff_share": counters.get("stiff_steps", 0) / max(1, counters.get("steps", 0)),
         "largest_rate": run.trajectory.steepest,
         "largest_drift_before_projection": run.trajectory.drift,
         "largest_rate_drift_before_projection": run.trajectory.rate_drift,
-        "closure_residual_of_given_start": run.start_residual,
+        "closure_residual_of_given_start": run.model.mechanism.start_residual,
     }
-    return found if run.twin is None else found | {"twin_perturbation": run.twin.perturbation}
-
-
-def _counts(run: Run) -> dict[str, str | int]:
-    """Redundancy, and the integrator that made the run, in words for the attributes."""
-    redundant = run.engine.mobility.redundant
-    found: dict[str, str | int] = {"redundant_closure_rows": redundant}
-    found["method"] = run.engine.model.scene.solver.integrator
+    if run.twin is not None:
+        told["twin_perturbation"] = run.twin.perturbation
+    told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
     if run.switched:
-        found["switched"] = run.switched
+        told["switched"] = run.switched
     if redundant:
-        found["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
-    return found
+        told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+    doubts = "\n".join(warnings(run.model, run.trajectory))
+    if run.model.contacts:
+        from pipeline.dynamics.contact import validity
+
+        told["contacts"] = validity.laws(run.model.contacts, run.model.laws)
+    if doubts or run.model.contacts:
+        told["warnings"] = doubts
+    return told
 
 
-def _motion(model: Model, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
-    origin = model.mechanism.origin
-    links = link_motions(model, seen["link_frame"])
-    bodies = body_motions(model, seen, links)
-    frames = frame_positions(model, seen, links)
-    coordinates["body"] = list(bodies)
-
-    def stacked(parts: list[np.ndarray]) -> np.ndarray:
-        return np.stack(parts, axis=1)
-
-    dims = ("time", "body", "axis")
-    every = list(bodies.values())
-    variables["position"] = (dims, stacked([m.p + origin for m in every]))
-    variables["quaternion"] = (("time", "body", "quat"), stacked([quaternions(m.R) for m in every]))
-    variables["velocity"] = (dims, stacked([m.v for m in every]))
-    variables["angular_velocity"] = (dims, stacked([m.omega for m in every]))
-    variables["acceleration"] = (dims, stacked([m.a for m in every]))
-    variables["angular_acceleration"] = (dims, stacked([m.alpha for m in every]))
-    rows = len(seen["status"])
-    coordinates["frame"] = list(frames)
-    variables["frame_position"] = (
-        ("time", "frame", "axis"),
-        stacked([p + origin for p in frames.values()]) if frames else np.zeros((rows, 0, 3)),
-    )
-    wrenches = joint_wrenches(model, seen, bodies, frames)
-    coordinates["joint"] = list(wrenches)
-    for name, part in (("joint_moment", 0), ("joint_force", 1)):
-        values = [w[part] for w in wrenches.values()]
-        variables[name] = (("time", "joint", "axis"), stacked(values) if values else np.zeros((rows, 0, 3)))
+def _stacked(values: list[np.ndarray], rows: int) -> np.ndarray:
+    """Vectors (time, 3) or (time, 4) of some things, (time, things, ..); of none, an empty array."""
+    return np.stack(values, axis=1) if values else np.zeros((rows, 0, 3))
 
 
-def _modes(model: Model, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
-    if not model.numbering.modes:
-        return
-    states = {str(model.mechanism.links[i].flexible): modal(model, i, seen) for i in sorted(model.numbering.modes)}
-    owners = [name for name, s in states.items() for _ in range(s.q.shape[1])]
-    numbers = [k + 1 for s in states.values() for k in range(s.q.shape[1])]
-    coordinates["mode"] = np.arange(len(owners))
-    coordinates["mode_body"] = ("mode", owners)
-    coordinates["mode_number"] = ("mode", np.array(numbers))
-    variables["modal_coordinate"] = (("time", "mode"), np.concatenate([s.q for s in states.values()], axis=1))
-    variables["modal_velocity"] = (("time", "mode"), np.concatenate([s.u for s in states.values()], axis=1))
+def _motion(motions: Motions) -> Part:
+    origin, rows = motions.model.mechanism.origin, len(motions.seen.state)
+    bodies, frames, wrenches = motions.bodies, motions.frame_positions, joint_wrenches(motions)
+    per_body = {
+        "position": [motion.p + origin for motion in bodies.values()],
+        "quaternion": [quaternions(motion.R) for motion in bodies.values()],
+        "velocity": [motion.v for motion in bodies.values()],
+        "angular_velocity": [motion.omega for motion in bodies.values()],
+        "acceleration": [motion.a for motion in bodies.values()],
+        "angular_acceleration": [motion.alpha for motion in bodies.values()],
+    }
+    variables: Variables = {
+        name: (("time", "body", "quat" if name == "quaternion" else "axis"), _stacked(values, rows))
+        for name, values in per_body.items()
+    }
+    variables["frame_position"] = (("time", "frame", "axis"), _stacked([p + origin for p in frames.values()], rows))
+    for name, k in (("joint_moment", 0), ("joint_force", 1)):
+        variables[name] = (("time", "joint", "axis"), _stacked([w[k] for w in wrenches.values()], rows))
+    return variables, {"body": list(bodies), "frame": list(frames), "joint": list(wrenches)}
 
 
-def _drives(model: Model, seen: Seen, scene: Scene, variables: Variables, coordinates: dict[str, object]) -> None:
-    names = model.mechanism.drives
+def _modes(motions: Motions) -> Part:
+    model = motions.model
+    if not model.numbering.flexible:
+        return {}, {}
+    states = {str(model.links[i].flexible): motions.modal(i) for i in model.numbering.flexible}
+    owners = [name for name, state in states.items() for _ in range(state.q.shape[1])]
+    numbers = [k + 1 for state in states.values() for k in range(state.q.shape[1])]
+    return {
+        "modal_coordinate": (("time", "mode"), np.concatenate([state.q for state in states.values()], axis=1)),
+        "modal_velocity": (("time", "mode"), np.concatenate([state.u for state in states.values()], axis=1)),
+    }, {
+        "mode": np.arange(len(owners)),
+        "mode_body": ("mode", owners),
+        "mode_number": ("mode", np.array(numbers)),
+    }
+
+
+def _drives(run: Run) -> Part:
+    model, seen, names = run.model, run.observed, list(run.model.drives)
     if not names:
-        return
-    sign_of = {name: link.stage.sign for link in model.mechanism.links if link.stage for name in link.drives}
-    signs = np.array([sign_of[name] for name in names])
-    coordinates["drive"] = names
-    force, position = signs * seen["drive_force"], signs * seen["coordinate"][:, model.numbering.nq :]
-    sharing = [name for name in model.scene.forces() if name not in scene.load]
+        return {}, {}
+    force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]
+    sharing = [name for name in model.scene.forces() if name not in run.scene.load]
     if sharing:  # actuators beyond the freedoms, which the engine has as loads
         from pipeline.dynamics.record.loads import along_coordinates
 
-        coordinates["drive"] = [*names, *sharing]
+        names += sharing
         known = joint_coordinates(model, seen)
         force = np.concatenate([force, along_coordinates(model, seen, sharing)], axis=1)
         position = np.concatenate([position, np.stack([known[name][0] for name in sharing], axis=1)], axis=1)
-    variables["drive_force"] = (("time", "drive"), force)
-    variables["drive_position"] = (("time", "drive"), position)
+    return {
+        "drive_force": (("time", "drive"), force),
+        "drive_position": (("time", "drive"), position),
+    }, {"drive": names}
 
 
-def _joint_coordinates(model: Model, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
-    found = joint_coordinates(model, seen)
-    if found:
-        coordinates["coordinate"] = list(found)
-        for k, name in enumerate(("joint_position", "joint_velocity", "joint_acceleration")):
-            variables[name] = (("time", "coordinate"), np.stack([series[k] for series in found.values()], axis=1))
+def _joint_coordinates(model: Model, seen: Observed) -> Part:
+    every = joint_coordinates(model, seen)
+    if not every:
+        return {}, {}
+    names = ("joint_position", "joint_velocity", "joint_acceleration")
+    series = (np.stack(values, axis=1) for values in zip(*every.values(), strict=True))
+    variables: Variables = {name: (("time", "coordinate"), s) for name, s in zip(names, series, strict=True)}
+    return variables, {"coordinate": list(every)}
 
 
-def _loads(model: Model, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
+def _loads(model: Model, seen: Observed) -> Part:
     from pipeline.dynamics.record.loads import load_series
 
-    coordinates["load"] = list(model.scene.forces())
-    variables.update(load_series(model, seen))
+    return load_series(model, seen), {"load": list(model.scene.forces())}
 
 
-def _contacts(model: Model, seen: Seen, variables: Variables, coordinates: dict[str, object]) -> None:
-    touch = seen["touch"].reshape(len(seen["touch"]), -1, m.TOUCH.size)
-    coordinates["contact"] = [name for name, *_ in model.mechanism.contacts]
+def _contacts(model: Model, seen: Observed) -> Part:
+    touch = seen.touch
     scalars = {
-        "contact_gap": touch[..., m.TOUCH.gap],
-        "contact_penetration": np.maximum(0.0, -touch[..., m.TOUCH.gap]),
-        "contact_rate": touch[..., m.TOUCH.rate],
-        "contact_normal_force": touch[..., m.TOUCH.normal_force],
-        "contact_friction_power": touch[..., m.TOUCH.friction_power],
-        "contact_sliding_speed": touch[..., m.TOUCH.slip],
+        "contact_gap": touch["gap"],
+        "contact_penetration": np.maximum(0.0, -touch["gap"]),
+        "contact_rate": touch["rate"],
+        "contact_normal_force": touch["normal_force"],
+        "contact_friction_power": touch["friction_power"],
+        "contact_sliding_speed": touch["slip"],
     }
-    variables.update({name: (("time", "contact"), values) for name, values in scalars.items()})
-    for name, o in (("contact_force", m.TOUCH.force), ("contact_offset", m.TOUCH.offset)):
-        variables[name] = (("time", "contact", "axis"), touch[..., o : o + 3])
+    variables: Variables = {name: (("time", "contact"), values) for name, values in scalars.items()}
+    variables["contact_force"] = (("time", "contact", "axis"), touch["force"])
+    variables["contact_offset"] = (("time", "contact", "axis"), touch["offset"])
     variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in model.laws]))
+    return variables, {"contact": [contact.name for contact in model.contacts]}
 
 
-def _events(trajectory: Trajectory, variables: Variables) -> None:
-    e = trajectory.events
+def _events(trajectory: Trajectory) -> Variables:
+    events = trajectory.events
     columns = {
-        "event_time": e[:, m.EVENT.time],
-        "event_contact": e[:, m.EVENT.contact].astype(np.int32),
-        "event_kind": np.array([EVENT_KINDS.index(_FLAGS[int(k)]) for k in e[:, m.EVENT.kind]], dtype=np.int8),
-        "event_approach_speed": e[:, m.EVENT.speed],
-        "event_peak_force": e[:, m.EVENT.peak_force],
-        "event_peak_penetration": e[:, m.EVENT.peak_depth],
-        "event_duration": e[:, m.EVENT.duration],
+        "event_time": events["time"],
+        "event_contact": events["contact"].astype(np.int32),
+        "event_kind": events["kind"].astype(np.int8),
+        "event_approach_speed": events["speed"],
+        "event_peak_force": events["peak_force"],
+        "event_peak_penetration": events["peak_depth"],
+        "event_duration": events["duration"],
     }
-    variables.update({name: (("event",), values) for name, values in columns.items()})
+    return {name: (("event",), values) for name, values in columns.items()}

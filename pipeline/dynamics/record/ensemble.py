@@ -12,18 +12,20 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.artifacts.schema import ENSEMBLE, conform
 from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress, silent
 from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.schema import Ensemble, Scene
-from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.dataset import attributes
-from pipeline.dynamics.record.motion import Motion, body_motions, link_motions, quaternions
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start
+from pipeline.dynamics.record.motion import Motion, Motions, quaternions
+from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.perturbation import offset_jacobian, perturbed
-from pipeline.dynamics.run.run import engines, observed
-from pipeline.dynamics.run.switching import follow
+from pipeline.dynamics.run.run import engines, follow, observed
+from pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import Trajectory, output_times
 
 
@@ -35,8 +37,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
             "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
         )
     engine, other = engines(scene, bundles, progress)
-    names = _bodies(engine, wanted)
-    start, _ = consistent_start(engine)
+    names = _bodies(engine.model, wanted)
+    start = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
     random = np.random.default_rng(wanted.seed)
     members, reasons = [], []
@@ -44,7 +46,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         offsets = random.normal(size=(len(scene.contacts()), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
-        last, trajectory, switched = follow(engine, moved, _quiet, other)
+        last, trajectory, switched = follow(engine, moved, silent, other)
         members.append(_member(last, trajectory, names))
         reasons += [switched] if switched else []
         progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
@@ -53,17 +55,12 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
 
 
-def _quiet(share: float | None, text: str) -> None:
-    """Progress is told per member."""
-
-
-def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
-    mechanism = engine.model.mechanism
-    known = [n for n, b in mechanism.scene.body.items() if b.type != "ground"]
+def _bodies(model: Model, wanted: Ensemble) -> list[str]:
+    """Bodies whose motion is kept: those asked for, or those that have contacts."""
+    known = [n for n, b in model.scene.body.items() if b.type != "ground"]
     if wanted.bodies is None:
-        return sorted(
-            {mechanism.frames[f].body for _, joint, _, _ in mechanism.contacts for f in joint.between} & set(known)
-        )
+        frames = model.mechanism.frames
+        return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known))
     for name in wanted.bodies:
         if name not in known:
             raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
@@ -71,25 +68,22 @@ def _bodies(engine: Engine, wanted: Ensemble) -> list[str]:
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
-    scene = engine.model.scene
-    regular = output_times(engine.breaks, scene.output.interval)
-    rows = np.searchsorted(trajectory.time, regular)
+    model = engine.model
+    regular = output_times(engine.breaks, model.scene.output.interval)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = replace(trajectory, rows=trajectory.rows[rows])
+    kept = replace(trajectory, rows=trajectory.rows[np.searchsorted(trajectory.time, regular)])
     seen = observed(engine, kept)
-    require_closed(engine.model, kept, seen)
-    motions = body_motions(engine.model, seen, link_motions(engine.model, seen["link_frame"]))
-    chosen = [motions[n] for n in names]
-    touch = seen["touch"].reshape(len(rows), -1, m.TOUCH.size)
+    require_closed(model, kept, seen)
+    bodies = Motions(model, seen).bodies
     variables = {
-        **_series(chosen, engine.model.mechanism.origin),
-        "contact_normal_force": (("time", "contact"), touch[..., m.TOUCH.normal_force]),
-        "contact_offset": (("time", "contact", "axis"), touch[..., m.TOUCH.offset : m.TOUCH.offset + 3]),
+        **_series([bodies[n] for n in names], model.mechanism.origin),
+        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"]),
+        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
-    contacts = [name for name, *_ in engine.model.mechanism.contacts]
+    contacts = [contact.name for contact in model.contacts]
     return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
 
 
@@ -106,15 +100,12 @@ def _series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[
 
 def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Largest force [N], impacts, and share of the time in contact, per contact."""
-    e = trajectory.events
-    span = engine.end - engine.start
+    closings = trajectory.events[trajectory.events["kind"] == CLOSING]
     peak, count, share = [], [], []
-    for c in range(engine.model.arrays.size(m.N_CONTACTS)):
-        closing = e[(e[:, m.EVENT.contact] == c) & (e[:, m.EVENT.kind] == m.CLOSING)]
-        lasting = np.where(
-            np.isnan(closing[:, m.EVENT.duration]), engine.end - closing[:, m.EVENT.time], closing[:, m.EVENT.duration]
-        )
-        peak.append(closing[:, m.EVENT.peak_force].max(initial=0.0))
-        count.append(int((closing[:, m.EVENT.speed] > IMPACT).sum()))
-        share.append(lasting.sum() / span)
+    for c in range(trajectory.contacts):
+        mine = closings[closings["contact"] == c]
+        lasting = np.where(np.isnan(mine["duration"]), engine.end - mine["time"], mine["duration"])
+        peak.append(mine["peak_force"].max(initial=0.0))
+        count.append(int((mine["speed"] > IMPACT).sum()))
+        share.append(lasting.sum() / (engine.end - engine.start))
     return np.array(peak), np.array(count), np.array(share)

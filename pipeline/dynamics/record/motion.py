@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.deformation import shift
-from pipeline.dynamics.model.flexible_bodies import bow
+from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.flexible_bodies import bow, shift
+from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
 
 
@@ -44,22 +46,6 @@ class Motion:
         return Motion(self.p + r, self.R, self.v + swing + s, self.omega, a, self.alpha)
 
 
-def link_motions(model: Model, frames: np.ndarray) -> list[Motion]:
-    """Motion of every link's frame, gravity's upward acceleration of the ground taken out."""
-    gravity = model.arrays.table(m.GRAVITY)["acceleration"][0]
-    frames = frames.reshape(len(frames), -1, m.FRAME.size)
-    found = []
-    for i in range(frames.shape[1]):
-        f = frames[:, i]
-        R = f[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3)
-        p, omega, v, alpha, a = (
-            f[:, o : o + 3]
-            for o in (m.FRAME.origin, m.FRAME.omega, m.FRAME.velocity, m.FRAME.alpha, m.FRAME.acceleration)
-        )
-        found.append(Motion(p, R, v, omega, a + gravity, alpha))
-    return found
-
-
 @dataclass(frozen=True)
 class Modal:
     """Modal coordinates of a flexible link, their rates and second rates; shape (time, mode)."""
@@ -68,46 +54,95 @@ class Modal:
     u: np.ndarray
     du: np.ndarray
 
-
-def modal(model: Model, link: int, seen: dict[str, np.ndarray]) -> Modal:
-    """Modal coordinates of a flexible link."""
-    numbering = model.numbering
-    q0, c0, n = numbering.flex_q0[link], numbering.flex_c0[link], numbering.modes[link]
-    return Modal(
-        seen["coordinate"][:, q0 : q0 + n], seen["speed"][:, c0 : c0 + n], seen["acceleration"][:, c0 : c0 + n]
-    )
+    def shift(self, shape: np.ndarray, bow: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacement of a point in the body frame, its rate and second rate; see `model.flexible_bodies.shift`."""
+        return shift(shape, bow, self.q, self.u, self.du)
 
 
-def body_motions(model: Model, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, Motion]:
-    """Motion of each moving body's centre of mass and axes, by name."""
-    mechanism, found = model.mechanism, {}
-    for name, body in mechanism.scene.body.items():
-        i = mechanism.link_of[name]
-        if isinstance(body, RigidBody):
-            place = mechanism.links[i].places[name]
-            found[name] = links[i].at(place.p + place.R @ np.array(body.com), place.R)
-        elif i and mechanism.links[i].flexible == name:
-            bundle, state = mechanism.bundles[name], modal(model, i, seen)
-            C, mass = bundle["modal_first_moment"].values, float(bundle["mass"])
-            arm, rate, second = shift(C, bow(mechanism, name), state.q, state.u, state.du)
-            found[name] = links[i].moving((bundle["first_moment"].values + arm) / mass, rate / mass, second / mass)
-    return found
+@dataclass(frozen=True)
+class Motions:
+    """Motions of all links, bodies and named frames in observed rows, each worked out when it is first asked for."""
+
+    model: Model
+    seen: Observed
+
+    @cached_property
+    def links(self) -> list[Motion]:
+        """Motion of every link's frame, gravity's upward acceleration of the ground taken out."""
+        gravity = self.model.gravity
+        return [
+            Motion(f["origin"], f["axes"], f["velocity"], f["omega"], f["acceleration"] + gravity, f["alpha"])
+            for f in self.seen.links.T
+        ]
+
+    def modal(self, link: int) -> Modal:
+        """Modal coordinates of a flexible link."""
+        numbering, seen = self.model.numbering, self.seen
+        q, c = numbering.modal_positions[link], numbering.modal_coordinates[link]
+        return Modal(seen.positions[:, q], seen.speeds[:, c], seen.accelerations[:, c])
+
+    @cached_property
+    def bodies(self) -> dict[str, Motion]:
+        """Motion of each moving body's centre of mass and axes, by name."""
+        motions: dict[str, Motion] = {}
+        for name, body in self.model.scene.body.items():
+            i = self.model.mechanism.link_of[name]
+            link = self.model.links[i]
+            if isinstance(body, RigidBody):
+                place = link.places[name]
+                motions[name] = self.links[i].at(place.p + place.R @ np.array(body.com), place.R)
+            elif link.bundle is not None:
+                shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
+                arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
+                motions[name] = self.links[i].moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
+        return motions
+
+    @cached_property
+    def frame_positions(self) -> dict[str, np.ndarray]:
+        """Origin of every named frame, kernels' origin, shape (time, 3)."""
+        positions = {}
+        for name, i, place in self._frames():
+            link, bundle = self.links[i], self.model.links[i].bundle
+            arm = np.broadcast_to(place.p, link.p.shape)
+            if bundle is not None:
+                label = name.partition(".")[2]
+                S = bundle["frame_translation_shape"].sel(frame=label).values
+                arm = arm + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
+            positions[name] = link.p + np.einsum("tij,tj->ti", link.R, arm)
+        return positions
+
+    @cached_property
+    def frame_velocities(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """Velocity of the origin and angular velocity of every named frame, world axes, shape (time, 3) each."""
+        velocities = {}
+        for name, i, place in self._frames():
+            link, bundle = self.links[i], self.model.links[i].bundle
+            if bundle is None:
+                velocities[name] = link.at(place.p).v, link.omega
+                continue
+            label, state = name.partition(".")[2], self.modal(i)
+            S, P = (bundle[f"frame_{k}_shape"].sel(frame=label).values for k in ("translation", "rotation"))
+            arm, rate, second = state.shift(S, bow(self.model.mechanism, i, label))
+            turning = np.einsum("tij,tj->ti", link.R, _angular_velocity(state.q @ P.T, state.u @ P.T))
+            velocities[name] = link.moving(place.p + arm, rate, second).v, link.omega + turning
+        return velocities
+
+    def _frames(self) -> Iterator[tuple[str, int, Placement]]:
+        """Every named frame: its link, and its undeformed place there."""
+        for name, frame in self.model.mechanism.frames.items():
+            i = self.model.mechanism.link_of[frame.body]
+            yield name, i, self.model.links[i].places[frame.body].of(frame.place)
 
 
-def frame_positions(model: Model, seen: dict[str, np.ndarray], links: list[Motion]) -> dict[str, np.ndarray]:
-    """Origin of every named frame, kernels' origin, shape (time, 3)."""
-    mechanism, found = model.mechanism, {}
-    for name, frame in mechanism.frames.items():
-        i = mechanism.link_of[frame.body]
-        place = mechanism.links[i].places[frame.body].of(frame.place)
-        arm = np.broadcast_to(place.p, (len(links[i].p), 3))
-        if mechanism.links[i].flexible:
-            bundle, label = mechanism.bundles[frame.body], name.partition(".")[2]
-            state = modal(model, i, seen)
-            S = bundle["frame_translation_shape"].sel(frame=label).values
-            arm = arm + shift(S, bow(mechanism, frame.body, label), state.q, state.u, state.du)[0]
-        found[name] = links[i].p + np.einsum("tij,tj->ti", links[i].R, arm)
-    return found
+def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Angular velocity, parent axes, of rotations exp(theta) whose vectors change at `rate`; shape (time, 3)."""
+    angle = np.linalg.norm(theta, axis=1, keepdims=True)
+    small = angle < 1e-4  # both series are exact to rounding there with their first two terms
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 0.5 - angle**2 / 24.0, (1.0 - np.cos(safe)) / safe**2)
+    second = np.where(small, 1.0 / 6.0 - angle**2 / 120.0, (safe - np.sin(safe)) / safe**3)
+    swing = np.cross(theta, rate)
+    return rate + first * swing + second * np.cross(theta, swing)
 
 
 def quaternions(R: np.ndarray) -> np.ndarray:

@@ -20,12 +20,9 @@ import xarray as xr
 
 from pipeline.core.algebra import skew
 from pipeline.core.errors import InputError
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.motion import body_motions, frame_positions, link_motions, modal
+from pipeline.dynamics.record.motion import Motions
 from pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
 
-Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
@@ -44,38 +41,36 @@ class Motion:
     du: np.ndarray
 
 
-def record(
-    model: Model, seen: Seen, names: tuple[str, ...], variables: Variables, coordinates: dict[str, object]
-) -> None:
-    """Add section forces and peak stresses of the bodies `names` to a run's variables and coordinates.
+def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[str, object]]:
+    """Section forces and peak stresses of the bodies `names`: variables and coordinates of the run dataset.
 
     Peak stresses are left out when a body has a section without known outline. InputError for a bundle that was made
     without what this needs.
     """
     forces, peaks, places, owners = [], [], [], []
     for name in names:
-        bundle = model.mechanism.bundles[name]
-        if "section_place" not in bundle:
+        bundle = motions.model.links[motions.model.mechanism.link_of[name]].bundle
+        if bundle is None or "section_place" not in bundle:
             raise InputError("[output] stress", f"the bundle of '{name}' has no sections", "make it with the scene")
-        found = section_forces(bundle, *_motion_and_loads(model, seen, name))
-        forces.append(found)
+        force = section_forces(bundle, *_motion_and_loads(motions, name))
+        forces.append(force)
         places.append(bundle["section_place"].values)
-        owners += [name] * found.shape[1]
+        owners += [name] * force.shape[1]
         if "fibre_stress" in bundle:
-            peaks.append(peak_stresses(bundle, found))
-    coordinates["section"] = np.arange(len(owners))
-    coordinates["section_body"] = ("section", owners)
-    coordinates["section_place"] = (
-        "section",
-        np.concatenate(places),
-        {"units": "m", "long_name": "place along the rod"},
-    )
+            peaks.append(peak_stresses(bundle, force))
     every = np.concatenate(forces, axis=1)
-    variables["section_force"] = (("time", "section", "axis"), every[..., :3])
-    variables["section_moment"] = (("time", "section", "axis"), every[..., 3:])
+    variables: Variables = {
+        "section_force": (("time", "section", "axis"), every[..., :3]),
+        "section_moment": (("time", "section", "axis"), every[..., 3:]),
+    }
     if len(peaks) == len(names):
         for k, name in enumerate(("peak_axial_stress", "peak_von_mises_stress")):
             variables[name] = (("time", "section"), np.concatenate([peak[k] for peak in peaks], axis=1))
+    return variables, {
+        "section": np.arange(len(owners)),
+        "section_body": ("section", owners),
+        "section_place": ("section", np.concatenate(places), {"units": "m", "long_name": "place along the rod"}),
+    }
 
 
 def section_forces(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -150,33 +145,32 @@ def _turn(v: np.ndarray) -> np.ndarray:
     return np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * (X @ X)
 
 
-def _motion_and_loads(model: Model, seen: Seen, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
+def _motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
+    """What `section_forces` takes of a flexible body."""
+    model = motions.model
     link = model.mechanism.link_of[name]
-    frame, state = link_motions(model, seen["link_frame"])[link], modal(model, link, seen)
-    gravity = model.arrays.table(m.GRAVITY)["acceleration"][0]
+    frame, state = motions.links[link], motions.modal(link)
     R_BW = np.swapaxes(frame.R, 1, 2)
-    a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - gravity, frame.omega, frame.alpha))
-    names = [f"{name}.{label}" for label in model.mechanism.bundles[name]["frame"].values]
+    a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - model.gravity, frame.omega, frame.alpha))
+    names = [frame for frame in model.mechanism.frames if frame.startswith(f"{name}.")]
     moment, force = np.zeros((len(a), len(names), 3)), np.zeros((len(a), len(names), 3))
-    for at, n, f in _loads(model, seen, name):
+    for at, n, f in _loads(motions, name):
         k = names.index(at)
         moment[:, k] += np.einsum("tij,tj->ti", R_BW, n - np.cross(frame.p, f))
         force[:, k] += np.einsum("tij,tj->ti", R_BW, f)
     return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
 
 
-def _loads(model: Model, seen: Seen, name: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _loads(motions: Motions, name: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """What joints, paths and loads do to a body: its frame, moment about the kernels' origin, force, world axes."""
-    scene, found = model.scene, []
-    links = link_motions(model, seen["link_frame"])
-    places = frame_positions(model, seen, links)
-    for joint, (n, f) in joint_wrenches(model, seen, body_motions(model, seen, links), places).items():
-        between = scene.joint[joint].between
-        about_origin = n + np.cross(places[between[1]], f)
-        found += [(at, sign * about_origin, sign * f) for at, sign in zip(between, (-1.0, 1.0), strict=True)]
-    found += [(frame, n, f) for frame, n, f in path_wrenches(model, seen)]
-    if scene.forces():
+    model, seen, acting = motions.model, motions.seen, list[tuple[str, np.ndarray, np.ndarray]]()
+    for joint, (n, f) in joint_wrenches(motions).items():
+        between = model.scene.joint[joint].between
+        about_origin = n + np.cross(motions.frame_positions[between[1]], f)
+        acting += [(at, sign * about_origin, sign * f) for at, sign in zip(between, (-1.0, 1.0), strict=True)]
+    acting += path_wrenches(model, seen)
+    if model.loads:
         from pipeline.dynamics.record.loads import on_frames
 
-        found += on_frames(model, seen, name)
-    return [load for load in found if model.mechanism.frames[load[0]].body == name]
+        acting += on_frames(model, seen, name)
+    return [load for load in acting if model.mechanism.frames[load[0]].body == name]

@@ -9,9 +9,12 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model import selection
+from pipeline.dynamics.model.mobility import INFINITE
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.run import Run
 from pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -36,42 +39,41 @@ class Pass:
     joint: str
 
 
-def topology(
-    engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray], joints: list[str]
-) -> tuple[Variables, dict[str, object]]:
-    """Variables and coordinates of the run dataset; joints: names along its joint dimension."""
-    redundant = np.array([name in engine.mobility.redundant_joints for name in joints], dtype=np.int8)
+def topology(run: Run) -> tuple[Variables, dict[str, object]]:
+    """Variables and coordinates of the run dataset."""
+    engine, trajectory, seen = run.engine, run.trajectory, run.observed
+    redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
-    rows, nv = len(trajectory.rows), engine.model.numbering.nv
+    rows, nv = len(trajectory.rows), engine.model.nv
     values = _singular_values(engine, trajectory, seen, singular.natural)
     rank = np.zeros(rows, dtype=np.int32)
     if values.shape[1]:
         rank = np.sum(values > ZERO * values[:, :1], axis=1).astype(np.int32)
         told = _singular_values(engine, trajectory, seen, singular.scaled)
-        least = np.maximum(told[:, -1], told[:, 0] / singular.INFINITE)
-        variables["condition"] = (("time",), np.minimum(told[:, 0] / least, singular.INFINITE))
+        least = np.maximum(told[:, -1], told[:, 0] / INFINITE)
+        variables["condition"] = (("time",), np.minimum(told[:, 0] / least, INFINITE))
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
     if not values.shape[1]:
         return variables, {}
-    found = _passes(engine, trajectory, values)
-    _refuse_rest(found, trajectory, seen["energy"][:, 0])
+    passes = _passes(engine, trajectory, values)
+    _refuse_rest(passes, trajectory, seen.energy["kinetic"])
     variables |= {
-        "pass_time": (("singular_pass",), np.array([p.time for p in found])),
-        "pass_condition": (("singular_pass",), np.array([p.condition for p in found])),
-        "pass_rank_loss": (("singular_pass",), np.array([p.lost for p in found], dtype=np.int32)),
+        "pass_time": (("singular_pass",), np.array([p.time for p in passes])),
+        "pass_condition": (("singular_pass",), np.array([p.condition for p in passes])),
+        "pass_rank_loss": (("singular_pass",), np.array([p.lost for p in passes], dtype=np.int32)),
     }
-    return variables, {"pass_joint": ("singular_pass", np.array([p.joint for p in found], dtype=str))}
+    return variables, {"pass_joint": ("singular_pass", np.array([p.joint for p in passes], dtype=str))}
 
 
 def _singular_values(
-    engine: Engine, trajectory: Trajectory, seen: dict[str, np.ndarray], scale: Callable[..., np.ndarray]
+    engine: Engine, trajectory: Trajectory, seen: Observed, scale: Callable[..., np.ndarray]
 ) -> np.ndarray:
     """Singular values of every row's closure Jacobian, with the rows solved for there; shape (time, rank)."""
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
-        J = selection.dense(engine.model, engine.h, seen["jacobian"][part])
+        J = selection.dense(engine.model, engine.h, seen.jacobian[part])
         parts.append(scale(engine.model, engine.h, J))
     J = np.concatenate(parts)
     return np.linalg.svd(J, compute_uv=False) if J.size else np.zeros((len(J), 0))
@@ -88,8 +90,8 @@ def _passes(engine: Engine, trajectory: Trajectory, values: np.ndarray) -> list[
     valleys = np.flatnonzero(lowest & (least < LOW * np.median(least)))
     regular = np.flatnonzero(least > ZERO * values[:, 0])
     ends = {int(k) for side in ("left", "right") for k in np.searchsorted(regular, valleys, side=side)}
-    found = (_pass_before(engine, trajectory, regular, k) for k in sorted(ends) if 0 < k < len(regular))
-    return [p for p in found if p is not None]
+    near = (_pass_before(engine, trajectory, regular, k) for k in sorted(ends) if 0 < k < len(regular))
+    return [p for p in near if p is not None]
 
 
 def _pass_before(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int) -> Pass | None:
@@ -121,15 +123,15 @@ def _between(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k: int
     """
     from scipy.interpolate import KroghInterpolator
 
-    times, first = trajectory.time, 1 + 2 * len(engine.model.mechanism.contacts)
+    times = trajectory.time
     start, end = float(times[regular[k - 1]]), float(times[regular[k]])
     engine.keep(trajectory.selection(int(regular[k])))
     engine.select_pieces(0.5 * (start + end))
-    nodes = regular[k - 1 : k + 1] if engine.model.mechanism.contacts else _smooth(engine, times, regular, k)
-    states, rates = trajectory.rows[nodes, first:], []
+    nodes = regular[k - 1 : k + 1] if engine.model.contacts else _smooth(engine, times, regular, k)
+    states, rates = trajectory.state[nodes], []
     for t, y in zip(times[nodes], states, strict=True):
         engine.attempt(y, float(t))
-        rates.append(engine.view(m.SLOPES, len(y)).copy())
+        rates.append(engine.slope.copy())
     values = np.stack([states, np.array(rates) * (end - start)], axis=1).reshape(-1, states.shape[1])
     path = KroghInterpolator(np.repeat((times[nodes] - start) / (end - start), 2), values)
 
@@ -149,9 +151,9 @@ def _smooth(engine: Engine, times: np.ndarray, regular: np.ndarray, k: int) -> n
     return np.asarray(near[(times[near] >= before) & (times[near] <= after)])
 
 
-def _refuse_rest(found: list[Pass], trajectory: Trajectory, kinetic: np.ndarray) -> None:
+def _refuse_rest(passes: list[Pass], trajectory: Trajectory, kinetic: np.ndarray) -> None:
     """SolverError for a singular pose passed so slowly that rounding, not motion, chooses how it goes on."""
-    for p in found:
+    for p in passes:
         if np.interp(p.time, trajectory.time, kinetic) <= AT_REST * np.max(kinetic):
             raise SolverError(
                 f"at t = {p.time:.6g} s: the mechanism comes to rest in a singular pose (joint {p.joint}, condition "

@@ -8,109 +8,86 @@ import numpy as np
 
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.motion import Motion
+from pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
 
 
-def joint_wrenches(
-    model: Model, seen: dict[str, np.ndarray], bodies: Mapping[str, Motion], frames: Mapping[str, np.ndarray]
-) -> dict[str, Wrench]:
-    """Wrench of every joint on its second body: force [N], moment [N m] about that body's frame origin.
-
-    Returned as (moment, force).
-    """
-    found = _tree(model, seen) | _closures(model, seen)
-    for name, (moment, force) in _contacts(model, seen).items():
-        held = found.get(name, (0.0, 0.0))  # what a clearance joint holds beside its contact
-        found[name] = (held[0] + moment, held[1] + force)
-    found |= _inside_groups(model, seen, bodies, found)
+def joint_wrenches(motions: Motions) -> dict[str, Wrench]:
+    """Wrench of every joint on its second body: moment about that body's frame origin [N m], force [N]."""
+    model, seen = motions.model, motions.seen
+    known = _tree(model, seen) | _closures(model, seen)
+    for c, contact in enumerate(model.contacts):
+        moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds beside its contact
+        push = seen.touch["force"][:, c]
+        known[contact.name] = (moment + np.cross(seen.touch["point"][:, c], push), force + push)
+    known |= _inside_groups(motions, known)
     result = {}
     for name, joint in model.scene.joint.items():
-        moment, force = found[name]
-        result[name] = (moment - np.cross(frames[joint.between[1]], force), force)
+        moment, force = known[name]
+        result[name] = (moment - np.cross(motions.frame_positions[joint.between[1]], force), force)
     return result
 
 
-def path_wrenches(model: Model, seen: dict[str, np.ndarray]) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """For every frame that a drive leads along a path: its name, moment about the kernels' origin, force."""
-    found, drives = _tree(model, seen), model.scene.drive
+    tree, drives = _tree(model, seen), model.scene.drive
     paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
-    return [(frame, *found[edge]) for edge, frame in paths.items() if edge in found]
+    return [(frame, *tree[edge]) for edge, frame in paths.items() if edge in tree]
 
 
-def _tree(model: Model, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
-    found = {}
-    table = seen["link_wrench"].reshape(len(seen["link_wrench"]), -1, 6)
-    for i, link in enumerate(model.mechanism.links):
-        edge = link.branch.edge
-        if edge is not None:
+def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
+    wrenches = {}
+    for i, link in enumerate(model.links):
+        if link.branch.edge is not None:
             sign = -1.0 if link.branch.reverse else 1.0
-            found[edge.name] = (sign * table[:, i, :3], sign * table[:, i, 3:])
-    return found
+            wrenches[link.branch.edge.name] = _wrench(seen.link_wrenches[:, i], sign)
+    return wrenches
 
 
-def _closures(model: Model, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
-    table = seen["closure_wrench"].reshape(len(seen["closure_wrench"]), -1, 6)
-    return {
-        model.mechanism.closures[k][0].name: (table[:, row, :3], table[:, row, 3:])
-        for row, k in enumerate(model.closure_order)
-    }
+def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
+    return {closure.edge.name: _wrench(seen.closure_wrenches[:, c]) for c, closure in enumerate(model.closures)}
 
 
-def _contacts(model: Model, seen: dict[str, np.ndarray]) -> dict[str, Wrench]:
-    touch = seen["touch"].reshape(len(seen["touch"]), -1, m.TOUCH.size)
-    found = {}
-    for c, (name, *_) in enumerate(model.mechanism.contacts):
-        force = touch[:, c, m.TOUCH.force : m.TOUCH.force + 3]
-        found[name] = (np.cross(touch[:, c, m.TOUCH.point : m.TOUCH.point + 3], force), force)
-    return found
+def _wrench(rows: np.ndarray, sign: float = 1.0) -> Wrench:
+    return sign * rows["moment"], sign * rows["force"]
 
 
-def _inside_groups(
-    model: Model, seen: dict[str, np.ndarray], bodies: Mapping[str, Motion], known: Mapping[str, Wrench]
-) -> dict[str, Wrench]:
+def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, Wrench]:
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
-    scene, mechanism = model.scene, model.mechanism
-    found: dict[str, Wrench] = {}
-    for link in mechanism.links:
-        inner = [n for n, j in scene.joint.items() if _is_inside(model, j.between, link.places) and n not in known]
-        demand = {b: _demand(model, seen, b, bodies, known) for b in link.places}
+    model, inside = motions.model, dict[str, Wrench]()
+    for link in model.links:
+        every = model.scene.joint.items()
+        inner = [n for n, j in every if n not in known and _is_inside(model, j.between, link.places)]
+        demand = {b: _demand(motions, b, known) for b in link.places}
         tree = _forest(model, inner, list(link.places))
         for name in inner:
             if name not in tree:
                 # a second path between bodies that are joined already: it carries nothing here
                 zero = np.zeros_like(next(iter(demand.values()))[0])
-                found[name] = (zero, zero)
+                inside[name] = (zero, zero)
                 continue
-            side, sign = _far_side(model, name, tree, list(link.places))
+            side, sign = _far_side(model, name, tree)
             moment, force = (sign * np.sum([demand[b][k] for b in side], axis=0) for k in (0, 1))
-            found[name] = (moment, force)
-    return found
+            inside[name] = (moment, force)
+    return inside
 
 
 def _is_inside(model: Model, between: tuple[str, str], places: Mapping[str, object]) -> bool:
     return all(model.mechanism.frames[f].body in places for f in between)
 
 
-def _demand(
-    model: Model,
-    seen: dict[str, np.ndarray],
-    name: str,
-    bodies: Mapping[str, Motion],
-    known: Mapping[str, Wrench],
-) -> Wrench:
+def _demand(motions: Motions, name: str, known: Mapping[str, Wrench]) -> Wrench:
     """What the fixed joints must supply to a body: its inertia less gravity, loads, paths and all other joints."""
-    scene = model.scene
-    times = len(next(iter(bodies.values())).p)
-    moment, force = np.zeros((times, 3)), np.zeros((times, 3))
-    body = scene.body[name]
+    model, seen = motions.model, motions.seen
+    moment, force = np.zeros((len(seen.state), 3)), np.zeros((len(seen.state), 3))
+    body = model.scene.body[name]
     if isinstance(body, RigidBody):
-        motion = bodies[name]
+        motion = motions.bodies[name]
         J = motion.R @ np.array(body.inertia) @ np.swapaxes(motion.R, 1, 2)
-        force = body.mass * (motion.a - model.arrays.table(m.GRAVITY)["acceleration"][0])
+        force = body.mass * (motion.a - model.gravity)
         spin = np.einsum("tij,tj->ti", J, motion.omega)
         moment = np.einsum("tij,tj->ti", J, motion.alpha) + np.cross(motion.omega, spin) + np.cross(motion.p, force)
     for joint_name, (n, f) in known.items():
@@ -118,7 +95,7 @@ def _demand(
         if name in (a, b):
             sign = 1.0 if name == b else -1.0
             moment, force = moment - sign * n, force - sign * f
-    if scene.forces():
+    if model.loads:
         from pipeline.dynamics.record.loads import on_body
 
         n, f = on_body(model, seen, name)
@@ -155,22 +132,22 @@ def _forest(model: Model, names: list[str], bodies: list[str]) -> list[str]:
     return kept
 
 
-def _far_side(model: Model, name: str, tree: list[str], bodies: list[str]) -> tuple[set[str], float]:
+def _far_side(model: Model, name: str, tree: list[str]) -> tuple[set[str], float]:
     """Bodies on one side of a fixed joint, without the ground; +1 for the second body's side."""
     frames, scene = model.mechanism.frames, model.scene
     a, b = (frames[f].body for f in scene.joint[name].between)
     others = [tuple(frames[f].body for f in scene.joint[n].between) for n in tree if n != name]
 
     def reach(start: str) -> set[str]:
-        found, stack = {start}, [start]
+        reached, stack = {start}, [start]
         while stack:
             body = stack.pop()
             for x, y in others:
                 for near, far in ((x, y), (y, x)):
-                    if near == body and far not in found:
-                        found.add(far)
+                    if near == body and far not in reached:
+                        reached.add(far)
                         stack.append(far)
-        return found
+        return reached
 
     side = reach(b)
     if any(scene.body[body].type == "ground" for body in side):

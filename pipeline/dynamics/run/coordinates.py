@@ -6,81 +6,60 @@ import numpy as np
 
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.tree import PATH
 
 Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
 
 
-def joint_coordinates(model: Model, seen: dict[str, np.ndarray]) -> dict[str, Series]:
+def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
     """By ``joint`` or, where it has several, ``joint.coordinate``; angles go on beyond half a turn."""
-    found: dict[str, Series] = {}
-    for i, link in enumerate(model.mechanism.links):
-        edge, stage = link.branch.edge, link.stage
-        if edge is None or stage is None or edge.kind == PATH:
+    series: dict[str, Series] = {}
+    for i, link in enumerate(model.links):
+        edge = link.branch.edge
+        if edge is None or link.on_path or not joint_class(edge.kind).COORDINATES:
             continue
-        declared = joint_class(edge.kind).COORDINATES
-        if not declared:
-            continue
-        q, c = model.numbering.q0[i], model.numbering.c0[i]
-        for k, place in enumerate(stage.positions):
-            places = (("coordinate", q + k), ("speed", c + k), ("acceleration", c + k))
-            position, rate, second = (stage.sign * seen[name][:, o] for name, o in places)
-            found[_label(edge.name, declared, place)] = position, rate, second
-    for row, k in enumerate(model.closure_order):
-        edge = model.mechanism.closures[k][0]
-        declared = joint_class(edge.kind).COORDINATES
-        for place, coordinate in enumerate(declared):
-            found[_label(edge.name, declared, place)] = _measured(model, seen, row, coordinate)
-    return {name: found[name] for name in _in_order(model, found)}
+        positions, coordinates = model.numbering.positions[i], model.numbering.coordinates[i]
+        for place, q, c in zip(link.joint.positions, positions, coordinates, strict=True):
+            parts = (seen.positions[:, q], seen.speeds[:, c], seen.accelerations[:, c])
+            position, rate, second = (link.joint.sign * part for part in parts)
+            series[label(edge.name, edge.kind, place)] = position, rate, second
+    closures = model.arrays.table(m.CLOSURES)
+    for row, (edge, *_) in zip(closures, model.closures, strict=True):
+        a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
+        for place, coordinate in enumerate(joint_class(edge.kind).COORDINATES):
+            series[label(edge.name, edge.kind, place)] = _measured(a, b, coordinate)
+    return {name: series[name] for name in _names(model.scene) if name in series}
 
 
-def label(scene: Scene, joint: str, k: int) -> str:
-    """Name of coordinate k of a joint in records."""
-    return _label(joint, joint_class(scene.joint[joint].type).COORDINATES, k)
-
-
-def _label(joint: str, declared: tuple[Coordinate, ...], k: int) -> str:
+def label(joint: str, kind: str, k: int) -> str:
+    """Name in records of coordinate k of a joint of some type."""
+    declared: tuple[Coordinate, ...] = joint_class(kind).COORDINATES
     return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
-def _in_order(model: Model, found: dict[str, Series]) -> list[str]:
-    """Joints as the scene lists them."""
-    names = [
-        _label(joint, joint_class(part.type).COORDINATES, k)
-        for joint, part in model.scene.joint.items()
-        if joint not in model.scene.contacts()
-        for k in range(len(joint_class(part.type).COORDINATES))
-    ]
-    return [name for name in names if name in found]
+def _names(scene: Scene) -> list[str]:
+    """Coordinates of all joints, as the scene lists them."""
+    kinds = {name: joint.type for name, joint in scene.joint.items() if name not in scene.contacts()}
+    return [label(name, kind, k) for name, kind in kinds.items() for k in range(len(joint_class(kind).COORDINATES))]
 
 
-def _measured(model: Model, seen: dict[str, np.ndarray], row: int, coordinate: Coordinate) -> Series:
-    """Coordinate of a joint that closes a loop, from the frames of its two sites."""
-    sites = seen["site_frame"].reshape(len(seen["site_frame"]), -1, m.FRAME.size)
-    a, b = (sites[:, model.arrays.table(m.CLOSURES)[side][row]] for side in ("site_a", "site_b"))
-    F, G = (x[:, m.FRAME.axes : m.FRAME.axes + 9].reshape(-1, 3, 3) for x in (a, b))
+def _measured(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:
+    """Coordinate of a joint that closes a loop, from the frames of its two sites, named fields over the rows."""
+    F, G = a["axes"], b["axes"]
     along = (G if coordinate.side else F)[:, :, coordinate.axis]
-    omega = a[:, m.FRAME.omega : m.FRAME.omega + 3]
-    turning = b[:, m.FRAME.omega : m.FRAME.omega + 3] - omega
+    omega, turning = a["omega"], b["omega"] - a["omega"]
     if coordinate.turning:
         R = np.einsum("tki,tkj->tij", F, G)
         (i, j), (k, l) = coordinate.sine, coordinate.cosine
         angle = np.unwrap(np.arctan2(R[:, i, j], R[:, k, l]))
-        swing = np.cross((b if coordinate.side else a)[:, m.FRAME.omega : m.FRAME.omega + 3], along)
-        second = b[:, m.FRAME.alpha : m.FRAME.alpha + 3] - a[:, m.FRAME.alpha : m.FRAME.alpha + 3]
-        return angle, _dot(along, turning), _dot(along, second) + _dot(swing, turning)
-    r, v, acceleration = (
-        b[:, o : o + 3] - a[:, o : o + 3] for o in (m.FRAME.origin, m.FRAME.velocity, m.FRAME.acceleration)
-    )
+        swing = np.cross((b if coordinate.side else a)["omega"], along)
+        return angle, _dot(along, turning), _dot(along, b["alpha"] - a["alpha"]) + _dot(swing, turning)
+    r, v, acceleration = (b[name] - a[name] for name in ("origin", "velocity", "acceleration"))
     slide = v - np.cross(omega, r)
-    second = (
-        acceleration
-        - np.cross(a[:, m.FRAME.alpha : m.FRAME.alpha + 3], r)
-        - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
-    )
+    second = acceleration - np.cross(a["alpha"], r) - np.cross(omega, np.cross(omega, r) + 2.0 * slide)
     return _dot(along, r), _dot(along, slide), _dot(along, second)
 
 

@@ -8,6 +8,11 @@ Both runs have one motion if the actuators can supply what the path did: with th
 :math:`v = N z`, :math:`N_P z` those of the path and :math:`N_B z` those of the actuators, every
 generalised force :math:`N_P^T\mu` must be some :math:`N_B^T\tau`, and :math:`\tau` is unique if the
 rows of :math:`N_B` are independent.
+
+Of more actuators than freedoms some, as many as there are freedoms, make the motion alone in a second run, with the
+forces :math:`\tau_S`. With the rates of all :math:`\dot q = T \dot q_S`, any :math:`\tau` with
+:math:`T^T\tau = \tau_S` does too, and :math:`T (T^T T)^{-1} \tau_S` is the least of them. The other actuators then act
+as loads, linear between two outputs, so that joint forces and works are those of this sharing.
 """
 
 from __future__ import annotations
@@ -19,26 +24,27 @@ import xarray as xr
 from scipy.linalg import null_space, qr
 
 from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress
 from pipeline.core.scene.drives import JointDrive, PathDrive
 from pipeline.core.scene.laws import Constant
+from pipeline.core.scene.loads import JointForce
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Piece, Pieces
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.laws import NONE
 from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Model, tabulate
+from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.run.coordinates import joint_coordinates, label
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
-from pipeline.dynamics.run.trajectory import integrate as step
+from pipeline.dynamics.run.engine import Engine, prepare
+from pipeline.dynamics.run.observation import observe
+from pipeline.dynamics.run.start import consistent_start
+from pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: singular values below this share of the largest are zero
 RANK = 1e-8
-
-
-def paths(scene: Scene) -> dict[str, PathDrive]:
-    """Paths that actuators shall produce, by name."""
-    return {n: d for n, d in scene.drive.items() if isinstance(d, PathDrive) and d.actuators is not None}
 
 
 def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, dict[str, Pieces]]:
@@ -46,26 +52,35 @@ def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.
     """
-    wanted = paths(scene)
+    wanted = {n: d for n, d in scene.drive.items() if isinstance(d, PathDrive) and d.actuators is not None}
     names = [a for path in wanted.values() for a in path.actuators or ()]
     _with_drives(scene, wanted, names)  # all of them can be named, before anything is compiled
-    engine = prepare(tabulate(build(scene, bundles)), progress)
-    start, _ = consistent_start(engine)
+    engine, start = _started(scene, bundles, progress)
     engine.evaluate(start, engine.start)
-    chosen = _enough(engine, scene, wanted, names)
-    trajectory = step(engine, start, progress)
-    before, after = observe(engine, trajectory.rows), observe(engine, trajectory.rows, after=True)
-    sides = [joint_coordinates(engine.model, seen) for seen in (before, after)]
+    alone = _enough(engine, scene, wanted, names)
+    trajectory, *sides = _run(engine, start, progress)
+    before, after = (joint_coordinates(engine.model, seen) for seen in sides)
     laws = {}
-    for name in chosen:
-        series = [np.array(side[_full_name(scene, name)]) for side in sides]
-        laws[name] = hermite(trajectory.time, *series)
-    other = _with_drives(scene, wanted, chosen)
-    if len(chosen) == len(names):
-        return other, laws
-    from pipeline.dynamics.run.allocation import share
+    for name in alone:
+        joint, k, _ = _coordinate(scene, name)
+        series = label(joint, scene.joint[joint].type, k)
+        laws[name] = hermite(trajectory.time, np.array(before[series]), np.array(after[series]))
+    other = _with_drives(scene, wanted, alone)
+    return (other, laws) if len(alone) == len(names) else _shared(other, laws, names, bundles, progress)
 
-    return share(other, laws, names, bundles, progress)
+
+def _started(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, laws: Mapping[str, Pieces] = NONE
+) -> tuple[Engine, np.ndarray]:
+    """An engine and its consistent start."""
+    engine = prepare(tabulate(build(scene, bundles), laws), progress)
+    return engine, consistent_start(engine)
+
+
+def _run(engine: Engine, start: np.ndarray, progress: Progress) -> tuple[Trajectory, Observed, Observed]:
+    """A run, and what is observed of it right before and right after each time."""
+    trajectory = integrate(engine, start, progress)
+    return trajectory, observe(engine, trajectory.rows), observe(engine, trajectory.rows, after=True)
 
 
 def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
@@ -81,6 +96,12 @@ def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
     return Pieces(tuple(pieces))
 
 
+def _coordinate(scene: Scene, actuator: str, place: str = "[drive]") -> tuple[str, int, Coordinate]:
+    """Joint of an actuator, ``joint`` or ``joint.coordinate``; number and declaration of its coordinate."""
+    joint, _, coordinate = actuator.partition(".")
+    return coordinate_of(scene, joint, coordinate or None, place)
+
+
 def _with_drives(scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> Scene:
     """The scene with a drive per actuator, called like it; its law is given later."""
     kept = {n: d for n, d in scene.drive.items() if n not in wanted}
@@ -90,36 +111,33 @@ def _with_drives(scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]
             place = f"[drive.{path}.actuators]"
             if name in kept or name in made or name in scene.load:
                 raise InputError(place, f"something called '{name}' acts already", "name each actuator once")
-            joint, _, coordinate = name.partition(".")
-            coordinate_of(scene, joint, coordinate or None, place)
-            made[name] = JointDrive(joint=joint, coordinate=coordinate or None, law=Constant(type="constant"))
-    return renamed(scene, {"drive": {**kept, **made}})
+            joint, _, _ = _coordinate(scene, name, place)
+            made[name] = JointDrive(joint=joint, coordinate=_named(name), law=Constant(type="constant"))
+    return _changed(scene, {"drive": {**kept, **made}})
 
 
-def renamed(scene: Scene, update: dict[str, object]) -> Scene:
+def _named(actuator: str) -> str | None:
+    """The coordinate that an actuator's name gives, if any."""
+    return actuator.partition(".")[2] or None
+
+
+def _changed(scene: Scene, update: dict[str, object]) -> Scene:
     """The scene with other parts, under its own name."""
     changed = scene.model_copy(update=update)
     changed._name, changed._path = scene.name, scene.path
     return changed
 
 
-def _full_name(scene: Scene, actuator: str) -> str:
-    """The actuator's coordinate as records name it."""
-    joint, _, coordinate = actuator.partition(".")
-    _, k, _ = coordinate_of(scene, joint, coordinate or None, "[drive]")
-    return label(scene, joint, k)
-
-
 def _enough(engine: Engine, scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> list[str]:
     """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
-    model = engine.model
-    free = null_space(closure_jacobian(engine), rcond=RANK)
-    known = [k for k, name in enumerate(model.mechanism.drives) if name.partition(".")[0] in wanted]
-    held = [k for k in range(model.numbering.known) if k not in known]
+    nv, drives = engine.model.nv, engine.model.drives
+    free = null_space(_closure_jacobian(engine), rcond=RANK)
+    known = [k for k, name in enumerate(drives) if name.partition(".")[0] in wanted]
+    held = [k for k in range(len(drives)) if k not in known]
     if held:  # other drives go on as they do
-        free = free @ null_space(free[[model.numbering.nv + k for k in held]], rcond=RANK)
-    of_path = free[[model.numbering.nv + k for k in known]]
-    of_actuators = np.array([rate(engine, scene, name) @ free for name in names])
+        free = free @ null_space(free[[nv + k for k in held]], rcond=RANK)
+    of_path = free[[nv + k for k in known]]
+    of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])
     place = f"[drive.{next(iter(wanted))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
     if both > rank:
@@ -145,55 +163,93 @@ def _rank(matrix: np.ndarray) -> int:
     return int(np.sum(values > RANK * max(values.max(initial=0.0), 1e-300)))
 
 
-def closure_jacobian(engine: Engine) -> np.ndarray:
+def _closure_jacobian(engine: Engine) -> np.ndarray:
     """Rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
-    model = engine.model
-    arrays, nv = model.arrays, model.numbering.nv
-    n_rows = arrays.size(m.N_CLOSURE_ROWS)
-    rows, columns = engine.view(m.ROWS.place, 6 * n_rows).reshape(-1, 6), _columns(engine)
-    J = np.zeros((n_rows, nv + model.numbering.known))
-    closures, entries, support = (arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
+    model, columns = engine.model, _columns(engine)
+    rows = engine.view(m.ROWS.place).reshape(-1, m.ROWS.size)
+    J = np.zeros((len(rows), model.nv + len(model.drives)))
+    closures, entries, support = (model.arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
     for c in closures:
         mine = slice(c["row0"], c["row0"] + c["n_rows"])
         for slot, col, sign in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
             J[mine, support["coordinate"][c["support0"] + slot]] += sign * rows[mine] @ columns[col]
-    for c, d, col, sign in arrays.table(m.KNOWN_ENTRIES):
+    for c, d, col, sign in model.arrays.table(m.KNOWN_ENTRIES):
         mine = slice(closures["row0"][c], closures["row0"][c] + closures["n_rows"][c])
-        J[mine, nv + d] += sign * rows[mine] @ columns[col]
+        J[mine, model.nv + d] += sign * rows[mine] @ columns[col]
     return J
 
 
 def _columns(engine: Engine) -> np.ndarray:
-    return engine.view(m.COLUMNS.place, 6 * engine.model.numbering.columns).reshape(-1, 6)
+    """Twists of all columns after an evaluation, shape (columns, 6)."""
+    return engine.view(m.COLUMNS.place).reshape(-1, m.COLUMNS.size)
 
 
-def rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
-    """Rate of an actuator's coordinate per speed of the system."""
-    model = engine.model
-    joint, _, name = actuator.partition(".")
-    _, k, coordinate = coordinate_of(scene, joint, name or None, "[drive]")
-    row = np.zeros(model.numbering.nv + model.numbering.known)
-    for i, link in enumerate(model.mechanism.links):
-        edge, stage = link.branch.edge, link.stage
-        if edge is not None and stage is not None and edge.name == joint and k in stage.positions:
-            row[model.numbering.c0[i] + stage.positions.index(k)] = stage.sign
-            return row
-    number = [e.name for e, _, _ in model.mechanism.closures].index(joint)
-    a, b = model.arrays.table(m.CLOSURES)[
-        list(model.closure_order).index(number), [m.CLOSURES.site_a, m.CLOSURES.site_b]
-    ]
-    wrench = _unit_wrench(model, engine, int(a), int(b), coordinate)
+def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
+    """Rate of an actuator's coordinate per speed of the mechanism, free ones first, then prescribed."""
+    model, (joint, k, coordinate) = engine.model, _coordinate(scene, actuator)
+    rates = np.zeros(model.nv + len(model.drives))
+    for i, link in enumerate(model.links):
+        if link.branch.edge is not None and link.branch.edge.name == joint and k in link.joint.positions:
+            rates[model.numbering.coordinates[i][link.joint.positions.index(k)]] = link.joint.sign
+            return rates
+    row = model.arrays.table(m.CLOSURES)[[closure.edge.name for closure in model.closures].index(joint)]
+    a, b = int(row["site_a"]), int(row["site_b"])
+    wrench, columns = _unit_wrench(engine.table(m.SITE_FRAMES), a, b, coordinate), _columns(engine)
     for site, sign in ((b, 1.0), (a, -1.0)):
-        for c, col in model.numbering.route(int(site)):
-            row[c] += sign * wrench @ _columns(engine)[col]
-    return row
+        for c, col in model.numbering.route(site):
+            rates[c] += sign * wrench @ columns[col]
+    return rates
 
 
-def _unit_wrench(model: Model, engine: Engine, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
+def _unit_wrench(sites: np.ndarray, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
     """Moment about the kernels' origin and force of a unit force along a coordinate, shape (6,)."""
-    sites = engine.view(m.SITE_FRAMES.place, m.FRAME.size * model.arrays.size(m.N_SITES)).reshape(-1, m.FRAME.size)
-    axes = sites[b if coordinate.side else a, m.FRAME.axes : m.FRAME.axes + 9].reshape(3, 3)
-    along = axes[:, coordinate.axis]
+    along = sites["axes"][b if coordinate.side else a][:, coordinate.axis]
     if coordinate.turning:
         return np.concatenate([along, np.zeros(3)])
-    return np.concatenate([np.cross(sites[b, m.FRAME.origin : m.FRAME.origin + 3], along), along])
+    return np.concatenate([np.cross(sites["origin"][b], along), along])
+
+
+def _shared(
+    scene: Scene, laws: dict[str, Pieces], names: list[str], bundles: Mapping[str, xr.Dataset], progress: Progress
+) -> tuple[Scene, dict[str, Pieces]]:
+    """The scene in which the actuators without a law act as loads, and the laws of all.
+
+    laws: motion of the actuators that make the scene's motion alone.
+    """
+    engine, start = _started(scene, bundles, progress, laws)
+    trajectory, *sides = _run(engine, start, progress)
+    before, after = (_least(engine, scene, trajectory.time, seen, names, list(laws)) for seen in sides)
+    loads, shared = {}, dict(laws)
+    for k, name in enumerate(names):
+        if name in laws:
+            continue
+        force = Constant(type="constant")
+        joint, _, _ = _coordinate(scene, name)
+        loads[name] = JointForce(type="joint-force", joint=joint, coordinate=_named(name), force=force)
+        shared[f"load.{name}"] = _linear(trajectory.time, before[:, k], after[:, k])
+    return _changed(scene, {"load": {**scene.load, **loads}}), shared
+
+
+def _least(
+    engine: Engine, scene: Scene, time: np.ndarray, seen: Observed, names: list[str], alone: list[str]
+) -> np.ndarray:
+    """Forces of all actuators at every time, shape (times, actuators); alone: those that make the motion."""
+    model = engine.model
+    made = [model.drives.index(name) for name in alone]
+    forces = seen.drive_force[:, made] * model.drive_signs[made]
+    own = [names.index(name) for name in alone]
+    least = []
+    for t, state, force in zip(time, seen.state, forces, strict=True):
+        engine.select_pieces(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
+        engine.evaluate(state, float(t))
+        free = null_space(_closure_jacobian(engine), rcond=RANK)
+        rates = np.array([_rate(engine, scene, name) @ free for name in names])
+        T = rates @ np.linalg.pinv(rates[own], rcond=RANK)
+        least.append(T @ np.linalg.solve(T.T @ T, force))
+    return np.array(least)
+
+
+def _linear(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
+    """Straight lines from the value right of each time to the value left of the next."""
+    slopes = (before[1:] - after[:-1]) / np.diff(time)
+    return Pieces(tuple(Piece(float(t), (float(x), float(s))) for t, x, s in zip(time, after, slopes, strict=False)))

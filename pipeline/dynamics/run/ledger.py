@@ -8,10 +8,10 @@ from pipeline.core.errors import SolverError
 from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.scene.solver import Solver
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run.trajectory import Trajectory
 
-Seen = dict[str, np.ndarray]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance
 ROUNDING = 1e-12
@@ -22,22 +22,19 @@ ROUNDING = 1e-12
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 1.0
 
 
-def series(model: Model, seen: Seen) -> Variables:
+def series(model: Model, seen: Observed) -> Variables:
     """The variables of the ledger, total and by cause."""
-    ledger = seen["state"][:, model.numbering.nq + model.numbering.nv :]
-    kinetic, potential, elastic = seen["energy"].T
-    contacts = len(model.mechanism.contacts)
-    touch = seen["touch"].reshape(len(ledger), contacts, m.TOUCH.size)
-    slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.PER_CONTACT * contacts].reshape(
-        len(ledger), contacts, m.PER_CONTACT
-    )
+    ledger = seen.state[:, model.speeds.stop :]
+    kinetic, potential, elastic = (seen.energy[name] for name in ("kinetic", "potential", "elastic"))
+    slots = ledger[:, m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(model.contacts)]
+    lost = m.named(m.CONTACT_LEDGER, slots)
     # friction's slot is its work; what bent bristles still hold of it is not lost
-    damping, friction = slots[..., m.DAMPING_LOSS], slots[..., m.FRICTION_LOSS] - touch[..., m.TOUCH.bent]
+    damping, friction = lost["damping"], lost["friction"] - seen.touch["bent"]
     work, modal = ledger[:, m.DRIVE_WORK], ledger[:, m.MODAL_LOSS]
     dissipated = modal + damping.sum(axis=1) + friction.sum(axis=1)
     balance = kinetic + potential + elastic + dissipated - work
     loaded: Variables = {}
-    if model.scene.forces():
+    if model.loads:
         load_work, load_loss = ledger[:, model.arrays.size(m.LOAD_SLOT) :].T[:2]
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
@@ -48,15 +45,15 @@ def series(model: Model, seen: Seen) -> Variables:
         "dissipated": (("time",), dissipated),
         "drive_work": (("time",), work),
         "energy_error": (("time",), balance - balance[0]),
-        "constraint_error": (("time",), seen["residual"][:, 0]),
+        "constraint_error": (("time",), seen.residual),
         **loaded,
     }
-    if model.numbering.modes:
+    if model.numbering.flexible:
         variables["modal_damping_loss"] = (("time",), modal)
-    if contacts:
-        variables["contact_elastic"] = (("time", "contact"), touch[..., m.TOUCH.stored] + touch[..., m.TOUCH.bent])
+    if model.contacts:
+        variables["contact_elastic"] = (("time", "contact"), seen.touch["stored"] + seen.touch["bent"])
         variables["contact_damping_loss"] = (("time", "contact"), damping)
-        variables["contact_impulse"] = (("time", "contact"), slots[..., m.IMPULSE])
+        variables["contact_impulse"] = (("time", "contact"), lost["impulse"])
         variables["contact_friction_loss"] = (("time", "contact"), friction)
     return variables
 
@@ -70,14 +67,14 @@ def usual(solver: Solver) -> float:
     return max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
 
 
-def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
+def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """SolverError when the ledger is off by more than the scene's tolerance times the energy turned over."""
-    ledger = {name: values for name, (_, values) in series(model, seen).items()}
-    error = np.abs(ledger["energy_error"])
-    turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in ledger]
-    turned = max(float(np.ptp(ledger[n])) for n in turning)
-    turned = max(turned, float(ledger["kinetic"].max()))
-    largest = max(float(np.abs(ledger[n]).max()) for n in turning)
+    totals = {name: values for name, (_, values) in series(model, seen).items()}
+    error = np.abs(totals["energy_error"])
+    turning = [n for n in ("kinetic", "potential", "elastic", "dissipated", "drive_work", "load_work") if n in totals]
+    turned = max(float(np.ptp(totals[n])) for n in turning)
+    turned = max(turned, float(totals["kinetic"].max()))
+    largest = max(float(np.abs(totals[n]).max()) for n in turning)
     solver = model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
     worst = int(np.argmax(error)) if np.isfinite(error).all() else int(np.argmin(np.isfinite(error)))
@@ -87,18 +84,18 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Seen) -> None:
     raise SolverError(
         f"at t = {trajectory.time[first]:.6g} s: the ledger of energy does not close: it is off by up to "
         f"{error[worst]:.3g} J where {turned:.3g} J are turned over (tolerance {tolerance:g}, "
-        f"[solver.ledger_tolerance]); lost so far: {_losses(model, ledger, first)}; "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(model, totals, first)}; "
         "a smaller rtol or step is the remedy, or the scene is beyond this integrator"
     )
 
 
-def _losses(model: Model, ledger: dict[str, np.ndarray], k: int) -> str:
+def _losses(model: Model, totals: dict[str, np.ndarray], k: int) -> str:
     parts = []
-    for c, (name, *_) in enumerate(model.mechanism.contacts):
+    for c, (name, *_) in enumerate(model.contacts):
         for cause in ("damping", "friction"):
-            parts.append(f"{ledger[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
-    if "modal_damping_loss" in ledger:
-        parts.append(f"{ledger['modal_damping_loss'][k]:.3g} J to modal damping")
-    if "load_loss" in ledger:
-        parts.append(f"{ledger['load_loss'][k]:.3g} J to the loads")
+            parts.append(f"{totals[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
+    if "modal_damping_loss" in totals:
+        parts.append(f"{totals['modal_damping_loss'][k]:.3g} J to modal damping")
+    if "load_loss" in totals:
+        parts.append(f"{totals['load_loss'][k]:.3g} J to the loads")
     return ", ".join(parts) or "nothing"

@@ -17,17 +17,16 @@ OFTEN = 0.05
 
 def text(engine: Engine) -> str:
     """When and why the stepper stopped, in words."""
-    control, n = engine.control, engine.n
+    control, n, contacts = engine.control, engine.n, engine.model.contacts
     where = singular.diagnosis(engine)
-    contacts = [name for name, *_ in engine.model.mechanism.contacts]
-    culprit = contacts[n[m.CULPRIT]] if contacts else ""
+    culprit = contacts[n[m.CULPRIT]].name if contacts else ""
     fixed = f"{control['fixed']:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control["fixed"] else ""
     unsolvable = (
         f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
     unsolvable += _other_integrator(engine)
-    if not engine.model.mechanism.closures:
+    if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
     reasons = {
         m.CAP_REACHED: f"the limit of {n[m.CAP]} evaluations is used up ([solver.evaluations]); "

@@ -1,4 +1,4 @@
-"""One run from scene to observed rows."""
+"""One run from scene to observed rows; where an explicit method would crawl, an implicit one takes over."""
 
 from __future__ import annotations
 
@@ -11,16 +11,23 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core.errors import SolverError
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.core.progress import Progress
+from pipeline.core.scene.drives import PathDrive
+from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.equations import observation
+from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.run.beside import beside
-from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
+from pipeline.dynamics.model.model import Model, tabulate
+from pipeline.dynamics.run import trajectory as stepping
+from pipeline.dynamics.run.engine import Engine, prepare
 from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.switching import follow, implicit
-from pipeline.dynamics.run.trajectory import Trajectory
+from pipeline.dynamics.run.observation import beside, observe_flat
+from pipeline.dynamics.run.start import consistent_start
+from pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
     from pipeline.dynamics.run.sensitivity import Twin
@@ -31,7 +38,6 @@ class Run:
     """A finished integration.
 
     scene: as the user gave it; the engine may hold another, made for it.
-    start_residual: loops' residual as the scene gives its start [m].
     twin: the run's twin, of scenes with contacts.
     switched: from when on and why an implicit integrator took the place of the scene's; empty when none did.
     """
@@ -39,10 +45,14 @@ class Run:
     scene: Scene
     engine: Engine
     trajectory: Trajectory
-    observed: dict[str, np.ndarray]
-    start_residual: float
-    twin: Twin | None
+    observed: Observed
+    twin: Twin | None = None
     switched: str = ""
+
+    @property
+    def model(self) -> Model:
+        """What was run."""
+        return self.engine.model
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
@@ -50,60 +60,84 @@ def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     return prepare(tabulate(build(scene, bundles)), progress)
 
 
-def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, Callable[[], Engine]]:
-    """The engine of a run, its actuators driven as their paths demand, and the maker of one with an implicit method."""
-    driven, given = scene, dict[str, Pieces]()
-    if any(getattr(drive, "actuators", None) for drive in scene.drive.values()):
-        from pipeline.dynamics.run.inverse import actuated
+def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
+    """The scene with actuators driven as the paths that they shall produce demand, and the laws of their motion."""
+    if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
+        return scene, {}
+    from pipeline.dynamics.run.inverse import actuated
 
-        driven, given = actuated(scene, bundles, progress)
+    return actuated(scene, bundles, progress)
+
+
+def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, Callable[[], Engine]]:
+    """The engine of a run, and the maker of one that goes on with the implicit method that takes over."""
+    moved, given = driven(scene, bundles, progress)
 
     def made(wanted: Scene) -> Engine:
         return prepare(tabulate(build(wanted, bundles), given), progress)
 
-    return made(driven), cache(lambda: made(implicit(driven)))
+    heir = INTEGRATORS[scene.solver.integrator].hands_over_to
+    return made(moved), cache(lambda: made(edited(moved, {"solver.integrator": heir})))
 
 
 def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
-    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands."""
+    """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
+
+    bundles: reduced flexible bodies by name.  Raises InputError for a scene that cannot be built, SolverError when the
+    run cannot go on.
+    """
     engine, other = engines(scene, bundles, progress)
-    start, residual = consistent_start(engine)
+    start = consistent_start(engine)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, residual, _twin(engine, start, trajectory), switched)
+    return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched)
+
+
+def follow(
+    engine: Engine, y: np.ndarray, progress: Progress, other: Callable[[], Engine]
+) -> tuple[Engine, Trajectory, str]:
+    """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
+
+    other: gives the engine that takes over, asked only when it is needed.
+    """
+    try:
+        return engine, stepping.integrate(engine, y, progress), ""
+    except StiffError as stiff:
+        progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
+        second = other()
+        return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
-    if not engine.model.mechanism.contacts:
+    if not engine.model.contacts:
         return None
     from pipeline.dynamics.run.sensitivity import twin
 
     return twin(engine, start, trajectory)
 
 
-def observed(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """The observed rows of a trajectory; SolverError where one of them could not be evaluated."""
-    seen = _observed_rows(engine, trajectory)
-    bad = np.flatnonzero(seen["status"][:, 0])
+def observed(engine: Engine, trajectory: Trajectory) -> Observed:
+    """The observed rows of a trajectory, each with the closure rows that were solved for when it was made.
+
+    Raises SolverError where one of them could not be evaluated.
+    """
+    size, parts = engine.model.arrays.size, []
+    for part, kept in trajectory.parts():
+        engine.keep(kept)
+        out = observe_flat(engine, trajectory.rows[part])
+        blurred = observation.by_name(out, size).status == m.SINGULAR
+        if engine.mobility.singular_start and part.start == 0:
+            blurred[0] = True  # rows of the closures that vanish there had no size before to be compared with
+        for k in np.flatnonzero(blurred):
+            limit = beside(engine, trajectory.rows[part][k])
+            if limit is not None:
+                out[k] = limit
+        parts.append(out)
+    seen = observation.by_name(np.concatenate(parts), size)
+    bad = np.flatnonzero(seen.status)
     if len(bad):
         raise SolverError(
             f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
         )
     return seen
-
-
-def _observed_rows(engine: Engine, trajectory: Trajectory) -> dict[str, np.ndarray]:
-    """Every row with the closure rows that were solved for when it was made."""
-    parts = []
-    for part, kept in trajectory.parts():
-        engine.keep(kept)
-        seen = observe(engine, trajectory.rows[part])
-        blurred = seen["status"][:, 0] == m.SINGULAR
-        if engine.mobility.singular_start and part.start == 0:
-            blurred[0] = True  # rows of the closures that vanish there had no size before to be compared with
-        for k in np.flatnonzero(blurred):
-            for name, value in (beside(engine, trajectory.rows[part][k]) or {}).items():
-                seen[name][k] = value[0]
-        parts.append(seen)
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}

@@ -12,10 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.core.progress import silent
 from pipeline.core.quantities import PARTED
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.run.engine import Engine, observe
-from pipeline.dynamics.run.perturbation import offset_jacobian, perturbed
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.observation import observe
+from pipeline.dynamics.run.start import project
 from pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
 
 #: the two are compared at every so manieth regular output, which bounds the cost
@@ -39,8 +41,8 @@ class Twin:
 
 def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     """Run the scene again from a start whose balls are offset, and compare the links' velocities."""
-    contacts = len(engine.model.mechanism.contacts)
-    size = max(engine.rtol * engine.model.mechanism.length, SMALLEST)
+    contacts = len(engine.model.contacts)
+    size = max(engine.rtol * engine.model.length, SMALLEST)
     direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
     moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
     time = output_times(engine.breaks, engine.model.scene.output.interval)[::EVERY]
@@ -49,14 +51,14 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
 
     def parted(rows: np.ndarray) -> bool:
         """Whether the twin is already beyond the horizon, where following it further tells nothing."""
-        k = int(np.searchsorted(time, rows[-1, 0], side="right")) - 1
+        k = int(np.searchsorted(time, m.record(rows, contacts).time[-1], side="right")) - 1
         w, n = engine.w.copy(), engine.n.copy()  # the twin's integration goes on with these
         two = _velocities(engine, replace(trajectory, rows=rows), time[[k]])
         engine.w[:], engine.n[:] = w, n
         return bool(np.linalg.norm(one[[k]] - two, axis=2).max() > visible)
 
     try:
-        other = integrate(engine, moved, _quiet, parted)
+        other = integrate(engine, moved, silent, parted)
     except SolverError:
         # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
         return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
@@ -69,9 +71,31 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
 def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.ndarray:
     """Velocities of all links' frames at times that the trajectory has, shape (time, link, 3)."""
     rows = trajectory.rows[np.searchsorted(trajectory.time, time)]
-    frames = observe(engine, rows)["link_frame"].reshape(len(rows), -1, m.FRAME.size)
-    return frames[:, :, m.FRAME.velocity : m.FRAME.velocity + 3]
+    return observe(engine, rows).links["velocity"]
 
 
-def _quiet(share: float | None, text: str) -> None:
-    """The run itself has told its progress."""
+def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
+
+    From the velocities that unit speeds give, so that no step width enters.
+    """
+    engine.select_pieces_after(engine.start)
+    contacts, columns = engine.model.arrays.table(m.CONTACTS), []
+    for k in range(engine.model.nv):
+        moved = y.copy()
+        moved[engine.model.speeds] = np.eye(engine.model.nv)[k]
+        engine.evaluate(project(engine, moved), engine.start)
+        velocity = engine.table(m.SITE_FRAMES)["velocity"]
+        columns.append((velocity[contacts["inner"]] - velocity[contacts["outer"]]).ravel())
+    return np.array(columns).T
+
+
+def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
+    engine.select_pieces_after(engine.start)
+    speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
+    moving, moved, nq = y.copy(), y.copy(), engine.model.nq
+    moving[engine.model.speeds] = speeds
+    # rates per unit time, for one unit: a displacement of 1e-8 m is linear
+    moved[:nq] += engine.evaluate(project(engine, moving), engine.start)[:nq]
+    return project(engine, moved)

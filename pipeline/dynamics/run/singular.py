@@ -9,6 +9,7 @@ import numpy as np
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.mobility import INFINITE
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.numbering import Numbering
 
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1
-#: condition numbers are not told apart from infinity above this
-INFINITE = 1e15
 #: a selection is looked at again when its pivot ratio has fallen to this share of what it was, and replaced when
 #: another is this much better
 WORN, BETTER = 1e-2, 10.0
@@ -38,13 +37,12 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
     scales = selection.row_scales(engine.model, spread, _natural_lengths(engine))
     kept, ratio = selection.choose(spread, scales, engine.mobility.rank)
     engine.keep(kept)
-    engine.view(m.ROW_SCALE, int(kept.sum()))[:] = scales[kept] ** 2
+    engine.view(m.ROW_SCALE)[: kept.sum()] = scales[kept] ** 2
     return ratio
 
 
 def _natural_lengths(engine: Engine) -> np.ndarray:
-    columns = engine.table(m.COLUMNS, engine.model.numbering.columns)
-    points = engine.table(m.SITE_FRAMES, engine.model.arrays.size(m.N_SITES))["origin"]
+    columns, points = engine.table(m.COLUMNS), engine.table(m.SITE_FRAMES)["origin"]
     return selection.natural_lengths(engine.model, columns, points, engine.mass_factor())
 
 
@@ -53,17 +51,16 @@ def improve(engine: Engine, t: float) -> bool:
 
     The state in Y and its slope stay as they are: the motion does not depend on the selection.
     """
-    size, rows = engine.model.arrays.size(m.NY), len(engine.kept)
-    row_scale = engine.view(m.ROW_SCALE, rows).copy()
-    y, slope = engine.view(m.Y, size).copy(), engine.view(m.SLOPES, size).copy()
-    pivots, before = engine.view(m.PIVOT, m.PIVOT_SIZE), engine.kept.copy()
+    row_scale = engine.view(m.ROW_SCALE)[: len(engine.kept)].copy()
+    y, slope = engine.view(m.Y).copy(), engine.slope.copy()
+    pivots, before = engine.view(m.PIVOT), engine.kept.copy()
     present = float(pivots[m.LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
     better = ratio > BETTER * present and not np.array_equal(before, engine.kept)
     if not better:
         engine.keep(before)
-        engine.view(m.ROW_SCALE, rows)[:] = row_scale
-    engine.view(m.Y, size)[:], engine.view(m.SLOPES, size)[:] = y, slope
+        engine.view(m.ROW_SCALE)[: len(row_scale)] = row_scale
+    engine.view(m.Y)[:], engine.slope[:] = y, slope
     pivots[m.LAST_PIVOT] = ratio if better else present
     pivots[m.WANTED_PIVOT] = WORN * ratio if better else WORN * present
     return better
@@ -78,7 +75,7 @@ def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
 def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """The same with lengths in units of the mechanism's size, and modes with the root of their body's mass besides."""
     along = built_rows(model, h) == 0
-    return J * np.where(along, 1.0 / model.mechanism.length, 1.0)[:, None] * model.speed_scales
+    return J * np.where(along, 1.0 / model.length, 1.0)[:, None] * model.speed_scales
 
 
 def built_rows(model: Model, h: np.ndarray) -> np.ndarray:
@@ -94,15 +91,15 @@ def coordinate_scales(numbering: Numbering) -> np.ndarray:
     """One radian, `SCALE`, or `SCALE` times the root of a kilogram, per free coordinate."""
     scales = np.full(numbering.nv, SCALE)
     for i, link in enumerate(numbering.mechanism.links):
-        if i and numbering.driven(i) < 0:
+        if i and not link.drives:
             for k, letter in enumerate(joint_class(link.kind).SPEEDS):
-                scales[numbering.c0[i] + k] = 1.0 if letter == "r" else SCALE
+                scales[numbering.coordinates[i][k]] = 1.0 if letter == "r" else SCALE
     return scales
 
 
 def diagnosis(engine: Engine) -> str:
     """Condition number at the last evaluated state, and the joint whose closure is nearest to dependent."""
-    if not engine.model.mechanism.closures:
+    if not engine.model.closures:
         return "no loop is closed"
     J = scaled(engine.model, engine.h, engine.rows(m.JACOBIAN))
     if not J.size:

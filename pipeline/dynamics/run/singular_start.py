@@ -16,7 +16,8 @@ from numpy.polynomial import chebyshev
 from pipeline.core.errors import SolverError
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.engine import Engine, observe
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.observation import observe
 
 #: points of the polynomial: the zero of its first gap is the singular pose
 POINTS = 8
@@ -63,10 +64,10 @@ def depart(engine: Engine, y0: np.ndarray) -> Departure:
 
     y0: with all loops closed.
     """
-    nq, nv = engine.model.numbering.nq, engine.model.numbering.nv
+    nq, nv = engine.model.nq, engine.model.nv
     engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
     engine.attempt(y0, engine.start)
-    slope = engine.view(m.SLOPES, len(y0)).copy()
+    slope = engine.slope.copy()
     slope[nq:] = 0.0
     floors = engine.model.arrays.table(m.FLOORS)["magnitude"][engine.model.arrays.table(m.GROUPS)["group"]]
     fastest = float(np.max(np.abs(slope[:nq] / floors[:nq]), initial=0.0))
@@ -86,7 +87,7 @@ def _along(engine: Engine, y0: np.ndarray, slope: np.ndarray, span: float, size:
 
     size: of positions and speeds, that what is left is compared with.
     """
-    nq, n = engine.model.numbering.nq, len(size)
+    nq, n = engine.model.nq, len(size)
     start, weights, used = y0.copy(), span * _integrals(NODES), 0
     states = y0 + span * NODES[:, None] * slope
     singular.select_rows(engine, states[-1], engine.start + span)
@@ -113,11 +114,11 @@ def _closed(engine: Engine, states: np.ndarray, span: float) -> tuple[np.ndarray
     """States at the nodes with their loops closed, and the slopes there; None where that cannot be."""
     times = engine.start + span * NODES
     seen = observe(engine, np.column_stack([times, states]))
-    if np.any(seen["status"]):
+    if np.any(seen.status):
         return None
-    closed, slopes = seen["state"], np.zeros_like(states)
+    closed, slopes = seen.state, np.zeros_like(states)
     for line, y, t in zip(slopes, closed, times, strict=True):
         if not engine.attempt(y, float(t)):
             return None
-        line[:] = engine.view(m.SLOPES, len(y))
+        line[:] = engine.slope
     return closed, slopes

@@ -1,4 +1,4 @@
-"""From a consistent start to the end, in segments between drive breaks."""
+"""From a consistent start to the end, in segments between breaks of the laws; one method may hand over to another."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.core.errors import SolverError
+from pipeline.core.progress import Progress
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import refusal, singular
-from pipeline.dynamics.run.engine import Engine, Progress, overlapping
-from pipeline.dynamics.run.handover import Handover, StiffError, hand_over, take_over
+from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.singular_start import depart
+from pipeline.dynamics.run.start import overlapping
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -22,8 +23,11 @@ EVENT_ROWS = 4096
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
+#: control floats of a method that another one goes on with
+LASTING = ("time", "drift", "rate_drift", "steepest")
 
-
+#: closure rows solved for, each from a time on [s]
+Selections = tuple[tuple[float, np.ndarray], ...]
 Stop = Callable[[np.ndarray], bool]
 
 
@@ -34,17 +38,18 @@ def never(rows: np.ndarray) -> bool:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left. rows: time, modes, impact rates, state; events: columns of `state`, by time.
+    """What the stepper left. rows: of the record (see `memory.record`); events: of the event table, by time.
 
-    selections: closure rows solved for, each from a time on.
+    contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
     """
 
     rows: np.ndarray
     events: np.ndarray
+    contacts: int
     counters: dict[str, int]
-    selections: tuple[tuple[float, np.ndarray], ...]
+    selections: Selections
     drift: float = 0.0
     rate_drift: float = 0.0
     steepest: float = 0.0
@@ -52,7 +57,12 @@ class Trajectory:
     @property
     def time(self) -> np.ndarray:
         """Times of the rows [s], strictly increasing."""
-        return self.rows[:, 0]
+        return m.record(self.rows, self.contacts).time
+
+    @property
+    def state(self) -> np.ndarray:
+        """States, shape (rows, NY)."""
+        return m.record(self.rows, self.contacts).state
 
     def parts(self) -> list[tuple[slice, np.ndarray]]:
         """Stretches of rows, each with the closure rows that were solved for to reach them."""
@@ -67,12 +77,42 @@ class Trajectory:
         return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
 
 
-@dataclass
-class _Run:
-    """The arrays of one integration; the record may be replaced by a larger one."""
+@dataclass(frozen=True)
+class Handover:
+    """What the next method must know, copied, at the end of the last accepted step.
 
-    w: np.ndarray
-    n: np.ndarray
+    y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
+    lasting: control floats LASTING by name.  rows, events: what was recorded.  selections: as of a trajectory.
+    """
+
+    y: np.ndarray
+    modes: np.ndarray
+    latched: np.ndarray
+    watched: np.ndarray
+    counters: np.ndarray
+    lasting: dict[str, float]
+    rows: np.ndarray
+    events: np.ndarray
+    selections: Selections
+
+    @property
+    def time(self) -> float:
+        """Where the next method begins [s]."""
+        return self.lasting["time"]
+
+
+class StiffError(SolverError):
+    """An explicit method crawls along at the limit of its stability; an implicit one may go on in long steps."""
+
+    def __init__(self, text: str, handover: Handover) -> None:
+        super().__init__(text)
+        self.handover = handover
+
+
+@dataclass
+class _Tape:
+    """The arrays of one integration; rows and events may be replaced by larger ones."""
+
     outputs: np.ndarray
     rows: np.ndarray
     events: np.ndarray
@@ -96,133 +136,133 @@ def integrate(
     stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is gone on with from there.
     """
-    run = _begin(engine, y) if left is None else _resume(engine, left)
+    tape = _begin(engine, y) if left is None else _resume(engine, left)
     if left is None and engine.mobility.singular_start:
-        _depart(engine, run)
+        _depart(engine, tape)
     control = engine.control
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control["time"]:
             continue
         engine.select_pieces(0.5 * (a + b))
-        control["end"], run.n[m.FRESH] = b, 1
-        if _segment(engine, run, progress, stop):
+        control["end"], engine.n[m.FRESH] = b, 1
+        if _segment(engine, tape, progress, stop):
             break
-    return _collect(run, control)
+    return _collect(engine, tape)
 
 
-def _begin(engine: Engine, y: np.ndarray) -> _Run:
-    run = _prepare(engine, y, engine.start)
-    run.rows[0, 0], run.rows[0, 1 + 2 * engine.model.arrays.size(m.N_CONTACTS) :] = engine.start, y
-    run.n[m.N_RECORDED], run.n[m.NEXT_OUTPUT] = 1, 1
-    _begin_closed(engine, y, run.rows[0], run.events)
-    return run
+def _begin(engine: Engine, y: np.ndarray) -> _Tape:
+    """A tape with its first row, and contacts that are closed at the start."""
+    tape = _prepare(engine, y, engine.start)
+    first = m.record(tape.rows[:1], len(engine.model.contacts))
+    first.time[:], first.state[:] = engine.start, y
+    engine.n[m.N_RECORDED], engine.n[m.NEXT_OUTPUT] = 1, 1
+    if engine.model.contacts:
+        _begin_closed(engine, y, tape.events)
+        first.modes[:], first.latched[:] = engine.modes, engine.latched
+    return tape
 
 
-def _resume(engine: Engine, left: Handover) -> _Run:
-    run = _prepare(engine, left.y, left.time)
-    take_over(engine, left)
-    run.rows, run.events = np.concatenate([left.rows, run.rows]), np.concatenate([left.events, run.events])
+def _resume(engine: Engine, left: Handover) -> _Tape:
+    """A tape with what another method has recorded; the engine as that method left it."""
+    tape, n = _prepare(engine, left.y, left.time), engine.n
+    cap = n[m.CAP]
+    n[m.STATUS : m.INTEGERS] = left.counters
+    n[m.CAP] = cap
+    engine.modes[:] = left.modes
+    engine.view(m.Y)[:], engine.latched[:], engine.view(m.WATCH.place)[:] = left.y, left.latched, left.watched
+    for name, value in left.lasting.items():
+        engine.control[name] = value
+    tape.rows, tape.events = np.concatenate([left.rows, tape.rows]), np.concatenate([left.events, tape.events])
     same = np.array_equal(left.selections[-1][1], engine.kept)
-    run.selections = [*left.selections, *([] if same else run.selections)]
-    return run
+    tape.selections = [*left.selections, *([] if same else tape.selections)]
+    return tape
 
 
-def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Run:
-    """Work space and record of an integration from state y at time t, nothing recorded yet."""
-    model, n = engine.model, engine.n
-    scene, contacts = model.scene, model.arrays.size(m.N_CONTACTS)
-    control = engine.control
+def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Tape:
+    """Work space and tape of an integration from state y at time t, nothing recorded yet."""
+    model, n, control = engine.model, engine.n, engine.control
+    solver, contacts = model.scene.solver, len(model.contacts)
     engine.select_pieces_after(t)
-    engine.view(m.CONTROL.place, m.CONTROL.size)[:] = 0.0
+    engine.view(m.CONTROL.place)[:] = 0.0
     control["time"], control["span"] = t, engine.end - engine.start
-    control["rtol"], control["length"] = engine.rtol, model.mechanism.length
-    control["fixed"], control["parameter"] = scene.solver.step or 0.0, engine.method.parameter(scene.solver)
+    control["rtol"], control["length"] = engine.rtol, model.length
+    control["fixed"], control["parameter"] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0
-    n[n[m.MODE] :] = 0
-    n[m.CAP] = scene.solver.evaluations
-    engine.view(m.Y, len(y))[:] = y
-    engine.view(m.LATCHED, contacts)[:] = 0.0
-    outputs = output_times(engine.breaks, scene.output.interval)
+    n[m.CAP] = solver.evaluations
+    engine.modes[:], engine.latched[:] = 0, 0.0
+    outputs = output_times(engine.breaks, model.scene.output.interval)
     room = EVENT_ROWS if contacts else m.ROOM
-    rows = np.zeros((len(outputs) + room + m.ROOM, 1 + 2 * contacts + len(y)))
-    ratio = singular.select_rows(engine, y, t)
-    engine.view(m.Y, len(y))[:] = y
-    engine.view(m.PIVOT, m.PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    rows = m.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
-    return _Run(engine.w, n, outputs, rows, events, [(t, engine.kept.copy())])
+    return _Tape(outputs, rows, events, [(t, _select(engine, y, t))])
 
 
-def _depart(engine: Engine, run: _Run) -> None:
+def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
+    """Choose the closure rows in a state, from which the integration goes on; a copy of the choice."""
+    ratio = singular.select_rows(engine, y, t)
+    engine.view(m.Y)[:] = y
+    engine.view(m.PIVOT)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    return engine.kept.copy()
+
+
+def _depart(engine: Engine, tape: _Tape) -> None:
     """Lay the way out of a singular start, and choose the closure rows at its end."""
-    n, control, first = run.n, engine.control, 1
-    way = depart(engine, run.rows[0, first:])
-    passed = run.outputs[(run.outputs > engine.start) & (run.outputs < engine.start + way.span)]
+    n, record = engine.n, m.record(tape.rows, len(engine.model.contacts))
+    way = depart(engine, record.state[0])
+    passed = tape.outputs[(tape.outputs > engine.start) & (tape.outputs < engine.start + way.span)]
     times = np.concatenate([[engine.start], passed, [engine.start + way.span]])
-    run.rows[: len(times), 0] = times
-    run.rows[: len(times), first:] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
+    record.time[: len(times)] = times
+    record.state[: len(times)] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
     n[m.N_RECORDED], n[m.NEXT_OUTPUT] = len(times), 1 + len(passed)
     n[m.EVALUATIONS] += way.evaluations
-    control["time"] = times[-1]
-    ratio = singular.select_rows(engine, way.y, float(times[-1]))
-    engine.view(m.Y, len(way.y))[:] = way.y
-    engine.view(m.PIVOT, m.PIVOT_SIZE)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
-    run.selections[:] = [(engine.start, engine.kept.copy())]
+    engine.control["time"] = times[-1]
+    tape.selections[:] = [(engine.start, _select(engine, way.y, float(times[-1])))]
 
 
-def _begin_closed(engine: Engine, y: np.ndarray, row: np.ndarray, events: np.ndarray) -> None:
+def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
     """Contacts that the start already has begin there, at the approach speeds that the scene declares."""
-    contacts = engine.model.mechanism.contacts
-    if not contacts:
-        return
-    n, count = engine.n, len(contacts)
-    modes, latched = n[n[m.MODE] : n[m.MODE] + count], engine.view(m.LATCHED, count)
-    watched = engine.table(m.WATCH, count)
-    engine.view(m.WATCH.place, m.WATCH.size * count)[:] = 0.0
+    n, watched, event = engine.n, engine.table(m.WATCH), m.named(m.EVENT, events)[:, 0]
+    engine.view(m.WATCH.place)[:] = 0.0
     for c in overlapping(engine, y):
-        speed = contacts[c][1].initial_approach_speed
+        speed = engine.model.contacts[c].joint.initial_approach_speed
         if speed is None:
             continue  # a start that differs by a hair from one that touches: it closes at once
-        modes[c], latched[c] = 1, speed
-        event = events[n[m.N_EVENTS]]
-        event[[m.EVENT.time, m.EVENT.contact, m.EVENT.kind]] = engine.start, c, m.CLOSING
-        event[[m.EVENT.speed, m.EVENT.peak_force, m.EVENT.peak_depth]] = speed, 0.0, 0.0
+        engine.modes[c], engine.latched[c] = 1, speed
+        event[n[m.N_EVENTS]] = (c, m.CLOSING, engine.start, speed, 0.0, 0.0, np.nan)
         watched["event_row"][c], watched["trend0"][c] = n[m.N_EVENTS], m.STEEPLY
         n[m.N_EVENTS] += 1
-    row[1 : 1 + count], row[1 + count : 1 + 2 * count] = modes, latched
 
 
-def _segment(engine: Engine, run: _Run, progress: Progress, stop: Stop) -> bool:
+def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> bool:
     """To the end of the segment; True when it was stopped before."""
-    arrays, n = engine.model.arrays, run.n
-    control = engine.control
+    n, control = engine.n, engine.control
     while True:
         n[m.BUDGET] = n[m.EVALUATIONS] + SLICE
-        engine.entry.advance(engine.h, arrays.f, run.w, n, run.outputs, run.rows, run.events)
-        t = control["time"]
+        engine.entry.advance(engine.h, engine.model.arrays.f, engine.w, n, tape.outputs, tape.rows, tape.events)
+        t = float(control["time"])
         progress((t - engine.start) / control["span"], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
         status = n[m.STATUS]
         if status == m.SEGMENT_END:
             return False
         if status == m.FULL:
-            run.rows = np.concatenate([run.rows, np.zeros_like(run.rows)])
-            run.events = np.concatenate([run.events, np.full_like(run.events, np.nan)])
+            tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
+            tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
-            if singular.improve(engine, float(t)):
-                run.selections.append((float(t), engine.kept.copy()))
+            if singular.improve(engine, t):
+                tape.selections.append((t, engine.kept.copy()))
             elif status != m.WORN_ROWS:
                 raise SolverError(refusal.text(engine))
         elif status != m.PAUSED:
             raise SolverError(refusal.text(engine))
-        elif _crawls(engine, run):
-            left = hand_over(engine, run.rows, run.events, run.selections)
-            raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", left)
-        elif stop(run.rows[: n[m.N_RECORDED]]):
+        elif _crawls(engine):
+            raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
+        elif stop(tape.rows[: n[m.N_RECORDED]]):
             return True
 
 
-def _crawls(engine: Engine, run: _Run) -> bool:
+def _crawls(engine: Engine) -> bool:
     """Whether stability limits the steps so much that the run would take far too long."""
-    n, control = run.n, engine.control
+    n, control = engine.n, engine.control
     if not engine.method.traits.hands_over_to or control["fixed"] or n[m.EVALUATIONS] < TRIAL:
         return False
     done = max((control["time"] - engine.start) / control["span"], 1e-12)
@@ -230,10 +270,27 @@ def _crawls(engine: Engine, run: _Run) -> bool:
     return bool(n[m.STIFF_STEPS] > refusal.STIFF_SHARE * n[m.STEPS] and n[m.EVALUATIONS] / done > too_many)
 
 
-def _collect(run: _Run, control: np.void) -> Trajectory:
-    n = run.n
-    rows = run.rows[: n[m.N_RECORDED]]
-    keep = np.append(np.diff(rows[:, 0]) > 0.0, True)  # an event on an output time is one row, the later
+def _hand_over(engine: Engine, tape: _Tape) -> Handover:
+    """What a paused integration leaves to another method."""
+    n = engine.n
+    return Handover(
+        engine.view(m.Y).copy(),
+        engine.modes.copy(),
+        engine.latched.copy(),
+        engine.view(m.WATCH.place).copy(),
+        n[m.STATUS : m.INTEGERS].copy(),
+        {name: float(engine.control[name]) for name in LASTING},
+        tape.rows[: n[m.N_RECORDED]].copy(),
+        tape.events[: n[m.N_EVENTS]].copy(),
+        tuple(tape.selections),
+    )
+
+
+def _collect(engine: Engine, tape: _Tape) -> Trajectory:
+    n, contacts = engine.n, len(engine.model.contacts)
+    rows = tape.rows[: n[m.N_RECORDED]]
+    # an event on an output time is one row, the later
+    keep = np.append(np.diff(m.record(rows, contacts).time) > 0.0, True)
     counters = {
         "evaluations": int(n[m.EVALUATIONS]),
         "steps": int(n[m.STEPS]),
@@ -243,8 +300,8 @@ def _collect(run: _Run, control: np.void) -> Trajectory:
         "projection_evaluations": int(n[m.PROJECTION_EVALUATIONS]),
         "jacobians": int(n[m.JACOBIANS]),
     }
-    events = run.events[: n[m.N_EVENTS]]
+    events = m.named(m.EVENT, tape.events[: n[m.N_EVENTS]])[:, 0]
     # what happens inside a step is noted when the step is done: one contact after the other
-    in_order = events[np.argsort(events[:, m.EVENT.time], kind="stable")]
-    drift, rate_drift, steepest = (float(control[name]) for name in ("drift", "rate_drift", "steepest"))
-    return Trajectory(rows[keep], in_order, counters, tuple(run.selections), drift, rate_drift, steepest)
+    in_order = events[np.argsort(events["time"], kind="stable")]
+    drift, rate_drift, steepest = (float(engine.control[name]) for name in ("drift", "rate_drift", "steepest"))
+    return Trajectory(rows[keep], in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest)

@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from pipeline.core import quantities
+from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.scene.wanted import Quantity
 from pipeline.post.cost.statistics import relative_error
 from pipeline.post.cost.study import Point, horizon_of, relative
@@ -97,7 +98,7 @@ def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: f
     if quantity.kind == "velocity":
         return relative(float(reference.attrs.get("growth", 0.0)) * displacement, size)
     if quantity.kind == "impact_times":
-        speed = reference["event_approach_speed"].values[reference["event_kind"].values == 1]
+        speed = reference["event_approach_speed"].values[reference["event_kind"].values == CLOSING]
         hard = speed[speed > quantities.IMPACT]
         return relative(displacement / float(hard.min()), size) if len(hard) else np.nan
     return np.nan

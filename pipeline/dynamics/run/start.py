@@ -1,0 +1,96 @@
+"""A consistent start: loops closed, speeds projected, contacts that are closed already found."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.scene.drives import PathDrive
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import initial
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.observation import observe
+
+#: surfaces that overlap by less than this share of the clearance touch
+TOUCHING = 1e-9
+
+
+def consistent_start(engine: Engine) -> np.ndarray:
+    """State at the start with its loops closed and the bodies' velocities as given; shape (NY,).
+
+    Raises InputError for a start that joints, drives or surfaces do not allow.
+    """
+    model = engine.model
+    engine.select_pieces_after(engine.start)
+    y = initial.start_state(model)
+    singular.select_rows(engine, y, engine.start)
+    if not engine.mobility.singular_start:
+        y = _closed(engine, y)
+
+    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        _look(engine, state)
+        return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
+
+    y = initial.given_velocities(model, motion, y)
+    if not engine.mobility.singular_start:
+        y = project(engine, y)
+    if model.loads:
+        _look(engine, y)
+        y = initial.start_loads(model, y, engine.table(m.LOAD))
+    _refuse_penetration(engine, y)
+    return y
+
+
+def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """`project` of a start that only the engine can close: with paths, or with flexible bodies."""
+    try:
+        return project(engine, y)
+    except SolverError as error:
+        paths = [name for name, drive in engine.model.scene.drive.items() if isinstance(drive, PathDrive)]
+        place = f"[drive.{paths[0]}]" if paths else "[joint]"
+        what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
+        raise InputError(place, f"the mechanism cannot be assembled: {error}", what) from None
+
+
+def _look(engine: Engine, y: np.ndarray) -> None:
+    """Evaluate at the start what does not take accelerations, which a singular pose does not have."""
+    if engine.mobility.singular_start:
+        engine.attempt(y, engine.start)
+    else:
+        engine.evaluate(y, engine.start)
+
+
+def project(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Y at the start with the loops closed and their rates zero; SolverError when that fails."""
+    rows = m.empty_record(1, len(engine.model.contacts), len(y))
+    start = m.record(rows, len(engine.model.contacts))
+    start.time[:], start.state[:] = engine.start, y
+    seen = observe(engine, rows)
+    if seen.status[0] != m.OK:
+        raise SolverError(
+            f"at t = {engine.start:.6g} s: the loops cannot be closed from the start that the scene gives"
+        )
+    return seen.state[0].copy()
+
+
+def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
+    """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
+    contacts = engine.model.contacts
+    if not contacts:
+        return {}
+    engine.evaluate(y, engine.start)
+    gaps = engine.table(m.TOUCH)["gap"]
+    return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -TOUCHING * joint.clearance}
+
+
+def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
+    for c, depth in overlapping(engine, y).items():
+        name, joint, *_ = engine.model.contacts[c]
+        if joint.initial_approach_speed is None:
+            raise InputError(
+                f"[joint.{name}]",
+                f"its surfaces start {depth:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
+                "move a body, enlarge the clearance, or declare the speed at which this contact began as "
+                "initial_approach_speed",
+            )
