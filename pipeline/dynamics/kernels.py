@@ -57,15 +57,22 @@ class Part(JITCodeLibrary):
         return super()._get_module_for_linking()
 
     def _called(self) -> list[Any]:
-        """Libraries of what it calls, directly or not, each once."""
+        """Libraries of what it calls, directly or not, each once and after all that call it.
+
+        The linker takes only what is referred to already: of a kernel that one caller names in code that never runs, and
+        another one below calls, nothing would be there.
+        """
         found: dict[Any, None] = {}
-        waiting = list(self._linking_libraries)
-        while waiting:
-            library = waiting.pop(0)
-            if library not in found:
+        open_calls = [(library, False) for library in self._linking_libraries]
+        while open_calls:
+            library, below_done = open_calls.pop()
+            if below_done:
                 found[library] = None
-                waiting += library._linking_libraries if isinstance(library, Part) else []
-        return list(found)
+            elif library not in found:
+                open_calls.append((library, True))
+                below = library._linking_libraries if isinstance(library, Part) else []
+                open_calls += [(other, False) for other in below if other not in found]
+        return list(reversed(found))
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)

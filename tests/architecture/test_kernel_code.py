@@ -63,3 +63,24 @@ def test_kernels_serve_several_functions() -> None:
         return middle(x) - low(x)
 
     assert (one(1.0), other(1.0), one(2.0)) == (6.0, 4.0, 10.0)
+
+
+def test_a_kernel_that_one_caller_names_in_vain_is_there_for_another() -> None:
+    """The linker takes what is referred to; code that never runs is gone before."""
+    low, middle, _ = tower()
+
+    @kernel
+    def never(x):
+        return False
+
+    @kernel
+    def high(x):
+        if never(x):
+            return low(x)
+        return middle(x)
+
+    @njit
+    def called(x):
+        return high(x)
+
+    assert called(1.0) == 6.0
