@@ -11,9 +11,10 @@ import xarray as xr
 from scipy.special import ellipj, ellipk
 
 from pipeline import dynamics
+from pipeline.core.scene.load import load_scene
 from pipeline.core.scene.schema import Scene
 from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import run
+from tests.analytic.mechanism_runs import TREE, run
 from tests.properties import movable
 from tests.properties.mechanisms import Table, simulate
 from tests.properties.movable import Mechanism, Random, Setting
@@ -214,3 +215,32 @@ def test_drives_of_a_tiny_loop_reach_their_pose_as_those_of_a_large_one() -> Non
         held = dynamics.frequencies(Scene.model_validate(table), {}, lambda share, text: None, None, {"crank": 0.2})
         found.append(held.frequency.values * np.sqrt(size))
     assert found[1] == pytest.approx(found[0], rel=1e-7)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+@pytest.mark.parametrize("hinge", ["low", "high"])
+def test_either_hinge_of_a_door_supplies_the_torque_of_its_path(hinge: str, size: float) -> None:
+    """Torque = I angle'' + m g' d sin(angle); one coordinate of a corner is prescribed, the other hinge does nothing new.
+
+    size: of all lengths; times are as its root, torques as it.
+    """
+    door, table = Door(), load_scene(TREE / "scenes" / "checks" / "door.toml").model_dump(exclude_none=True)
+    pace = np.sqrt(size)
+    for body in table["body"].values():
+        for frame in body["frames"].values():
+            frame["position"] = [size * x for x in frame.get("position", (0.0, 0.0, 0.0))]
+    table["body"]["door"] |= {
+        "com": [size * x for x in door.arm], "inertia": [0.2 * size**2] * 3,
+        "frames": table["body"]["door"]["frames"] | {"corner": {"position": [0.8 * size, 0.0, 0.0]}},
+    }  # fmt: skip
+    table |= {"time": {"end": 0.2 * pace}, "output": {"interval": 0.01 * pace}, "solver": {"rtol": 1e-10}}
+    law = {"type": "polynomial", "coefficients": [0.8 * size, 0.0, -3.0, -2.0 / pace]}
+    table["drive"] = {"path": {"frame": "door.corner", "position": {"x": law}, "actuators": [hinge]}}
+    dataset = simulate(table)
+    angle = door.start + dataset.joint_position.sel(coordinate=hinge).values
+    second = dataset.joint_acceleration.sel(coordinate=hinge).values
+    known = door.about_axis * size**2 * second + door.mass * door.pull * door.distance * size * np.sin(angle)
+    # quintics through outputs have their values exactly
+    assert dataset.drive_force.sel(drive=hinge).values == pytest.approx(known, rel=0, abs=1e-8 * size)
+    assert np.ptp(angle) > 0.1

@@ -13,6 +13,7 @@ from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.mobility import Mobility, analyse
 from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.model.rates import ZERO, rates
+from pipeline.dynamics.model.selection import choose
 from tests.properties import movable
 from tests.properties.mechanisms import Table
 from tests.properties.movable import Joint, Mechanism, Random, Setting
@@ -201,3 +202,34 @@ def test_a_body_held_at_its_centre_of_mass_has_its_gyration_for_a_size() -> None
         length = build(Scene.model_validate(table), {}).length
         # radius of gyration of 0.04, 0.06, 0.07 per unit of mass and size
         assert length == pytest.approx(size * np.sqrt(0.085), rel=1e-9)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e3])
+def test_poses_that_contradict_a_fixed_joint_are_refused_at_any_size(size: float) -> None:
+    """Two parts of one door, fixed to each other, one of them placed a hundredth of its size off."""
+    random = np.random.default_rng(5)
+    setting = Setting(size, movable.any_turn(random), own_frames=True)
+    table = movable.scene(coaxial(random, ["revolute", "revolute"], 1), random, setting)
+    half = table["body"]["door"]
+    table["body"]["handle"] = {**half, "frames": {"here": {}}}
+    half["frames"]["there"] = {}
+    table["joint"]["screws"] = {"type": "fixed", "between": ["door.there", "handle.here"]}
+    assert analysed(table).mobility == 1
+    off = (np.array(half["pose"]["position"]) + [0.0, 0.01 * size, 0.0]).tolist()
+    table["body"]["handle"] = {**table["body"]["handle"], "pose": {**half["pose"], "position": off}}
+    with pytest.raises(InputError, match="contradicts"):
+        analysed(table)
+
+
+@pytest.mark.parametrize(
+    "spread", [np.zeros((5, 3)), np.full((5, 3), np.nan), np.zeros((5, 0)), 1e-17 * np.ones((5, 3))]
+)
+def test_rows_that_are_nothing_are_chosen_without_a_riddle(spread: np.ndarray) -> None:
+    """In a singular pose rows may vanish altogether: the least pivot then says so."""
+    for scale in (np.zeros(5), np.ones(5)):
+        kept, pivot = choose(spread, scale, 2)
+        assert kept.sum() == min(2, spread.shape[1])
+        assert pivot <= 1e-30 or not kept.any()
+    kept, pivot = choose(spread, np.zeros(5), 0)
+    assert not kept.any()
+    assert pivot == 1.0

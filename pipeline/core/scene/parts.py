@@ -124,8 +124,8 @@ class FlexibleBody(Part):
     damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
     stiffening: Stiffening | None = None
     pose: Pose | None = None
-    velocity: Velocity | None = None
-    angular_velocity: AngularVelocity | None = None
+    velocity: Velocity | None = Field(default=None, description="start velocity of the centre of mass, world axes")
+    angular_velocity: AngularVelocity | None = Field(default=None, description="start angular velocity, world axes")
 
 
 Body = Annotated[Ground | RigidBody | FlexibleBody, Field(discriminator="type")]

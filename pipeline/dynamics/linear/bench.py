@@ -14,7 +14,6 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model import initial, selection
-from pipeline.dynamics.model.driving import prescribed
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.run import singular
@@ -40,12 +39,6 @@ class Bench:
     time: float
     drives: np.ndarray
     turns: np.ndarray
-
-    @property
-    def units(self) -> np.ndarray:
-        """What counts as far for each drive: a radian, or the mechanism's size [m]; shape (known,)."""
-        mechanism = self.engine.model.mechanism
-        return np.array([1.0 if p.dimension == "angle" else mechanism.length for p in prescribed(mechanism.scene)])
 
     @property
     def contacts(self) -> int:
@@ -147,7 +140,7 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     if not bench.engine.model.mechanism.closures:
         share = 1.0
     else:
-        way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
+        way = float(np.max(np.abs(target - origin) / bench.engine.model.drive_scales, initial=0.0))
         stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
     while share < 1.0:
         attempt = min(1.0, share + stride)

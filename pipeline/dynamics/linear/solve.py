@@ -40,7 +40,7 @@ def equilibrium(
 
 def _require_steady(bench: Bench, rest: Equilibrium) -> None:
     """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
-    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.units, initial=0.0))
+    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.engine.model.drive_scales, initial=0.0))
     if fastest == 0.0:
         return
     model, before, forces = bench.engine.model, balance(bench, rest.at.q), _forces(bench)

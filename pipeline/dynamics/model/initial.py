@@ -98,12 +98,11 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
 
     unit, L = model.speed_scales, model.mechanism.length
     lengths = np.tile([1.0] * 3 + [L] * 3, len(wanted))[told]
-    opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
         frames, opening = motion(state)
         moving = [centre.motion(frames, state[:nq], state[nq : nq + nv]) for centre in centres]
-        return np.concatenate([np.array(moving).ravel()[told] / lengths, opening / opening_lengths])
+        return np.concatenate([np.array(moving).ravel()[told] / lengths, opening / model.row_scales])
 
     base = rates(y)
     columns = []

@@ -20,7 +20,7 @@ from pipeline.dynamics.model import loads as loading
 from pipeline.dynamics.model import wiring
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.driving import drive_laws, joint_class
+from pipeline.dynamics.model.driving import drive_laws, joint_class, prescribed
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.numbering import Numbering, number
@@ -56,6 +56,18 @@ class Model:
         nq, nv = self.numbering.nq, self.numbering.nv
         groups = self.arrays.table(m.GROUPS)["group"][nq : nq + nv]
         return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][groups])
+
+    @property
+    def drive_scales(self) -> np.ndarray:
+        """The same of each prescribed coordinate, shape (drives,)."""
+        length = self.mechanism.length
+        return np.array([1.0 if one.dimension == "angle" else length for one in prescribed(self.scene)])
+
+    @property
+    def row_scales(self) -> np.ndarray:
+        """The same of what each closure row holds, shape (rows,)."""
+        along = self.arrays.table(m.CLOSURE_ROWS)["kind"] == 0
+        return np.where(along, self.mechanism.length, 1.0)
 
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Model:

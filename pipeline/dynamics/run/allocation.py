@@ -12,7 +12,6 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
-from scipy.linalg import null_space
 
 from pipeline.core.scene.laws import Constant
 from pipeline.core.scene.loads import JointForce
@@ -21,7 +20,7 @@ from pipeline.dynamics.drives.pieces import Piece, Pieces
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import tabulate
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
-from pipeline.dynamics.run.inverse import RANK, closure_jacobian, rate, renamed
+from pipeline.dynamics.run.inverse import RANK, free_motions, rate, renamed, scale_of
 from pipeline.dynamics.run.trajectory import integrate as step
 
 
@@ -61,13 +60,14 @@ def _least(
     made = [mechanism.drives.index(name) for name in alone]
     forces = seen["drive_force"][:, made] * [signs[name] for name in alone]
     own = [names.index(name) for name in alone]
+    scales = np.array([scale_of(engine, scene, name) for name in names])
     found = []
     for t, state, force in zip(time, seen["state"], forces, strict=True):
         engine.select_pieces(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
         engine.evaluate(state, float(t))
-        free = null_space(closure_jacobian(engine), rcond=RANK)
+        free = free_motions(engine)
         rates = np.array([rate(engine, scene, name) @ free for name in names])
-        T = rates @ np.linalg.pinv(rates[own], rcond=RANK)
+        T = scales[:, None] * (rates @ np.linalg.pinv(rates[own], rcond=RANK)) / scales[own]
         found.append(T @ np.linalg.solve(T.T @ T, force))
     return np.array(found)
 

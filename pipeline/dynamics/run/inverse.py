@@ -16,7 +16,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
-from scipy.linalg import null_space, qr
+from scipy.linalg import qr
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.drives import JointDrive, PathDrive
@@ -32,7 +32,7 @@ from pipeline.dynamics.run.coordinates import joint_coordinates, label
 from pipeline.dynamics.run.engine import Engine, Progress, consistent_start, observe, prepare
 from pipeline.dynamics.run.trajectory import integrate as step
 
-#: singular values below this share of the largest are zero
+#: singular values below this are zero, of matrices between motions in radians and shares of the mechanism's size
 RANK = 1e-8
 
 
@@ -113,12 +113,12 @@ def _full_name(scene: Scene, actuator: str) -> str:
 def _enough(engine: Engine, scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> list[str]:
     """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
     model = engine.model
-    free = null_space(closure_jacobian(engine), rcond=RANK)
+    free, nv = free_motions(engine), model.numbering.nv
     known = [k for k, name in enumerate(model.mechanism.drives) if name.partition(".")[0] in wanted]
     held = [k for k in range(model.numbering.known) if k not in known]
     if held:  # other drives go on as they do
-        free = free @ null_space(free[[model.numbering.nv + k for k in held]], rcond=RANK)
-    of_path = free[[model.numbering.nv + k for k in known]]
+        free = free @ _null(free[[nv + k for k in held]])
+    of_path = free[[nv + k for k in known]]
     of_actuators = np.array([rate(engine, scene, name) @ free for name in names])
     place = f"[drive.{next(iter(wanted))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
@@ -141,8 +141,22 @@ def _enough(engine: Engine, scene: Scene, wanted: Mapping[str, PathDrive], names
 
 
 def _rank(matrix: np.ndarray) -> int:
-    values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RANK * max(values.max(initial=0.0), 1e-300)))
+    return int(np.sum(np.linalg.svd(matrix, compute_uv=False) > RANK))
+
+
+def _null(matrix: np.ndarray) -> np.ndarray:
+    """Orthonormal columns that a matrix takes to zero; where it is nothing but rounding these are all."""
+    return np.asarray(np.linalg.svd(matrix)[2][_rank(matrix) :].T)
+
+
+def free_motions(engine: Engine) -> np.ndarray:
+    """Speeds that open no closure, free ones first, then prescribed, as orthonormal columns; shape (speeds, motions).
+
+    In radians and shares of the mechanism's size.
+    """
+    model = engine.model
+    J = closure_jacobian(engine) * np.concatenate([model.speed_scales, model.drive_scales])
+    return _null(J / model.row_scales[:, None])
 
 
 def closure_jacobian(engine: Engine) -> np.ndarray:
@@ -168,8 +182,9 @@ def _columns(engine: Engine) -> np.ndarray:
 
 
 def rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
-    """Rate of an actuator's coordinate per speed of the system."""
+    """Rate of an actuator's coordinate per speed of the system; all in radians or shares of the mechanism's size."""
     model = engine.model
+    scales = np.concatenate([model.speed_scales, model.drive_scales])
     joint, _, name = actuator.partition(".")
     _, k, coordinate = coordinate_of(scene, joint, name or None, "[drive]")
     row = np.zeros(model.numbering.nv + model.numbering.known)
@@ -179,14 +194,20 @@ def rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
             row[model.numbering.c0[i] + stage.positions.index(k)] = stage.sign
             return row
     number = [e.name for e, _, _ in model.mechanism.closures].index(joint)
-    a, b = model.arrays.table(m.CLOSURES)[
-        list(model.closure_order).index(number), [m.CLOSURES.site_a, m.CLOSURES.site_b]
-    ]
-    wrench = _unit_wrench(model, engine, int(a), int(b), coordinate)
+    closure = model.arrays.table(m.CLOSURES)[list(model.closure_order).index(number)]
+    a, b = int(closure["site_a"]), int(closure["site_b"])
+    wrench = _unit_wrench(model, engine, a, b, coordinate)
     for site, sign in ((b, 1.0), (a, -1.0)):
-        for c, col in model.numbering.route(int(site)):
+        for c, col in model.numbering.route(site):
             row[c] += sign * wrench @ _columns(engine)[col]
-    return row
+    return row * scales / scale_of(engine, scene, actuator)
+
+
+def scale_of(engine: Engine, scene: Scene, actuator: str) -> float:
+    """A radian, or the mechanism's size, as an actuator's coordinate turns or slides."""
+    joint, _, name = actuator.partition(".")
+    _, _, coordinate = coordinate_of(scene, joint, name or None, "[drive]")
+    return 1.0 if coordinate.turning else engine.model.mechanism.length
 
 
 def _unit_wrench(model: Model, engine: Engine, a: int, b: int, coordinate: Coordinate) -> np.ndarray:
