@@ -221,7 +221,7 @@ def test_drives_of_a_tiny_loop_reach_their_pose_as_those_of_a_large_one() -> Non
 @pytest.mark.parametrize("size", [1.0, 1e-6])
 @pytest.mark.parametrize("hinge", ["low", "high"])
 def test_either_hinge_of_a_door_supplies_the_torque_of_its_path(hinge: str, size: float) -> None:
-    """Torque = I angle'' + m g' d sin(angle); one coordinate of a corner is prescribed, the other hinge does nothing new.
+    """Torque = I angle'' + m g' d sin(angle), where one coordinate of a corner is prescribed.
 
     size: of all lengths; times are as its root, torques as it.
     """

@@ -215,7 +215,7 @@ def test_poses_that_contradict_a_fixed_joint_are_refused_at_any_size(size: float
     half["frames"]["there"] = {}
     table["joint"]["screws"] = {"type": "fixed", "between": ["door.there", "handle.here"]}
     assert analysed(table).mobility == 1
-    off = (np.array(half["pose"]["position"]) + [0.0, 0.01 * size, 0.0]).tolist()
+    off = (np.array(half["pose"]["position"]) + 0.01 * size).tolist()
     table["body"]["handle"] = {**table["body"]["handle"], "pose": {**half["pose"], "position": off}}
     with pytest.raises(InputError, match="contradicts"):
         analysed(table)
