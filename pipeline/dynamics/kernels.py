@@ -59,8 +59,8 @@ class Part(JITCodeLibrary):
     def _called(self) -> list[Any]:
         """Libraries of what it calls, directly or not, each once and after all that call it.
 
-        The linker takes only what is referred to already: of a kernel that one caller names in code that never runs, and
-        another one below calls, nothing would be there.
+        The linker takes only what is referred to already: a kernel that one caller names in code that never runs would
+        be missing for another one below.
         """
         found: dict[Any, None] = {}
         open_calls = [(library, False) for library in self._linking_libraries]

@@ -107,4 +107,3 @@ def test_every_method_passes_singular_poses(name: str) -> None:
     dataset = simulate(table)
     assert error(dataset, four_bars.inclination(LOOPS, dataset.time.values)) < within
     assert len(dataset.pass_time) == 2
-

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine

@@ -8,8 +8,8 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.run.collocation import CLOSELY, Collocation
 from pipeline.dynamics.run.engine import Engine, observe_with, pieces_at
 
-#: pivot ratio of the closures at which the equations hold eight digits of accelerations
-CLEAR = 1e-5
+#: pivot ratio of the closures at which the equations hold eight digits of accelerations where loops are closed to 1e-14
+CLEAR = 1e-4
 #: first distance in time, as share of the polynomial, its factor from try to try, and how many there are
 NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
 #: where it is looked, in units of the distance, and the weights there of the limit between: exact for quintics

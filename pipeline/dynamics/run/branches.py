@@ -140,10 +140,10 @@ class _Pose:
             span = WAY / fastest
             steps = self._tangents(span * speeds, _null(rows), self.engine.start + span)
             return [_steady(self.engine, self._with(step / span), self._slope(step / span)) for step in steps]
-        span = self._drives_go()
-        if span is None:
+        until = self._drives_go()
+        if until is None:
             return [d for step in self._tangents(np.zeros(self.nv), _null(self.J), None) for d in self._fall(step)]
-        t = self.engine.start + span
+        t = self.engine.start + until
         went = self.residual(np.zeros(self.nv), t)
         base, *_ = np.linalg.lstsq(self.J, -went, rcond=ZERO)
         return [self._driven(step, float(np.linalg.norm(went))) for step in self._tangents(base, _null(self.J), t)]

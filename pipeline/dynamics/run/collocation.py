@@ -146,7 +146,7 @@ def collocate(
     state's own speeds lead.  share: what a closure row has left of its most at the ends; rounding follows its square.
     """
     began = sampler.evaluations
-    states, samples = _march(sampler, t, y, span, slope, lead)
+    samples = _march(sampler, t, y, span, slope, lead)
     used = _far_from_singular(samples, LEAST)
     if slope is not None and used.sum() < POINTS - MANY:
         used = _far_from_singular(samples, SLOW_LEAST)
@@ -213,24 +213,24 @@ def _march(
     span: float,
     slope: np.ndarray | None,
     lead: Lead | None,
-) -> tuple[np.ndarray, list[Sample]]:
-    """States at the nodes and what there is, each predicted by the polynomial through the slopes before it."""
+) -> list[Sample]:
+    """What there is at the nodes, each state predicted by the polynomial through the slopes before it."""
     nq, flat = sampler.engine.model.numbering.nq, np.zeros(len(y))
     if slope is None:
         sampler.attempt(t, y)
         flat[:nq] = sampler.slope()[:nq]
     nodes, slopes = ([0.0], [slope]) if slope is not None else ([], [])
-    states, samples = [], []
+    samples = list[Sample]()
     for x in NODES:
         if slope is None and len(nodes) < LED:
-            states.append(lead.state(t + x * span) if lead is not None else y + x * span * flat)
+            state = lead.state(t + x * span) if lead is not None else y + x * span * flat
         else:
-            states.append(y + span * (_integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes)))
-        samples.append(sampler.sample(t + x * span, states[-1]))
+            state = y + span * (_integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes))
+        samples.append(sampler.sample(t + x * span, state))
         if samples[-1].sound and _share(samples[-1], samples) >= LEAST:
             nodes.append(x)
             slopes.append(samples[-1].slope)
-    return np.array(states), samples
+    return samples
 
 
 def _share(sample: Sample, samples: list[Sample]) -> float:

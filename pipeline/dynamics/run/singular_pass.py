@@ -136,9 +136,9 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     low, found = np.min(values / best, axis=1), list[Pass]()
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
-        bracket = (times[max(k - 1, 0)], times[min(k + 1, LOOKS)])
+        bracket = float(times[max(int(k) - 1, 0)]), float(times[min(int(k) + 1, LOOKS)])
         t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": NEAR * made.span}).x)
-        one = _pass(sampler, made, _between(least, min((t, *bracket), key=least), NEARLY * made.span, bracket))
+        one = _pass(sampler, made, _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket))
         if one is not None and not (found and one.time - found[-1].time < SAME * made.span):
             found.append(one)
     return tuple(found)
