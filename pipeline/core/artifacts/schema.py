@@ -164,6 +164,9 @@ ENSEMBLE: Schema = {
     ),
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
+    "peak_acceleration": _V(
+        ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
+    ),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
 }
 
