@@ -74,9 +74,9 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
     found: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
-        scene = timing.paper_scene(graph.scene)
         bundles = {f"bundle/{body}": task for body, task in graph.bundle.items()}
-        found.setdefault(kernels.shared(scene), kernels.task(scene, bundles))
+        for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
+            found.setdefault(kernels.shared(scene), kernels.task(scene, bundles))
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 

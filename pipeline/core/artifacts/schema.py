@@ -211,7 +211,7 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         variable, values = schema[name], dataset[name]
         if values.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
-        may_be_open = name.startswith("event_")  # an event that the run's end cuts short has no duration
+        may_be_open = name.startswith(("event_", "impact_"))  # what the run's end cuts short has no duration
         if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}

@@ -94,10 +94,7 @@ def make_advance(
             n[m.STATUS] = m.AT_SINGULAR
         elif w[h[m.PIVOT] + m.LAST_PIVOT] < w[h[m.PIVOT] + m.WANTED_PIVOT]:
             n[m.STATUS] = m.WORN_ROWS
-        elif (
-            n[m.N_RECORDED] + waiting + room > rows.shape[0]
-            or n[m.N_EVENTS] + room > events.shape[0]
-        ):
+        elif n[m.N_RECORDED] + waiting + room > rows.shape[0] or n[m.N_EVENTS] + room > events.shape[0]:
             n[m.STATUS] = m.FULL
         else:
             return False

@@ -91,7 +91,7 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched)
+    return Run(scene, engine, trajectory, seen, twin_of(engine, start, trajectory), switched)
 
 
 def follow(
@@ -109,7 +109,8 @@ def follow(
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
 
-def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+def twin_of(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+    """The twin of a run with contacts."""
     if not engine.model.contacts:
         return None
     from pipeline.dynamics.run.sensitivity import twin

@@ -47,7 +47,7 @@ def six_panels(
     """Figure with the paper's six panels, each with a slim one below; returns it and the axes that hold labels.
 
     reference: the ideal model.  others: the models compared with it, drawn in this order.
-    posts: post artifacts whose ensemble mean +- std is drawn as a band, one per model of `others`.
+    posts: post artifacts whose ensemble's quantiles are drawn as a band, one per model of `others`.
     impacts: with them the slim panels of acceleration and reaction zoom to the ideal model's range;
     all others show the difference from the ideal model.
     """
@@ -162,17 +162,18 @@ def _peaks(axes: Axes, motion: Motion) -> None:
 
 
 def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset) -> None:
-    """Mean +- one standard deviation over the ensemble, beyond the horizon only."""
+    """Middle nine tenths of the ensemble and its median, beyond the horizon only.
+
+    Quantiles, as forces are not negative and most of their values are zero: a mean minus a deviation would be.
+    """
     if quantity.ensemble is None or "ensemble_time" not in post.sizes:
         return
     name, factor = quantity.ensemble
-    mean, std = _column(post[f"{name}_mean"]) * factor, _column(post[f"{name}_std"]) * factor
+    low, middle, high = (_column(post[f"{name}_quantile"].sel(quantile=q)) * factor for q in (0.05, 0.5, 0.95))
     time = post.ensemble_time.values
     beyond = time >= motion.horizon
-    axes.fill_between(
-        time[beyond], (mean - std)[beyond], (mean + std)[beyond], color=motion.model.color, alpha=0.22, lw=0
-    )
-    axes.plot(time[beyond], mean[beyond], color=motion.model.color, lw=0.8)
+    axes.fill_between(time[beyond], low[beyond], high[beyond], color=motion.model.color, alpha=0.22, lw=0)
+    axes.plot(time[beyond], middle[beyond], color=motion.model.color, lw=0.8)
 
 
 def _column(variable: xr.DataArray) -> np.ndarray:
