@@ -33,6 +33,7 @@ FAR_CSJ_CB = Model("sps4/far_csj_cb", "FAR-CSJ, Craig-Bampton modes (added)", "#
 
 FAR = (FAR_FREE, FAR_FIXED, FAR_CB)
 FAR_CSJ = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
+MODELS = (IDEAL, *FAR, CSJ, *FAR_CSJ)
 
 
 @dataclass(frozen=True, slots=True)

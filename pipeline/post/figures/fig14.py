@@ -1,4 +1,4 @@
-"""Figure 14: phase plots of angle and velocity along z, all models."""
+"""Figure 14: angle and velocity of the platform hardly show the impacts"""
 
 from __future__ import annotations
 

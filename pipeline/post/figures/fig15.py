@@ -1,4 +1,4 @@
-"""Figure 15: phase plots of displacement and velocity along z, all models."""
+"""Figure 15: displacement and velocity hardly show the impacts"""
 
 from __future__ import annotations
 

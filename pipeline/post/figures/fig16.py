@@ -1,4 +1,4 @@
-"""Figure 16: phase plots of velocity and acceleration along z, all models."""
+"""Figure 16: the acceleration shows every impact; in between it is that of the ideal model"""
 
 from __future__ import annotations
 

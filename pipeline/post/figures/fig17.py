@@ -37,8 +37,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             axes[-1, column].set_xlabel("x in the socket (mm)")
         style.heading(
             figure,
-            "Figure 17: centre of the ball in the socket",
-            "grey: clearance sphere; dots: where impacts begin; pale beyond the horizon",
+            "Figure 17: the ball flies from wall to wall; with a flexible rod its ways part from run to run",
+            "centre of the ball in the socket; grey: clearance sphere; dots: where impacts begin; pale beyond the horizon",
         )
         return style.files("fig17", figure)
 

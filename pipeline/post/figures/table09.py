@@ -6,7 +6,18 @@ import numpy as np
 import xarray as xr
 
 from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from pipeline.post.models import CSJ, FAR_CSJ, FAR_CSJ_CB, FAR_CSJ_FIXED, FAR_CSJ_FREE, IDEAL, JOINT, PLATFORM, Model, believed_until
+from pipeline.post.models import (
+    CSJ,
+    FAR_CSJ,
+    FAR_CSJ_CB,
+    FAR_CSJ_FIXED,
+    FAR_CSJ_FREE,
+    IDEAL,
+    JOINT,
+    PLATFORM,
+    Model,
+    believed_until,
+)
 from pipeline.post.paper import TABLE9
 from pipeline.post.plotting.error_table import MEANING, Column, heads, paper, rows, several, single
 from pipeline.post.plotting.table import Table, files

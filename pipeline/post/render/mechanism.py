@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.post.body_shape import scale_to, surface
-from pipeline.post.render.solids import Solid, equivalent, mesh
+from pipeline.post.render.solids import Solid, equivalent, mesh, plate
 from pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -127,7 +127,7 @@ def _rigid(
     for name, given in solids.items():
         frames = _frames(run, names.index(name), name)
         inside = any(np.linalg.norm(origin) < radius.get(frame, 0.0) for frame, origin in frames.items())
-        solid = None if inside else given
+        solid = None if inside or given is None else plate(given, np.array(list(frames.values())).reshape(-1, 3))
         # a slim solid is drawn with slim arms
         width = arm if solid is None else min(arm, float(np.sort(solid.half)[1]))
         holds = solid is not None and any(solid.holds(frames[frame]) for frame in frames if frame in sockets)

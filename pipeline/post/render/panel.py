@@ -11,8 +11,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from pipeline.post.models import PLATFORM
+from pipeline.post.models import MODELS, PLATFORM
 from pipeline.post.plotting import style
+
+
+#: of scenes that are none of the paper's models
+OTHER = "#0072B2"
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +72,7 @@ def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, n
     body = watched(run)
     angle = np.degrees(post.rotation.values[:, body])
     axes.set_title(f"{run.body.values[body]}: rotation (°)")
-    return _curve(axes, run, angle, "#0072B2")
+    return _curve(axes, run, angle, _color(run))
 
 
 def _reaction(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
@@ -76,13 +80,18 @@ def _reaction(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any,
     force = post.reaction.sel(joint=name).values
     kind = "contact force" if "contact" in run.sizes else "reaction"
     axes.set_title(f"{name}: {kind} (N)")
-    return _curve(axes, run, force, "#D55E00", 0.8)
+    return _curve(axes, run, force, _color(run), 0.8)
 
 
 def _energy(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
     """Instead of a reaction, where there is no joint."""
     axes.set_title("kinetic energy (J)")
-    return _curve(axes, run, run.kinetic.values, "#D55E00")
+    return _curve(axes, run, run.kinetic.values, _color(run))
+
+
+def _color(run: xr.Dataset) -> str:
+    """The colour that the model of the run has in all figures; one of its own for other scenes."""
+    return next((m.color for m in MODELS if m.scene == run.attrs.get("scene")), OTHER)
 
 
 def _curve(
@@ -100,7 +109,7 @@ def _socket(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, n
     radius = 1e3 * float(post.clearance[0])
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
-    axes.plot(x, y, color="#009E73", lw=0.5, alpha=0.7)
+    axes.plot(x, y, color=_color(run), lw=0.5, alpha=0.7)
     axes.set_title("ball centre in the socket (mm)")
     axes.set(
         xlabel="x",
