@@ -94,7 +94,7 @@ def make(place: Workplace) -> Path:
     if s6_render.gl_state().endswith("none"):
         from pipeline.post.render import gl
 
-        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.REMEDY}")
+        place.monitor.say(f"there are no pictures of shapes and no film: {gl.REMEDY}")
     check(shown)
     return place.store.root / "report" / "index.html"
 
@@ -151,7 +151,7 @@ def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
         scene="report",
         part=name,
         run="stages.figure:run",
-        params={"figure": name} | ({"gl": s6_render.gl_state()} if entry["gl"] else {}),
+        params={"figure": name},
         inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
         modules=(f"{FIGURES}.{name}",),
         folder="tables" if name.startswith("table") else "figures",

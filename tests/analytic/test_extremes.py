@@ -13,8 +13,8 @@ from tests.analytic.mechanism_runs import run
 DENSER = 50
 #: both models are wholly predictable so far, and have had their first impacts
 UNTIL = {"sps4/csj": 0.0105, "sps4/far_csj_cb": 0.0085}
-#: regular outputs 2 us apart miss the peak of a contact of 60 us or more by up to (pi / 60)^2 / 2, a thousandth (3e-4 is
-#: found), while outputs 0.1 ms apart miss it by a tenth and more
+#: regular outputs 2 us apart miss the peak of a contact of 60 us or more by up to (pi / 60)^2 / 2, a thousandth (3e-4
+#: is found), while outputs 0.1 ms apart miss it by a tenth and more
 CLOSE = 4e-3
 
 

@@ -241,6 +241,19 @@ def bundle(count: int = 7, nodes: int = 13, frequency: np.ndarray | None = None)
     return conform(xr.Dataset(data, {"frame": ["bottom", "top"]}), BUNDLE)
 
 
+def mesh() -> xr.Dataset:
+    """What table 2 reads of a mesh: twelve elements of aluminium."""
+    cells = np.ones(12)
+    data = {
+        "density": (("cell",), 2740.0 * cells),
+        "youngs_modulus": (("cell",), 7.17e10 * cells),
+        "shear_modulus": (("cell",), 7.17e10 / 2.66 * cells),
+        "area": (("cell",), np.pi * 1e-4 * cells),
+        "abscissa": (("node",), np.linspace(0.0, 0.24, 13)),
+    }
+    return xr.Dataset(data)
+
+
 def modes(frequency: tuple[float, ...], kinds: tuple[str, ...]) -> xr.Dataset:
     """A made-up artifact of schema MODES with the given frequencies."""
     shape = np.zeros((13, 6, len(frequency)))
@@ -264,7 +277,7 @@ def timing() -> xr.Dataset:
     seconds = np.outer([0.004, 0.02, 0.02, 0.04, 0.3, 0.4], [1.0, 1.1, 0.9])
     slow = np.where(np.arange(6)[:, None] == 2, np.nan, 5.0 * seconds)
     data = {}
-    for way, times in (("equal", seconds), ("step", slow), ("tolerance", 2.0 * seconds)):
+    for way, times in (("equal", seconds), ("step", slow), ("tolerance", 2.0 * seconds), ("size", 3.0 * seconds)):
         data |= {
             f"{way}_integration_seconds": (("scene", f"{way}_repeat"), times),
             f"{way}_recording_seconds": (("scene", f"{way}_recorded"), np.full((6, 1), 0.1)),

@@ -184,15 +184,12 @@ def test_a_stepped_rod_is_drawn_with_each_cells_radius():
 
 @needs_gl
 @pytest.mark.parametrize("corners", [1, 3, 4])
-def test_shapes_of_solids_become_pictures_pages_and_files(corners, tmp_path):
+def test_shapes_of_solids_become_pages_and_files(corners, tmp_path):
     from pipeline.post.render import shapes
 
     plate = solid(corners)
-    picture = shapes.picture(plate, 1)
     content = shapes.page(plate, 1)
     assert content == shapes.page(plate, 1)
-    # viridis is on it: pixels that are far from grey; 15 dots of nine pixels cover less than the plate does
-    assert np.count_nonzero(np.ptp(picture.astype(int), axis=-1) > 60) > (200 if corners == 1 else 5000)
     assert b"vtk" in content
     (tmp_path / "plate.vtu").write_bytes(shapes.vtu(plate))
     read = meshio.read(tmp_path / "plate.vtu")

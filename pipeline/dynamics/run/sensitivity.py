@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.core.artifacts.event_kinds import OPENING
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import silent
 from pipeline.core.quantities import PARTED
-from pipeline.core.artifacts.event_kinds import OPENING
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.observation import observe

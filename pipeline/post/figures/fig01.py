@@ -34,7 +34,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         axes[0, 1].set_title("(b) joint centres from above (mm)")
         style.heading(
             figure,
-            "Figure 1: four SPS legs and a central PS chain carry the platform; rod 1 is flexible, joint A1 has clearance",
+            "Figure 1: four SPS legs and a central PS chain carry the platform; "
+            "rod 1 is flexible, joint A1 has clearance",
             "the paper prints neither the joint coordinates nor the start height: those shown are assumed",
         )
         return style.files("fig01", figure)
@@ -126,11 +127,12 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
         up = 1.0 if foot[1] > 0.0 else -1.0
         for place, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
             text = f"{name}\n({place[0]:.1f}, {place[1]:.1f})"
-            axes.annotate(text, place[:2] + [0.0, 23.0 * way], ha="center", va="center", fontsize=8.2)
+            axes.annotate(text, (place[0], place[1] + 23.0 * way), ha="center", va="center", fontsize=8.2)
     axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)
     axes.annotate("C, Z", (14.0, 0.0), va="center", fontsize=8.2)
     length = np.linalg.norm(at["platform.A1"] - at["ground.B1"])
-    text = f"height of A1..A4 at the start {1e3 * at['platform.A1'][2]:.1f} mm; legs between ball centres {1e3 * length:.1f} mm"
+    height = at["platform.A1"][2]
+    text = f"height of A1..A4 at the start {1e3 * height:.1f} mm; legs between ball centres {1e3 * length:.1f} mm"
     axes.set_xlabel(f"x0 (mm)\n{text}")
     axes.set_ylabel("y0 (mm)")
     reach = 1e3 * np.abs([at[f"ground.B{k}"][:2] for k in LEGS]).max(axis=0)

@@ -25,6 +25,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
     clearance, ball = 1e3 * joint["clearance"], 1e3 * joint["ball_radius"]
     deepest = 1e6 * float(data[f"{CSJ.scene}:run"].contact_penetration.max())
+    peak = float(post.peak_force.sel(contact=JOINT))
     exaggerated = (SOCKET - DRAWN_BALL) / SOCKET * (ball + clearance) / clearance
     with style.style():
         figure, axes = style.grid(1, 2, (10.4, 5.1))
@@ -36,8 +37,9 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             f"Figure 5: a ball of {ball:g} mm moves by {clearance:g} mm in its socket and enters the wall by "
             f"{deepest:.1f} µm at most",
-            f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), B: of the ball (b1), "
-            f"p_SB: eccentricity (d); largest force of the {CSJ.label} run {float(post.peak_force.sel(contact=JOINT)):.0f} N",
+            f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), "
+            "B: of the ball (b1), "
+            f"p_SB: eccentricity (d); largest force of the {CSJ.label} run {peak:.0f} N",
         )
         return style.files("fig05", figure)
 

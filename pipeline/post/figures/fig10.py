@@ -47,7 +47,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         _back(axes[0, 2])
         style.heading(
             figure,
-            "Figure 10: contacts end steps where they begin and end; the paper looks at them at the ends of steps of 10 µs",
+            "Figure 10: contacts end steps where they begin and end; "
+            "the paper looks at them at the ends of steps of 10 µs",
             f"numbers: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {told['steps']} steps, "
             f"{told['evaluations']} evaluations, {told['projections']} projections",
         )

@@ -31,7 +31,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             f"Figure 11: a flexible rod moves the platform by {moved[FAR_CB.scene]:.2g} µm at most; free-free modes "
             f"find {moved[FAR_FREE.scene]:.1g} µm of it, fixed-fixed modes {_little(moved[FAR_FIXED.scene])}",
-            "slim panels (added): difference from the ideal model; the added mode set is drawn as the band that it fills",
+            "slim panels (added): difference from the ideal model; "
+            "the added mode set is drawn as the band that it fills",
         )
         style.shared_legend(figure, labelled, 4)
         return style.files("fig11", figure)

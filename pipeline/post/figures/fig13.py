@@ -32,8 +32,10 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         style.heading(
             figure,
             "Figure 13: the mode set decides how far a flexible rod softens the impacts",
-            f"largest acceleration in m/s², of ensembles the mean: {_peaks(posts)}. Beyond its horizon a single run is pale, bands are the middle 90 % of "
-            "the ensembles (the added set's run is drawn as the band that it fills); dots: largest force of each impact",
+            f"largest acceleration in m/s², of ensembles the mean: {_peaks(posts)}. "
+            "Beyond its horizon a single run is pale, bands are the middle 90 % of "
+            "the ensembles (the added set's run is drawn as the band that it fills); "
+            "dots: largest force of each impact",
         )
         style.shared_legend(figure, labelled, 3)
         return style.files("fig13", figure)

@@ -40,7 +40,8 @@ def make(name: str, finding: str, bundle: xr.Dataset, printed: tuple[float, ...]
         style.heading(
             figure,
             finding,
-            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor beside each; grey: undeformed",
+            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor beside each; grey: "
+            "undeformed",
         )
         return style.files(name, figure)
 

@@ -69,7 +69,9 @@ def _contradiction(ours: Deviation) -> str:
     return (
         f"The paper's two rows contradict each other: {printed.angle:.3g} rad with {printed.displacement:.3g} mm is "
         f"{printed.angle / printed.displacement:.2g} rad/mm. Whatever changes the length of leg 1 turns and lifts the "
-        f"platform in a ratio that geometry sets: {TABLE8.angle / TABLE8.displacement:.2g} rad/mm by the paper's Table 8, "
-        f"{1e-3 * ours.angle / ours.displacement:.2g} rad/mm here (Craig-Bampton). {printed.displacement:.3g} mm may be no "
+        f"platform in a ratio that geometry sets: {TABLE8.angle / TABLE8.displacement:.2g} rad/mm by the paper's "
+        "Table 8, "
+        f"{1e-3 * ours.angle / ours.displacement:.2g} rad/mm here (Craig-Bampton). {printed.displacement:.3g} mm "
+        "may be no "
         "more than the last digit that the displacement was printed with."
     )

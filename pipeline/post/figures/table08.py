@@ -33,7 +33,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     count, peak = int(post.impact_count.sel(contact=JOINT)), float(post.peak_force.sel(contact=JOINT))
     notes = (
         comparison("CSJ model", ours, TABLE8),
-        f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the platform's largest "
+        f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the "
+        "platform's largest "
         f"vertical acceleration {float(post.peak_acceleration.sel(body=PLATFORM, axis='z')):.0f} m/s².",
         _restitution(data[f"{CSJ.scene}:run"], post),
         "Angle and displacement errors are geometry: once the ball rests against the socket, leg 1 is "
@@ -61,7 +62,9 @@ def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     shown = (post.impact_separation_speed / post.impact_approach_speed).values
     shown = shown[np.isfinite(shown)]
     return (
-        f"Restitution: {asked:g} is assumed, the contact law gives a free impact {delivered:.3f}; in the run separation "
-        f"over approach speed has the median {np.median(shown):.3f} (from {shown.min():.2f} to {shown.max():.2f}: drives "
+        f"Restitution: {asked:g} is assumed, the contact law gives a free impact {delivered:.3f}; in the run "
+        "separation "
+        f"over approach speed has the median {np.median(shown):.3f} (from {shown.min():.2f} to {shown.max():.2f}: "
+        "drives "
         "and friction act meanwhile)."
     )

@@ -112,6 +112,7 @@ def _accelerations(data: dict[str, xr.Dataset]) -> str:
         peak = data[f"{model.scene}:ensemble"].peak_acceleration.sel(body=PLATFORM, axis="z").values
         texts.append(f"{model.label.removeprefix('FAR-CSJ, ')} {peak.mean():.0f} ± {peak.std(ddof=1):.0f} m/s²")
     return (
-        f"Largest vertical accelerations of the platform: {'; '.join(texts)}. They lie inside impacts, where the motion "
+        f"Largest vertical accelerations of the platform: {'; '.join(texts)}. They lie inside impacts, where the "
+        "motion "
         "is recorded at the largest force and penetration of each contact besides the regular outputs."
     )

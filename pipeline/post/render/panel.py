@@ -14,7 +14,6 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from pipeline.post.models import MODELS, PLATFORM
 from pipeline.post.plotting import style
 
-
 #: of scenes that are none of the paper's models
 OTHER = "#0072B2"
 
