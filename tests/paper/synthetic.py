@@ -70,6 +70,8 @@ def run(name: str = "sps4/ideal", *, clearance: bool = False, modes: int = 0, no
         "title": f"made-up {name}",
         "parameters": json.dumps(_parameters(clearance)),
         "evaluations": 1000,
+        "steps": 100,
+        "projections": 10,
     }
     attrs["assumptions"] = json.dumps({"joint.A1.normal.restitution": "assumed: not printed in the paper"})
     return conform(xr.Dataset(data, coords), RUN, **attrs)
@@ -109,6 +111,11 @@ def _bodies(time, z, tilt):
             owners.append(frame.partition(".")[0])
             places.append(at)
     arrays = (np.stack(position, axis=1), np.stack(quaternion, axis=1))
+    fixed = np.broadcast_to([0.0, 0.0, 0.07], (count, 3))
+    for frame, at in (("ground.Z", fixed), ("central_rod.Z", p_platform - [0.0, 0.0, 0.28])):
+        frames.append(frame)
+        owners.append(frame.partition(".")[0])
+        places.append(at)
     return bodies, *arrays, frames, owners, np.stack(places, axis=1)
 
 
@@ -168,6 +175,8 @@ def _parameters(clearance: bool) -> dict:
     body = {
         "platform": rigid(0.31, (1.040159e-3, 1.040159e-3, 2.080267e-3)),
         "ground": {"type": "ground", "frames": {}},
+        "central_rod": rigid(0.59, (2.837976e-3, 2.837976e-3, 2.9409e-5)),
+        "socket_A1": rigid(0.30, (9.8769e-5, 9.8769e-5, 1.274e-4)),
     }
     for k in range(1, 5):
         body[f"cylinder{k}"] = rigid(2.08, CYLINDER_INERTIA)
@@ -178,6 +187,8 @@ def _parameters(clearance: bool) -> dict:
     if clearance:
         friction = {"law": "modified-coulomb", "static": 0.15, "dynamic": 0.1, "v_static": 2e-4, "v_dynamic": 1e-2}
         joint["A1"] |= {"type": "clearance-spherical", "clearance": 5e-4, "ball_radius": 0.02, "friction": friction}
+        steel = {"youngs_modulus": 2.068e11, "poisson": 0.29}
+        joint["A1"] |= {"socket_material": steel, "ball_material": steel}
         joint["A1"]["normal"] = {"law": "lankarani-nikravesh", "restitution": 0.9}
     return {"body": body, "joint": joint}
 
