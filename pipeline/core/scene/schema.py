@@ -64,17 +64,21 @@ class Accuracy(Part):
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
+    allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
     """
 
     quantities: dict[str, Wanted] = Field(default_factory=dict)
+    allow_missed: bool = False
 
     @model_validator(mode="before")
     @classmethod
     def _flat(cls, table: Any) -> Any:
-        if not isinstance(table, dict) or set(table) <= {"quantities", "source"}:
+        plain = {"allow_missed", "source"}
+        if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
-        found = {name: _wanted(name, value) for name, value in _leaves(table, "")}
-        return {"quantities": found} | ({"source": table["source"]} if "source" in table else {})
+        wanted = {name: value for name, value in table.items() if name not in plain}
+        found = {name: _wanted(name, value) for name, value in _leaves(wanted, "")}
+        return {"quantities": found} | {name: table[name] for name in plain & set(table)}
 
 
 def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
