@@ -26,7 +26,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
-        for sentence in warnings(done.engine.model, done.trajectory):
+        for sentence in warnings(done):
             progress(None, f"warning: {sentence}")
         return dataset(done)
 

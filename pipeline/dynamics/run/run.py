@@ -90,6 +90,7 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     start = consistent_start(engine)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
+    _require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
     return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched)
 
@@ -107,6 +108,17 @@ def follow(
         progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
         second = other()
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
+
+
+def _require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+    """SolverError for a contact so deep that its surfaces mean nothing."""
+    if not model.contacts:
+        return
+    from pipeline.dynamics.contact.validity import deepest, refuse_deep
+
+    depths, _ = deepest(trajectory.events, seen.touch)
+    for (name, joint, *_), depth in zip(model.contacts, depths, strict=True):
+        refuse_deep(name, joint, float(depth))
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
