@@ -67,7 +67,7 @@ def attributes(scene: Scene) -> dict[str, str]:
 
 def warnings(run: Run) -> list[str]:
     """Sentences about what a run is to be doubted for."""
-    return [*_contact_warnings(run), *_flexible_warnings(run), *_step_warnings(run.model, run.trajectory)]
+    return [*run.mended, *_contact_warnings(run), *_flexible_warnings(run), *_step_warnings(run.model, run.trajectory)]
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
@@ -118,6 +118,8 @@ def _report(run: Run) -> dict[str, float | int | str]:
     if run.twin is not None:
         told["twin_perturbation"] = run.twin.perturbation
     told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
+    if run.mended:
+        told["start_mended"] = "\n".join(run.mended)
     if run.switched:
         told["switched"] = run.switched
     if redundant:
