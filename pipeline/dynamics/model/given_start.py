@@ -28,7 +28,10 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Miss:
-    """A driven coordinate whose start, in the poses given, is not where its law starts [m or rad]."""
+    """A driven coordinate whose start, in the poses given, is not where its law starts [m or rad].
+
+    of_path: the coordinate is one of a path, not of a joint.
+    """
 
     drive: str
     place: str
@@ -36,6 +39,7 @@ class Miss:
     now: float
     value: float
     turning: bool
+    of_path: bool = False
 
     @property
     def size(self) -> float:
@@ -103,16 +107,23 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
         turn = rotation_vector_to_matrix(np.array(wanted[3:6], dtype=float))
         apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
         drive = str(edge.drives[3]).partition(".")[0]
-        yield Miss(str(edge.drives[3]), f"[drive.{drive}.rotation]", f"the turn of '{edge.frame_b}'", apart, 0.0, True)
+        yield Miss(
+            str(edge.drives[3]), f"[drive.{drive}.rotation]", f"the turn of '{edge.frame_b}'", apart, 0.0, True, True
+        )
     for k, (name, value) in enumerate(zip(edge.drives, wanted, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue
-        yield Miss(name, f"[drive.{name}]", f"'{edge.frame_b}'", float(now[k]), value, k >= 3)
+        yield Miss(name, f"[drive.{name}]", f"'{edge.frame_b}'", float(now[k]), value, k >= 3, True)
 
 
 def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
-    """InputError for poses given that contradict a drive by more than a mend may move them."""
+    """InputError for poses given that contradict a joint's drive by more than a mend may move them.
+
+    What a path leads is put where the path begins, however far that is, and told: the path says where the body is.
+    """
     for miss in found:
+        if miss.of_path:
+            continue
         limit = FAR_ANGLE if miss.turning else FAR * mechanism.length
         if miss.size > limit:
             unit = "rad" if miss.turning else "m"
