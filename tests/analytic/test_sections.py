@@ -58,7 +58,8 @@ def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Sce
     # neighbours part by exp(0.112 x 47 s) = 200 of a tolerance of 1e-10, and both runs err
     for name in ("position", "velocity", "quaternion"):
         a, b = one_by_one[name].values[1:5], strobed[name].values
-        assert np.abs(a - b * np.sign((a * b).sum(axis=-1, keepdims=True) if name == "quaternion" else 1.0)).max() < 1e-5
+        sign = np.sign((a * b).sum(axis=-1, keepdims=True)) if name == "quaternion" else 1.0
+        assert np.abs(a - b * sign).max() < 1e-5
 
 
 @pytest.mark.parametrize(
