@@ -93,7 +93,7 @@ def _rule(
     told = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"
     grows, still = rate.low > least, rate.low <= least
     if after and still:
-        times = "period" if after == 1 else f"{after} periods"
+        times = "one period" if after == 1 else f"{after} periods"
         return "periodic", (f"the states come back after {times}, to {distance:.2g} of the motion", told)
     tested = f"0-1 test K = {K:.2f}"
     if grows and K > CHAOTIC:
