@@ -111,7 +111,7 @@ class Graph:
     def verdict(self) -> Task:
         """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
         inputs = {"sections": self.sections}
-        return self._scene_task("verdict", "stages.s4_sections:verdict", {}, inputs, names={"nc": "verdict.nc"})
+        return self._scene_task("verdict", "stages.s5_verdict:run", {}, inputs, names={"nc": "verdict.nc"})
 
     @cached_property
     def post(self) -> Task:

@@ -1,4 +1,4 @@
-"""Beside stages 4 and 5: scene and bundles -> sections of its periodic motion -> verdict and figure."""
+"""Beside stage 4: scene and bundles -> sections of its periodic motion."""
 
 from __future__ import annotations
 
@@ -28,12 +28,3 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline import dynamics
 
     return {"nc": dynamics.sections(s4_simulate.rebuild(params), s4_simulate.bundles(inputs), progress)}
-
-
-def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Verdict (schema VERDICT) and its figure; the input is ``sections``."""
-    from pipeline.post.plotting import section_figure
-    from pipeline.post.verdict import derive
-
-    judged = derive(inputs["sections"])
-    return {"nc": judged, **section_figure.make(inputs["sections"], judged)}

@@ -24,8 +24,8 @@ def campbell() -> ModuleType:
 
 @pytest.mark.parametrize("speed", [0.0, 100.0, 300.0])
 def test_the_gyroscopic_moment_parts_the_whirls_of_an_overhung_rotor(campbell: ModuleType, speed: float) -> None:
-    # the shaft's own mass, 1.6e-5 of the disc's, of which a quarter counts, is not in the closed form; at the least whirl
-    # a millionth of the turning speed, from which it is found as a difference, comes on top
+    # the shaft's own mass, 1.6e-5 of the disc's, of which a quarter counts, is not in the closed form; the least whirl
+    # is found as a difference of numbers ten times as large
     assert_allclose(campbell.found_whirls(speed), campbell.whirls(speed), rtol=2e-4)
 
 
