@@ -52,7 +52,7 @@ def fitted(ay: float, bx: float, by: float) -> Layout:
 def admissible(layout: Layout) -> bool:
     """Whether its legs and sockets can be built, before it is moved."""
     return bool(
-        SHORTEST <= layout.leg
+        layout.leg >= SHORTEST
         and layout.leg + STROKE <= LONGEST
         and np.hypot(layout.ax, layout.ay) <= REACH
         and 2.0 * min(layout.ay, layout.bx, layout.by) >= SOCKETS

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pipeline.core.scene.schema import Scene
     from pipeline.dynamics.record.cost import Cost
 
-__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "simulate"]
+__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -27,7 +27,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
-        for sentence in warnings(done.engine.model, done.trajectory):
+        for sentence in warnings(done):
             progress(None, f"warning: {sentence}")
         return dataset(done)
 
@@ -48,6 +48,13 @@ def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *,
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from pipeline.dynamics.record.ensemble import ensemble as run
+
+    return run(scene, bundles, progress)
+
+
+def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """A scene whose laws repeat, looked at once in each period (schema SECTIONS)."""
+    from pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)
 
