@@ -49,6 +49,7 @@ class Graph:
                 "stages.s1_mesh:run",
                 s1_mesh.params(Path(part.mesh), self.recipe),
                 modules=s1_mesh.modules(Path(part.mesh)),
+                context={"folder": str(Path(part.mesh).parent.resolve())},
             )
             for body, part in self.scene.flexible().items()
         }
@@ -182,6 +183,7 @@ class Graph:
         return Task(
             stage=stage,
             scene=self.scene.name,
+            context={"name": self.scene.name},
             run=run,
             params=params,
             folder=self._folder(),
@@ -198,11 +200,13 @@ class Graph:
         params: dict[str, object],
         inputs: dict[str, Task] | None = None,
         modules: tuple[str, ...] = (),
+        context: dict[str, str] | None = None,
     ) -> Task:
         return Task(
             stage=stage,
             scene=self.scene.name,
             part=body,
+            context=context or {},
             run=run,
             params=params,
             folder=self._folder(stage),

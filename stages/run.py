@@ -97,7 +97,7 @@ def _known(name: str) -> str:
 
 
 def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
-    """Dataset of the simulate stage, brought up to date; titled as the scene is.
+    """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
     An edited scene (`override`) is cached like any other but does not take the place of its file's
     results under results/runs.  Raises FlexclearError.
@@ -108,7 +108,7 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
 def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
@@ -154,7 +154,7 @@ def linear(
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
 def check(outcome: Outcome) -> None:

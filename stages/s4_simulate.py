@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -14,13 +13,21 @@ if TYPE_CHECKING:
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles and the place of files on disk are not part of it,
+    """What the engine sees of a scene. Titles, and places and names of files are not part of it,
     nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
     left_out = {"title", "description", "accuracy" if ensemble else "ensemble"}
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.flexible():
-        table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
-    return {"name": scene.name, "scene": table}
+        table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
+    return {"scene": without_file_names(table)}
+
+
+def without_file_names(node: Any) -> Any:
+    """The same, but for the names of files that laws were read from: their numbers are there."""
+    if isinstance(node, dict):
+        read = node.get("type") == "table" and "points" in node
+        return {k: "" if read and k == "file" else without_file_names(value) for k, value in node.items()}
+    return [without_file_names(item) for item in node] if isinstance(node, list) else node
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
@@ -72,9 +79,10 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def rebuild(params: Mapping[str, Any]) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name."""
+    """The scene again, from what `params` kept of it; its title is its name, where that is told."""
     from pipeline.core.scene.schema import Scene
 
-    scene = Scene.model_validate({**params["scene"], "title": params["name"]})
-    scene._name = params["name"]
+    name = str(params.get("name", "scene"))
+    scene = Scene.model_validate({**params["scene"], "title": name})
+    scene._name = name
     return scene

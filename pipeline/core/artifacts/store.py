@@ -14,10 +14,10 @@ import fcntl
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipeline.core.errors import ResourceError
 
@@ -93,8 +93,7 @@ class Store:
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
             record = Record(stage, key, digests, dict(facts))
-            text = json.dumps(asdict(record), indent=1, sort_keys=True, ensure_ascii=False)
-            publish(self.path(stage, key, "json"), text.encode() + b"\n")
+            publish(self.path(stage, key, "json"), checked(asdict(record)))
         return record
 
     def load(self, record: Record) -> xr.Dataset:
@@ -126,6 +125,17 @@ class Store:
             return None
         return read_record(self.root / folder / ".facts" / f"{label.replace(' ', '.')}.json")
 
+    def names(self, stage: str, plain: str) -> tuple[str, ...]:
+        """Files that the tasks of one plain key have opened so far; none where none was made yet."""
+        table = read_checked(self.path(stage, plain, "names"))
+        return tuple(table["names"]) if table is not None else ()
+
+    def keep_names(self, stage: str, plain: str, names: Sequence[str]) -> None:
+        """Remember them."""
+        path = self.path(stage, plain, "names")
+        with disk_limits(path.parent):
+            publish(path, checked({"names": list(names)}))
+
     @contextlib.contextmanager
     def lock(self, stage: str, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
         """Held by one process at a time, so that concurrent runs make an artifact once.
@@ -150,12 +160,32 @@ class Store:
 
 
 def read_record(path: Path) -> Record | None:
-    """The record in a file; None when there is none or it cannot be understood."""
+    """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
     try:
-        table = json.loads(path.read_bytes())
+        table = read_checked(path) or {}
         return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError):
         return None
+
+
+def checked(table: Mapping[str, Any]) -> bytes:
+    """A table as a file that carries its own digest: ``{"content": ..., "sha256": ...}``."""
+    whole = {"content": table, "sha256": _digest(table)}
+    return json.dumps(whole, indent=1, sort_keys=True, ensure_ascii=False).encode() + b"\n"
+
+
+def read_checked(path: Path) -> dict[str, Any] | None:
+    """The table in a file that `checked` made; None when there is none or one bit of it has changed."""
+    try:
+        whole = json.loads(path.read_bytes())
+        table = whole["content"]
+        return dict(table) if whole["sha256"] == _digest(table) else None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _digest(table: Mapping[str, Any]) -> str:
+    return _sha256(json.dumps(table, sort_keys=True, ensure_ascii=False).encode())
 
 
 def publish(path: Path, content: bytes) -> str:
@@ -174,6 +204,7 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> str:
     Equal datasets give equal bytes: fixed compression, no times or names of this machine. Numeric
     arrays are compressed and carry fletcher32 sums, so that other programs notice damage too.
     """
+    import netCDF4  # noqa: F401 - what `engine` names: its version is a fact of every key
     import xarray as xr
 
     packed = {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}
