@@ -9,8 +9,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipeline.core.artifacts.disk import disk_limits
 from pipeline.core.artifacts.paths import results_root
-from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
+from pipeline.core.artifacts.store import Store, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import TREE, Sources

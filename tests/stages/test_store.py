@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.artifacts.store import Record, Store, publish, write_dataset
+from pipeline.core.artifacts.disk import publish
+from pipeline.core.artifacts.store import Record, Store, write_dataset
 from pipeline.core.errors import ResourceError
 
 KEY = "k" * 32

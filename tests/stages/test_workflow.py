@@ -145,13 +145,18 @@ def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     assert [path.name for path in project.results.rglob("*") if path.is_file() and path.stat().st_size] == []
 
 
-def test_a_scene_that_says_the_same_is_run_under_its_own_name(project: Project, add_scene: Callable[[str, str], None]):
-    """Two scenes may be equal in all but the name; each has its own artifacts, named as it is."""
+def test_a_scene_that_says_the_same_under_another_name_is_not_run_again(
+    project: Project, add_scene: Callable[[str, str], None]
+):
+    """The name of its file is no fact; both show the result, and only `run` from Python and `--out` name it."""
     add_scene("twin", SCENE + JOINT)
     for name in ("ideal", "twin"):
-        project.run("run", f"tiny/{name}", "--to", "simulate")
-        run = xr.load_dataset(project.results / "runs" / "tiny" / name / "run.nc", decode_times=False)
-        assert run.attrs["scene"] == f"tiny/{name}"
+        project.run("run", f"tiny/{name}", "--to", "simulate", "--out", str(project.folder / f"{name}.nc"))
+        named = xr.load_dataset(project.folder / f"{name}.nc", decode_times=False)
+        assert named.attrs["scene"] == f"tiny/{name}"
+    assert project.calls() == ["simulate tiny/ideal"]
+    shown = [project.results / "runs" / "tiny" / name / "run.nc" for name in ("ideal", "twin")]
+    assert shown[0].read_bytes() == shown[1].read_bytes()
 
 
 def test_the_ensemble_is_a_stage_of_its_own(project: Project, add_scene: Callable[[str, str], None]):

@@ -82,6 +82,9 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     if not why and last is not None:
         # nothing changed, so the artifact itself must be broken; `find` has said so if it is corrupt
         why = [store.fault(last) or "its record in the cache is missing"]
+    failure = store.why_outdated(task.folder, task.label)
+    if failure is not None:
+        why.append(f"what is shown is of an earlier state: {failure.splitlines()[0]}")
     return State(task, None, tuple(why))
 
 

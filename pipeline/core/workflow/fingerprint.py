@@ -18,7 +18,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from pipeline.core.artifacts.store import checked, publish, read_checked
+from pipeline.core.artifacts.disk import checked, publish, read_checked
 
 OWN = ("pipeline", "stages", "benchmarks")
 #: distributions whose name differs from that of their import package
