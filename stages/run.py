@@ -18,6 +18,7 @@ from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
 from pipeline.core.workflow.task import Task
+from stages import owner
 from stages.graph import STAGES, Graph
 
 if TYPE_CHECKING:
@@ -43,6 +44,10 @@ def command(options: argparse.Namespace) -> None:
         check_target(options.out)
     wanted = graphs(options.scenes)
     place = workplace()
+    for graph in wanted:
+        told = owner.claim(graph.scene, place.store)
+        if told is not None:
+            place.monitor.say(told)
     outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
@@ -170,19 +175,20 @@ def _as_in_its_file(scene: Scene) -> bool:
 
 def graphs(names: list[str]) -> list[Graph]:
     """Graphs of the scenes, each once; the mistakes of all scenes are told together."""
-    found: dict[str, Graph] = {}
+    found: dict[Path | None, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
         try:
             graph = Graph(load_scene(find_scene(name)))
             graph.up_to("post")
-            found[graph.scene.name] = graph
+            found[graph.scene.path and graph.scene.path.resolve()] = graph
         except InputErrors as errors:
             wrong.extend(errors.errors)
         except InputError as error:
             wrong.append(error)
     if wrong:
         raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+    owner.refuse_namesakes([graph.scene for graph in found.values()])
     return list(found.values())
 
 

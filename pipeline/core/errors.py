@@ -2,6 +2,17 @@
 
 from __future__ import annotations
 
+#: characters of a value or a message that are shown; the middle of longer ones is left out
+LONGEST = 400
+
+
+def shown(text: str, longest: int = LONGEST) -> str:
+    """Text as it may stand on a terminal: control characters spelt out, the middle of what is long left out."""
+    if len(text) > longest:
+        half = longest // 2
+        text = f"{text[:half]} ... ({len(text) - 2 * half} characters left out) ... {text[-half:]}"
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+
 
 class FlexclearError(Exception):
     """Base of all expected failures; `exit_code` is what the command returns."""

@@ -11,7 +11,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from pipeline.core.errors import InputError
+from pipeline.core.errors import InputError, shown
 from pipeline.core.registry import suggestion
 from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.not_toml import not_toml
@@ -60,12 +60,18 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 
 
 def scene_name(path: Path) -> str:
-    """Path below the last folder called ``scenes``, without suffix; else the file's stem."""
-    parts = path.resolve().with_suffix("").parts
-    if "scenes" in parts:
-        last = len(parts) - 1 - parts[::-1].index("scenes")
-        return "/".join(parts[last + 1 :])
-    return parts[-1]
+    """Path without suffix below the last folder called ``scenes``; else below the current folder; else the stem.
+
+    Raises InputError where that cannot be the name of a folder.
+    """
+    whole = path.resolve().with_suffix("")
+    if not whole.name.strip(".") or not whole.name.isprintable():
+        raise InputError(shown(str(path)), "is no name for a scene: results go into a folder of that name", "rename it")
+    if "scenes" in whole.parts[:-1]:
+        last = len(whole.parts) - 1 - whole.parts[::-1].index("scenes")
+        return "/".join(whole.parts[last + 1 :])
+    here = Path.cwd()
+    return whole.relative_to(here).as_posix() if whole.is_relative_to(here) else whole.name
 
 
 def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
