@@ -24,6 +24,7 @@ COMMANDS = {
     "report": "all figures and tables of the paper, and results/report/index.html",
     "schema": "JSON schema of scene files",
     "cite": "sources of the methods and data that a scene uses",
+    "cache": "what is kept: size, check, explain, prune",
 }
 
 
