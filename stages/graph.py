@@ -42,6 +42,8 @@ class Graph:
     @cached_property
     def mesh(self) -> dict[str, Task]:
         """By flexible body."""
+        for part in self.scene.flexible().values():
+            s1_mesh.check_size(Path(part.mesh), self.scene.limits, self.recipe)
         return {
             body: self._body_task(
                 "mesh",
@@ -183,7 +185,7 @@ class Graph:
         return Task(
             stage=stage,
             scene=self.scene.name,
-            context={"name": self.scene.name},
+            context={"name": self.scene.name, "limits": self.scene.limits.written()},
             run=run,
             params=params,
             folder=self._folder(),

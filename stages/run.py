@@ -13,6 +13,7 @@ from pipeline.core.artifacts.disk import disk_limits
 from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
+from pipeline.core.scene.limits import check_run
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
@@ -45,6 +46,7 @@ def command(options: argparse.Namespace) -> None:
     wanted = graphs(options.scenes)
     place = workplace()
     for graph in wanted:
+        check_run(graph.scene, place.store.root)
         told = owner.claim(graph.scene, place.store)
         if told is not None:
             place.monitor.say(told)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.core.errors import InputError
 from pipeline.core.registry import module_of
+from pipeline.core.scene.limits import Limits, check_cells
 from pipeline.core.scene.load import read_toml
 from pipeline.core.workflow import opened
 
@@ -36,6 +37,12 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
         if not path.is_file():
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     return {"recipe": table | changes}
+
+
+def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:
+    """ResourceError when the mesh would have more cells than it may; files are judged when they are read."""
+    table = params(recipe, edits)["recipe"]
+    check_cells(table.get("shape"), table.get("elements"), limits, recipe)
 
 
 def modules(recipe: Path) -> tuple[str, ...]:

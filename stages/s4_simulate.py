@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from pipeline.core.artifacts.paths import results_root
+from pipeline.core.scene.limits import check_run
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -15,7 +18,7 @@ if TYPE_CHECKING:
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
     """What the engine sees of a scene. Titles, and places and names of files are not part of it,
     nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
-    left_out = {"title", "description", "accuracy" if ensemble else "ensemble"}
+    left_out = {"title", "description", "limits", "accuracy" if ensemble else "ensemble"}
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.flexible():
         table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
@@ -45,6 +48,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline import dynamics
 
     scene, reduced = rebuild(params), bundles(inputs)
+    check_run(scene, results_root())
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
         progress(None, text)
@@ -70,7 +74,9 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
     from pipeline import dynamics
 
-    return {"nc": dynamics.ensemble(rebuild(params), bundles(inputs), progress)}
+    scene = rebuild(params)
+    check_run(scene, results_root())
+    return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
 
 
 def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
@@ -83,6 +89,6 @@ def rebuild(params: Mapping[str, Any]) -> Scene:
     from pipeline.core.scene.schema import Scene
 
     name = str(params.get("name", "scene"))
-    scene = Scene.model_validate({**params["scene"], "title": name})
+    scene = Scene.model_validate({**params["scene"], "title": name, "limits": params.get("limits", {})})
     scene._name = name
     return scene

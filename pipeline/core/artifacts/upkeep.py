@@ -114,9 +114,9 @@ def _shown(store: Store) -> Iterator[Record]:
 def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
     """Files of artifacts whose record is gone: a process died between them. Young ones may be about to get one."""
     for path in sorted((store.root / "cache").glob("*/*")):
-        if path.is_file() and path not in known and not path.name.endswith(BESIDE):
-            if time.time() - path.stat().st_mtime > YOUNG:
-                yield path
+        ours = path.is_file() and path not in known and not path.name.endswith(BESIDE)
+        if ours and time.time() - path.stat().st_mtime > YOUNG:
+            yield path
 
 
 def _below(store: Store, path: Path) -> str:

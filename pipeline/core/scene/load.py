@@ -13,12 +13,13 @@ from pydantic import ValidationError
 
 from pipeline.core.errors import InputError, shown
 from pipeline.core.registry import suggestion
+from pipeline.core.scene.limits import check_parts
 from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
-SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
+SETTINGS = ("time", "solver", "output", "ensemble", "accuracy", "limits")
 #: bytes that no scene or recipe needs
 LARGEST = 16 << 20
 EDITS = ("extends", "replace", "set", "remove")
@@ -34,6 +35,7 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     table = compose(path)
     for place, value in (override or {}).items():
         _put(table, place, value, f"override of {path}")
+    check_parts(table, path, FAMILIES)
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:

@@ -52,7 +52,7 @@ def dataset(run: Run) -> xr.Dataset:
 
 def attributes(scene: Scene) -> dict[str, str]:
     """What the run was made from: parameters, assumptions, sources, versions; no times, no names of files."""
-    parameters = scene.model_dump(mode="json", exclude={"title", "description"}, exclude_none=True)
+    parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
         del parameters["body"][body]["mesh"]
     return {

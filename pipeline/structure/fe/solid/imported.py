@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from pipeline.core import machine
 from pipeline.core.errors import InputError
 from pipeline.core.units import UNITS
 from pipeline.core.workflow import opened
@@ -49,6 +50,8 @@ def _read(path: Path, where: str) -> Any:
 
     if not path.is_file():
         raise InputError(where, f"there is no file {path}", "paths are relative to the recipe")
+    # text of 20 bytes becomes a number of 8, but meshes are in memory several times while they are read
+    machine.require_memory(5.0 * path.stat().st_size, f"{where}: '{path.name}'", "use a coarser mesh")
     _note_companions(path)
     said = io.StringIO()
     try:
