@@ -14,7 +14,7 @@ from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
 from pipeline.core.scene.limits import check_run
-from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.load import is_file, load_scene
 from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
@@ -89,10 +89,10 @@ def workplace() -> Workplace:
 def find_scene(name: str) -> Path:
     """The file of a scene given by path or by name (``sps4/csj``). InputError names what is near."""
     path = Path(name)
-    if path.suffix == ".toml" or path.is_file():
+    if path.suffix == ".toml" or is_file(path):
         return path
     named = TREE / "scenes" / f"{name}.toml"
-    if named.is_file():
+    if is_file(named):
         return named
     raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
 

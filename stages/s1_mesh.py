@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from pipeline.core.errors import InputError
 from pipeline.core.registry import module_of
 from pipeline.core.scene.limits import Limits, check_cells
-from pipeline.core.scene.load import read_toml
+from pipeline.core.scene.load import is_file, read_toml
 from pipeline.core.workflow import opened
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     if "elements" in changes:
         changes["elements"] = changes["elements"] * table["elements"]
     for path in _files(table, recipe.parent):
-        if not path.is_file():
+        if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     return {"recipe": table | changes}
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from pipeline.core.errors import InputError
 from pipeline.core.units import unit
 
+#: characters of a line that is worth mending
+LONGEST = 300
 _LINE = re.compile(r"\(at line (\d+)")
 #: text in quotation marks, or a comment, both left alone; or a number and what stands after it like a unit
 _PARTS = re.compile(
@@ -22,7 +24,7 @@ def not_toml(path: Path, text: str, message: str) -> InputError:
     found, lines = _LINE.search(message), text.splitlines()
     number = int(found[1]) if found else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
-    quoted = _quoted(line)
+    quoted = _quoted(line) if len(line) <= LONGEST else line
     if quoted != line:
         rule = f"a quantity with a unit needs quotation marks: {line.strip()}"
         return InputError(f"{path}, line {number}", f"is not TOML: {rule}", f"write {quoted.strip()}")

@@ -158,7 +158,7 @@ def _table(path: Path, where: str) -> Table:
         node = np.array([int(row["node"]) for row in rows])
         position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
         component = np.array([_component(row["component"]) for row in rows])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, csv.Error, OverflowError) as error:
         hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
         raise InputError(where, f"'{path.name}' is no table of unknowns: {error}", hint) from None
     return Table(node, component, position.reshape(-1, 3))
