@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pipeline.core.artifacts.paths import results_root
-from pipeline.core.scene.limits import check_run
+from pipeline.core.scene.demand import check_run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -15,10 +15,16 @@ if TYPE_CHECKING:
     from pipeline.core.scene.schema import Scene
 
 
-def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, and places and names of files are not part of it,
-    nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
-    left_out = {"title", "description", "limits", "accuracy" if ensemble else "ensemble"}
+def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
+    """What the engine sees of a scene. Titles, limits, and places and names of files are not part of it,
+    nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
+    whether that may be missed."""
+    whole = ("title", "description", "limits", "accuracy" if ensemble else "ensemble")
+    left_out: dict[str, Any] = dict.fromkeys(whole, True)
+    if not ensemble:
+        left_out["accuracy"] = {"allow_missed"}
+    if not sections:
+        left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.flexible():
         table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle

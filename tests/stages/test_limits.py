@@ -11,7 +11,8 @@ import pytest
 
 from pipeline.core import machine
 from pipeline.core.errors import InputError, ResourceError
-from pipeline.core.scene.limits import check_cells, check_run, row
+from pipeline.core.scene.demand import check_run, row
+from pipeline.core.scene.limits import check_cells
 from pipeline.core.scene.load import load_scene
 from pipeline.structure.fe.exchange import files
 from stages import s4_simulate

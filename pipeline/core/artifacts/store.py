@@ -13,7 +13,7 @@ import errno
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 #: the file of an artifact that other stages read
 MAIN = "nc"
+#: attributes of the main file that a command tells, without opening the file
+TOLD = ("warnings", "accuracy_verdict")
 #: lies beside what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
@@ -46,12 +48,16 @@ OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key."""
+    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
+
+    said: those of the main file's attributes that a command tells its user (`TOLD`).
+    """
 
     stage: str
     key: str
     files: Mapping[str, str]
     facts: Mapping[str, str]
+    said: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -104,7 +110,8 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
-            record = Record(stage, key, digests, dict(facts))
+            said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
+            record = Record(stage, key, digests, dict(facts), said)
             publish(self.path(stage, key, "json"), checked(asdict(record)))
         return record
 
@@ -217,9 +224,15 @@ def read_record(path: Path) -> Record | None:
     """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
     try:
         table = read_checked(path) or {}
-        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]))
+        said = dict(table.get("said", {}))
+        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]), said)
     except (ValueError, KeyError, TypeError):
         return None
+
+
+def _attributes(product: Product) -> Mapping[str, object]:
+    """Attributes of the main file; none where it is no dataset."""
+    return getattr(product.get(MAIN), "attrs", {})
 
 
 def write_dataset(path: Path, dataset: xr.Dataset) -> str:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import bz2
 import gzip
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
@@ -24,7 +25,7 @@ COPIES = 4.0
 SMALLER = "condense the body, or leave out what no frame needs"
 #: more rows than this are taken for damage
 LARGEST = 10**9
-OPENERS = {".gz": gzip.open, ".bz2": bz2.open}
+OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
 def read(path: Path, where: str) -> sp.coo_array:
