@@ -26,6 +26,7 @@ COMMANDS = {
     "schema": "JSON schema of scene files",
     "cite": "sources of the methods and data that a scene uses",
     "cache": "what is kept: size, check, explain, prune",
+    "doctor": "is all here that is needed, and does it compute",
 }
 
 
