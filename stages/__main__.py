@@ -16,6 +16,8 @@ INTERRUPTED = 130
 CLOSED_PIPE = 141
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
+    "new": "a commented scene of one's own to start from",
+    "check": "every mistake of scenes and recipes at once; nothing is run",
     "run": "bring scenes up to date",
     "why": "for each stage: fresh, or why it would run again",
     "cost": "what accuracy costs: errors against cost, and where they come from",

@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING
 from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
-from pipeline.core.scene.load import load_scene
+from pipeline.core.scene import lines
+from pipeline.core.scene.load import load_scene, read_toml
+from pipeline.core.scene.references import dangling
 from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
@@ -102,6 +104,7 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     An edited scene (`override`) is cached like any other but does not take the place of its file's
     results under results/runs.  Raises FlexclearError.
     """
+    require_names(scene)
     place = place or workplace()
     import_module("pipeline.core.artifacts.modal")  # gives the dataset its accessor
     task = Graph(scene, shown=_as_in_its_file(scene)).simulate
@@ -174,6 +177,7 @@ def graphs(names: list[str]) -> list[Graph]:
     for name in names:
         try:
             graph = Graph(load_scene(find_scene(name)))
+            require_names(graph.scene)
             graph.up_to("post")
             found[graph.scene.name] = graph
         except InputErrors as errors:
@@ -181,8 +185,26 @@ def graphs(names: list[str]) -> list[Graph]:
         except InputError as error:
             wrong.append(error)
     if wrong:
-        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+        told = [lines.located(error) for error in wrong]
+        raise told[0] if len(told) == 1 else InputErrors(told)
     return list(found.values())
+
+
+def require_names(scene: Scene) -> None:
+    """InputErrors for names in a scene that lead nowhere, before a mesh or a mode is computed for it."""
+    table = scene.model_dump(mode="python", exclude_none=True)
+    wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
+    if wrong:
+        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+
+
+def recipe_frames(mesh: str) -> list[str] | None:
+    """Names of the frames in a mesh recipe; None where it cannot be read, which is told elsewhere."""
+    try:
+        frames = read_toml(Path(mesh)).get("frames")
+    except InputError:
+        return None
+    return list(frames) if isinstance(frames, dict) else None
 
 
 def copy_run(graph: Graph, place: Workplace, target: Path) -> None:

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
 
 
 def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles and the place of files on disk are not part of it,
-    nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
-    left_out = {"title", "description", "accuracy" if ensemble else "ensemble"}
+    """What the engine sees of a scene. Titles, views and the place of files on disk are not part
+    of it, nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
+    left_out = {"title", "description", "view", "accuracy" if ensemble else "ensemble"}
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.flexible():
         table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name

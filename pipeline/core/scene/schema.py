@@ -9,7 +9,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
-from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
+from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
@@ -77,6 +77,25 @@ class Accuracy(Part):
         return {"quantities": found} | ({"source": table["source"]} if "source" in table else {})
 
 
+class View(Part):
+    """What is looked at; no effect on the motion.
+
+    watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.peak_force``;
+    default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
+    direction: from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar
+    mechanism its normal, else from above and in front.
+    """
+
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    direction: Direction | None = None
+
+    @model_validator(mode="after")
+    def _points(self) -> View:
+        if self.direction is not None and not any(self.direction):
+            raise ValueError("a direction of length zero points nowhere")
+        return self
+
+
 def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
     """Dotted name -> value, of nested tables or quoted names alike."""
     found = []
@@ -120,6 +139,7 @@ class Scene(Part):
     output: Output = Output()
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None
+    view: View | None = None
 
     @model_validator(mode="after")
     def _rows_can_be_kept(self) -> Scene:
@@ -133,11 +153,13 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _quantities_are_there(self) -> Scene:
-        for name in self.accuracy.quantities if self.accuracy else ():
+        named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
+        named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
+        for place, name in named:
             try:
                 parse(name, self.owners())
             except ValueError as error:
-                raise ValueError(f"accuracy.{name}: {error}") from None
+                raise ValueError(f"{place}{name}: {error}") from None
         return self
 
     @model_validator(mode="after")
@@ -170,6 +192,12 @@ class Scene(Part):
         }
         hosts = self._hosts()
         return usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+
+    def watched(self) -> list[Quantity]:
+        """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
+        if self.view is not None and self.view.watch is not None:
+            return [parse(name, self.owners()) for name in self.view.watch]
+        return self.wanted()
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""
