@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +14,7 @@ from pipeline.core.errors import InputError, InputErrors
 from pipeline.core.scene import lines
 from pipeline.core.scene.load import compose, load_scene
 from pipeline.core.scene.references import dangling
-from stages import run
+from stages import run, s1_mesh
 from stages.graph import Graph
 
 if TYPE_CHECKING:
@@ -59,10 +60,10 @@ def examined(name: str) -> tuple[list[InputError], Scene | None]:
         found += _each(error)
     found += _collect(_recipes(path))
     if scene is not None:
-        found += _collect([lambda: Graph(scene).up_to("post")])
-        found += _collect(_laws(scene, str(path)))
+        found += _collect([lambda: Graph(scene).up_to("post")], path)
+        found += _collect(_laws(scene), path)
         if not found and not scene.flexible():
-            found += [_placed(error, str(path)) for error in _collect([lambda: _assembled(scene)])]
+            found += _collect([lambda: _assembled(scene)], path)
     return list({str(error): error for error in found}.values()), scene
 
 
@@ -71,12 +72,21 @@ def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
     bodies = compose(path).get("body", {})
     meshes = dict.fromkeys(body["mesh"] for body in bodies.values() if isinstance(body.get("mesh"), str))
     if meshes:
-        from pipeline.structure.fe.recipe import read_recipe
-
-        yield from (lambda mesh=mesh: read_recipe(mesh) for mesh in meshes)
+        yield from (partial(_recipe, Path(mesh)) for mesh in meshes)
 
 
-def _laws(scene: Scene, path: str) -> Iterator[Callable[[], Any]]:
+def _recipe(path: Path) -> None:
+    """Read a mesh recipe; of a beam, the nodes at which frames and masses have to lie are laid out, too."""
+    from pipeline.structure.fe.recipe import read_recipe
+
+    table = read_recipe(path)
+    if s1_mesh.kind_of(path) == "beam":
+        from pipeline.structure.fe import mesh
+
+        mesh.build(table, place=str(path))
+
+
+def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
     """A check for each prescribed coordinate: whether there is such a one, and its values fit."""
     from pipeline.dynamics.model.driving import prescribed
     from pipeline.dynamics.model.laws import checked_law
@@ -89,7 +99,7 @@ def _laws(scene: Scene, path: str) -> Iterator[Callable[[], Any]]:
                 for one in prescribed(alone):
                     checked_law(alone, one.law, one.dimension, one.place)
 
-            yield lambda check=check: _with_path(check, path)
+            yield check
 
 
 def _assembled(scene: Scene) -> None:
@@ -100,23 +110,13 @@ def _assembled(scene: Scene) -> None:
     tabulate(build(scene, {}))
 
 
-def _with_path(check: Callable[[], Any], path: str) -> None:
-    try:
-        check()
-    except InputError as error:
-        raise _placed(error, path) from None
-
-
-def _placed(error: InputError, path: str) -> InputError:
-    """Behind the file that is checked, a place that names none."""
-    return InputError(f"{path} {error.place}", error.problem, error.remedy) if error.place.startswith("[") else error
-
-
-def _collect(checks: Any) -> list[InputError]:
+def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[InputError]:
+    """What the checks raise; errors without a file are placed in that of `path`."""
     found: list[InputError] = []
     for check in checks:
         try:
-            check()
+            with run.in_file(path):
+                check()
         except InputError as error:
             found += _each(error)
     return found

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -178,7 +179,8 @@ def graphs(names: list[str]) -> list[Graph]:
         try:
             graph = Graph(load_scene(find_scene(name)))
             require_names(graph.scene)
-            graph.up_to("post")
+            with in_file(graph.scene.path):
+                graph.up_to("post")
             found[graph.scene.name] = graph
         except InputErrors as errors:
             wrong.extend(errors.errors)
@@ -188,6 +190,17 @@ def graphs(names: list[str]) -> list[Graph]:
         told = [lines.located(error) for error in wrong]
         raise told[0] if len(told) == 1 else InputErrors(told)
     return list(found.values())
+
+
+@contextmanager
+def in_file(path: Path | None) -> Iterator[None]:
+    """Errors whose place names no file are placed in this one."""
+    try:
+        yield
+    except InputError as error:
+        if path is None or not error.place.startswith("["):
+            raise
+        raise InputError(f"{path} {error.place}", error.problem, error.remedy) from None
 
 
 def require_names(scene: Scene) -> None:
