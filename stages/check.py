@@ -62,7 +62,7 @@ def examined(name: str) -> tuple[list[InputError], Scene | None]:
     if scene is not None:
         found += _collect([lambda: Graph(scene).up_to("post")], path)
         found += _collect(_laws(scene), path)
-        if not found and not scene.flexible():
+        if not found and not scene.flexible() and not scene.meshed():
             found += _collect([lambda: _assembled(scene)], path)
     return list({str(error): error for error in found}.values()), scene
 
@@ -141,6 +141,7 @@ def _record(mistake: InputError) -> dict[str, Any]:
 def _summary(scene: Scene) -> str:
     counts = {
         "rigid bodies": len(scene.rigid()),
+        "rigid bodies from recipes": len(scene.meshed()),
         "flexible bodies": len(scene.flexible()),
         "joints": len(scene.joint) - len(scene.contacts()),
         "joints with clearance": len(scene.contacts()),

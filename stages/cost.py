@@ -148,8 +148,7 @@ def _kernels(designs: list[cost_design.Design]) -> dict[tuple[str, ...], Task]:
 
 
 def _bundles(design: cost_design.Design) -> dict[str, Task]:
-    graph = Graph(design.scene, shown=False, recipe=design.recipe)
-    return {f"bundle/{body}": task for body, task in graph.bundle.items()}
+    return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
 
 
 def _measured(

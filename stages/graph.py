@@ -13,7 +13,7 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s3_bundle, s4_linear, s4_simulate, s6_render
+from stages import s1_mesh, s2_modes, s3_bundle, s3_rigid, s4_linear, s4_simulate, s6_render
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
@@ -50,7 +50,7 @@ class Graph:
                 s1_mesh.params(Path(part.mesh), self.recipe),
                 modules=s1_mesh.modules(Path(part.mesh)),
             )
-            for body, part in self.scene.flexible().items()
+            for body, part in {**self.scene.flexible(), **self.scene.meshed()}.items()
         }
 
     @cached_property
@@ -87,6 +87,21 @@ class Graph:
         }
 
     @cached_property
+    def rigid(self) -> dict[str, Task]:
+        """By rigid body with a recipe."""
+        return {
+            body: self._body_task(
+                "rigid",
+                body,
+                "stages.s3_rigid:run",
+                {},
+                {"mesh": self.mesh[body]},
+                s1_mesh.modules(Path(part.mesh)),
+            )
+            for body, part in self.scene.meshed().items()
+        }
+
+    @cached_property
     def simulate(self) -> Task:
         """One run; shown as ``run.nc``."""
         return self._simulation("simulate", "stages.s4_simulate:run", "run.nc", ensemble=False)
@@ -107,7 +122,7 @@ class Graph:
     @cached_property
     def render(self) -> Task:
         """Pictures and film."""
-        inputs = {"run": self.simulate, **self._bundles()}
+        inputs = {"run": self.simulate, **self.bodies()}
         return self._scene_task("render", "stages.s6_render:run", {"gl": s6_render.gl_state()}, inputs)
 
     def linear(
@@ -123,7 +138,7 @@ class Graph:
         name = "linear" if vibrations else "equilibrium"
         modules = s4_simulate.modules(self.scene)
         return self._scene_task(
-            name, "stages.s4_linear:run", params, self._bundles(), names={"nc": f"{name}.nc"}, modules=modules
+            name, "stages.s4_linear:run", params, self.bodies(), names={"nc": f"{name}.nc"}, modules=modules
         )
 
     def up_to(self, stage: str) -> list[Task]:
@@ -159,13 +174,16 @@ class Graph:
         """The modes on a finer mesh, to tell the error of `modes` by; by flexible body."""
         return Graph(self.scene, shown=False, recipe={**self.recipe, "elements": FINER}).modes
 
-    def _bundles(self) -> dict[str, Task]:
-        return {f"bundle/{body}": task for body, task in self.bundle.items()}
+    def bodies(self) -> dict[str, Task]:
+        """The tasks of bodies that runs need, by the names that they know them by: ``bundle/<body>``, ``rigid/<body>``."""
+        return {f"bundle/{body}": task for body, task in self.bundle.items()} | {
+            f"{s3_rigid.PREFIX}{body}": task for body, task in self.rigid.items()
+        }
 
     def _simulation(self, stage: str, run: str, name: str, *, ensemble: bool) -> Task:
         params = s4_simulate.params(self.scene, ensemble=ensemble)
         modules = s4_simulate.modules(self.scene)
-        return self._scene_task(stage, run, params, self._bundles(), names={"nc": name}, modules=modules)
+        return self._scene_task(stage, run, params, self.bodies(), names={"nc": name}, modules=modules)
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""

@@ -61,7 +61,7 @@ class Scenes:
             scene=family,
             run="stages.timing:run",
             params={g.scene.name: s4_simulate.params(g.scene) for g in graphs},
-            inputs={f"{g.scene.name}:bundle/{body}": task for g in graphs for body, task in g.bundle.items()}
+            inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
             | _paper_kernels(graphs),
             modules=tuple(sorted({name for g in graphs for name in s4_simulate.modules(g.scene)})),
             folder=f"runs/{family}",
@@ -75,7 +75,7 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     found: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
         scene = timing.paper_scene(graph.scene)
-        bundles = {f"bundle/{body}": task for body, task in graph.bundle.items()}
+        bundles = graph.bodies()
         found.setdefault(kernels.shared(scene), kernels.task(scene, bundles))
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from stages import s3_rigid
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -18,7 +20,7 @@ def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
     of it, nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
     left_out = {"title", "description", "view", "accuracy" if ensemble else "ensemble"}
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
-    for body in scene.flexible():
+    for body in (*scene.flexible(), *scene.meshed()):
         table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
     return {"name": scene.name, "scene": table}
 
@@ -37,7 +39,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
     from pipeline import dynamics
 
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
         progress(None, text)
@@ -63,7 +65,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
     from pipeline import dynamics
 
-    return {"nc": dynamics.ensemble(rebuild(params), bundles(inputs), progress)}
+    return {"nc": dynamics.ensemble(rebuild(params, inputs), bundles(inputs), progress)}
 
 
 def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
@@ -71,10 +73,16 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
-def rebuild(params: Mapping[str, Any]) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name."""
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scene:
+    """The scene again, from what `params` kept of it; its title is its name.
+
+    inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
+    """
     from pipeline.core.scene.schema import Scene
 
-    scene = Scene.model_validate({**params["scene"], "title": params["name"]})
+    table = params["scene"]
+    scene = Scene.model_validate(
+        {**table, "body": s3_rigid.filled(table["body"], inputs), "title": params["name"]}
+    )
     scene._name = params["name"]
     return scene

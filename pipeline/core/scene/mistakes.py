@@ -47,6 +47,7 @@ VALIDATORS = ("function-", "constrained-", "literal[")
 
 #: models that are chosen otherwise than by their type -> how pydantic calls them in a place
 TAGS = {
+    "MeshedRigidBody": ("meshed",),
     "JointDrive": ("joint-drive",),
     "PathDrive": ("path-drive",),
     "PlainIntegrator": ("<plain>",),

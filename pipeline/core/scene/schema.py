@@ -17,6 +17,7 @@ from pipeline.core.scene.parts import (
     FlexibleBody,
     Ground,
     Joint,
+    MeshedRigidBody,
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
@@ -230,6 +231,10 @@ class Scene(Part):
     def flexible(self) -> dict[str, FlexibleBody]:
         """Flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
+
+    def meshed(self) -> dict[str, MeshedRigidBody]:
+        """Rigid bodies whose mass, inertia and frames are those of a mesh recipe, by name."""
+        return {n: b for n, b in self.body.items() if isinstance(b, MeshedRigidBody)}
 
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""
