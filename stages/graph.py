@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s3_bundle, s3_rigid, s4_linear, s4_simulate, s6_render
+from stages import s1_mesh, s2_modes, s3_bundle, s3_rigid, s4_linear, s4_simulate, s6_render, s7_overview
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
@@ -21,6 +21,8 @@ STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
 ARTIFACTS = {name: name for name in STAGES} | {"run": "simulate", "tight": "tight", "fine-modes": "fine_modes"}
 #: how much tighter the tolerance of `tight` is, and how many times more elements `fine-modes` has
 TIGHTER, FINER = 1e-2, 4
+#: the tightest tolerance that makes a difference: beyond, rounding does
+TIGHTEST = 1e-13
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class Graph:
     def render(self) -> Task:
         """Pictures and film."""
         inputs = {"run": self.simulate, **self.bodies()}
-        return self._scene_task("render", "stages.s6_render:run", {"gl": s6_render.gl_state()}, inputs)
+        return self._scene_task("render", "stages.s6_render:run", s6_render.params(self.scene), inputs)
 
     def linear(
         self,
@@ -165,9 +167,23 @@ class Graph:
 
     @cached_property
     def tight(self) -> Task:
-        """The same run at a tighter tolerance, to tell the error of `simulate` by."""
-        change = {"solver.rtol": TIGHTER * self.scene.solver.rtol, "accuracy": None}
+        """The same run at a tighter tolerance, or of half the step where steps are fixed, to tell its error by."""
+        solver = self.scene.solver
+        finer = {"rtol": max(TIGHTER * solver.rtol, TIGHTEST)} if solver.step is None else {"step": 0.5 * solver.step}
+        change = {f"solver.{key}": value for key, value in finer.items()} | {"accuracy": None}
         return Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
+
+    @property
+    def has_tighter(self) -> bool:
+        """Whether there is a tighter tolerance that tells the error of a run."""
+        return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
+
+    @cached_property
+    def overview(self) -> Task:
+        """General figures of the run."""
+        inputs = {"run": self.simulate, "post": self.post}
+        task = self._scene_task("overview", "stages.s7_overview:run", s7_overview.params(self.scene), inputs)
+        return replace(task, folder=self._folder("figures"))
 
     @cached_property
     def fine_modes(self) -> dict[str, Task]:

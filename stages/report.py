@@ -1,4 +1,7 @@
-"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them."""
+"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them.
+
+With scenes it is the report of these (`stages.own_report`).
+"""
 
 from __future__ import annotations
 
@@ -15,22 +18,33 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import TREE
 from pipeline.core.workflow.task import Task
-from stages import kernels, s4_simulate, s6_render, timing
+from stages import kernels, run, s4_simulate, s6_render, timing
 from stages.figure import FIGURES
 from stages.graph import Graph
-from stages.run import Workplace, check, workplace
+from stages.run import Workplace, check
 
 #: the scene whose film and pictures the page shows: the paper's full model
 HEADLINE = "sps4/far_csj_cb"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """It takes nothing."""
+    """What the command takes."""
+    parser.add_argument(
+        "scenes", nargs="*", metavar="SCENE", help="the report of these scenes; without any, that of the paper"
+    )
+    run.common_arguments(parser)
 
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
-    print(make(workplace()))
+    place = run.workplace(options)
+    if not options.scenes:
+        print(make(place))
+        return
+    from stages import own_report
+
+    for graph in run.graphs(options.scenes, options.set):
+        print(run.near(own_report.make(graph, place)))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    scene_arguments(parser)
     parser.add_argument(
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
@@ -43,14 +45,49 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
     if options.out is not None:
         check_target(options.out)
-    wanted = graphs(options.scenes)
-    place = workplace()
+    wanted = graphs(options.scenes, options.set)
+    place = workplace(options)
     outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
         print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in wanted))))
     if options.out is not None:
         copy_run(wanted[0], place, options.out)
+    for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
+        told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+
+
+def scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """What all commands take that bring scenes up to date."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    common_arguments(parser)
+
+
+def common_arguments(parser: argparse.ArgumentParser) -> None:
+    """Values to change, processes, and how much is said."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
+    )
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
+    said = parser.add_mutually_exclusive_group()
+    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
+    said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
+
+
+def told(folder: Path, files: Mapping[str, str]) -> None:
+    """One line on what was written where, of those files that are there."""
+    there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
+    if there:
+        print(f"{near(folder)}: {', '.join(there)}")
+
+
+def near(path: Path) -> str:
+    """A path as seen from the current folder, where it lies below it."""
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
 
 
 @dataclass(frozen=True)
@@ -60,10 +97,11 @@ class Workplace:
     store: Store
     sources: Sources
     monitor: Monitor = field(default_factory=Monitor)
+    jobs: int | None = None
 
     def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
-        """Bring tasks up to date over the cores there are."""
-        return bring(tasks, self.store, self.sources, self.monitor, jobs)
+        """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
+        return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
 
 
 class FailedTasksError(FlexclearError):
@@ -74,11 +112,17 @@ class FailedTasksError(FlexclearError):
         self.exit_code = failures[0].exit_code
 
 
-def workplace() -> Workplace:
-    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says."""
-    monitor = Monitor()
+def workplace(options: argparse.Namespace | None = None) -> Workplace:
+    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says.
+
+    options: of a command, with `jobs` and how much is said.
+    """
+    monitor = Monitor(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    jobs = getattr(options, "jobs", None)
+    if jobs is not None and jobs < 1:
+        raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
     root = results_root()
-    return Workplace(Store(root, say=monitor.say), Sources(TREE, root / "cache" / "imports.json"), monitor)
+    return Workplace(Store(root, say=monitor.say), Sources(TREE, root / "cache" / "imports.json"), monitor, jobs)
 
 
 def find_scene(name: str) -> Path:
@@ -171,13 +215,35 @@ def _as_in_its_file(scene: Scene) -> bool:
     return scene.path is not None and load_scene(scene.path) == scene
 
 
-def graphs(names: list[str]) -> list[Graph]:
-    """Graphs of the scenes, each once; the mistakes of all scenes are told together."""
+def overrides(settings: Sequence[str]) -> dict[str, object]:
+    """``KEY=VALUE`` texts as edits of a scene; a value is what TOML reads, else text. InputError for other texts."""
+    found: dict[str, object] = {}
+    for text in settings:
+        key, sign, value = text.partition("=")
+        if not sign or not key.strip():
+            raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
+        try:
+            found[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key.strip()] = value.strip()
+    return found
+
+
+def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
+    """The scene called `name` with `settings` changed; its own name then tells them, and so do its results."""
+    scene = load_scene(find_scene(name), overrides(settings))
+    if settings:
+        scene._name = f"{scene.name}," + ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings)
+    return scene
+
+
+def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
+    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are told together."""
     found: dict[str, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
         try:
-            graph = Graph(load_scene(find_scene(name)))
+            graph = Graph(loaded(name, settings))
             require_names(graph.scene)
             with in_file(graph.scene.path):
                 graph.up_to("post")
