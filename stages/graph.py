@@ -183,7 +183,7 @@ class Graph:
         """General figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
         task = self._scene_task("overview", "stages.s7_overview:run", s7_overview.params(self.scene), inputs)
-        return replace(task, folder=self._folder("figures"))
+        return replace(task, part="figures", folder=self._folder("figures"))
 
     @cached_property
     def fine_modes(self) -> dict[str, Task]:

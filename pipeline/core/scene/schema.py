@@ -24,6 +24,8 @@ from pipeline.core.scene.solver import PlainIntegrator, Solver
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
+#: types of joints with one freedom: driving it tells the whole relative motion
+SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
 MOST_ROWS = 1e7
 
@@ -192,7 +194,23 @@ class Scene(Part):
             if joint.type != "fixed"
         }
         hosts = self._hosts()
-        return usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+        known = self._prescribed()
+        pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
+        free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
+        return usual(free if any(free.values()) else pairs, tuple(self.contacts()))
+
+    def _prescribed(self) -> set[str]:
+        """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
+        driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
+        told = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
+        known = {name for name, body in self.body.items() if isinstance(body, Ground)}
+        found = set(known)
+        for _ in told:
+            for joint in told:
+                pair = {frame.partition(".")[0] for frame in joint.between}
+                if pair & found:
+                    found |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
+        return found - known
 
     def watched(self) -> list[Quantity]:
         """The quantities that are looked at: those that `[view]` names, else as `wanted`."""

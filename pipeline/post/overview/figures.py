@@ -27,6 +27,8 @@ ENERGIES = {
     "drive_work": "work of drives",
     "load_work": "work of loads",
 }
+#: title of the picture of a ball or pin in its socket
+CENTRE = "centre in its socket (mm)"
 #: of an energy that is not drawn: its share of the largest one
 UNSEEN = 1e-6
 
@@ -112,14 +114,14 @@ def _contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[s
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
     for row, k in zip(axes, chosen, strict=True):
         orbit(row[0], run, float(post["clearance"].values[k]), k)
-        row[0].set_title(f"{names[k]}: {row[0].get_title()}")
+        row[0].set_title(f"{names[k]}: {CENTRE}")
         _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap (µm)")
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
-        _over_time(row[2], run, run["contact_normal_force"].values[:, k], f"{names[k]}: normal force (N)")
         count = int(post["impact_count"].values[k])
         share = float(post["contact_time_share"].values[k])
         peak = float(post["peak_force"].values[k])
-        row[2].set_title(f"{row[2].get_title()}, {count} impacts, peak {peak:.4g} N, {share:.0%} in contact")
+        told = f"normal force (N); {count} impacts, peak {peak:.4g} N, {share:.0%} in contact"
+        _over_time(row[2], run, run["contact_normal_force"].values[:, k], told)
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 
@@ -144,7 +146,7 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.6, alpha=0.8)
     reach = 1.15 * radius
     axes.set(xlabel="xyz"[i], ylabel="xyz"[j], aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
-    axes.set_title("centre in its socket (mm)")
+    axes.set_title(CENTRE)
     return offset[:, i], offset[:, j]
 
 

@@ -10,7 +10,7 @@ import xarray as xr
 from pipeline.core import quantities
 from pipeline.core.scene.wanted import Quantity
 from pipeline.post.overview.curves import Curve, curves, has, scaled
-from pipeline.post.overview.figures import CONTACTS, orbit
+from pipeline.post.overview.figures import CENTRE, CONTACTS, orbit
 from pipeline.post.plotting import style
 from pipeline.post.series import derive
 
@@ -101,7 +101,7 @@ def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
     figure, axes = style.grid(rows, columns, (max(4.0, 2.75 * columns), 0.6 + 3.0 * rows))
     for panel, (label, run, k) in zip(axes.flat, found, strict=False):
         orbit(panel, run, float(derive(run)["clearance"].values[k]), k)
-        panel.set_title(f"{run['contact'].values[k]}: {label}\n{panel.get_title()}")
+        panel.set_title(f"{run['contact'].values[k]}: {label}\n{CENTRE}")
     for panel in axes.flat[len(found) :]:
         panel.set_visible(False)
     return style.files(name, figure)
