@@ -47,9 +47,21 @@ def main(arguments: list[str] | None = None) -> int:
         return CLOSED_PIPE
 
 
+class Version(argparse.Action):
+    """Prints the version, which is looked for when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and end."""
+        from pipeline.core.version import version
+
+        print(f"flexclear {version()}")
+        parser.exit()
+
+
 def parser(arguments: list[str]) -> argparse.ArgumentParser:
     """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
     top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for verb, text in COMMANDS.items():
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")

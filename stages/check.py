@@ -34,7 +34,7 @@ def command(options: argparse.Namespace) -> int:
         mistakes, scene = examined(name)
         found |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and scene is not None and not options.json:
-            print(f"{scene.path}: {_summary(scene)}; no mistake found")
+            print(f"{scene.path}: {scene.summary()}; no mistake found")
     if options.json:
         print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
     else:
@@ -136,16 +136,3 @@ def _record(mistake: InputError) -> dict[str, Any]:
         "problem": mistake.problem,
         "remedy": mistake.remedy,
     }
-
-
-def _summary(scene: Scene) -> str:
-    counts = {
-        "rigid bodies": len(scene.rigid()),
-        "rigid bodies from recipes": len(scene.meshed()),
-        "flexible bodies": len(scene.flexible()),
-        "joints": len(scene.joint) - len(scene.contacts()),
-        "joints with clearance": len(scene.contacts()),
-        "drives": len(scene.drive),
-        "loads": len(scene.load),
-    }
-    return ", ".join(f"{number} {what}" for what, number in counts.items() if number)

@@ -18,7 +18,10 @@ from stages.graph import Graph
 from stages.run import Workplace, check
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from pipeline.core.scene.schema import Scene
+    from pipeline.post.overview.page import Part
 
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
@@ -62,6 +65,10 @@ class Comparison:
     def folder(self) -> Path:
         """Where its files are shown."""
         return self.place.store.root / self.task.folder
+
+    def dataset(self) -> xr.Dataset:
+        """All series, differences, errors, events and costs."""
+        return self.place.store.load(self.record)
 
     def file(self, name: str) -> Path:
         """One of its files, in the store."""
@@ -116,7 +123,7 @@ def page(found: Comparison, title: str) -> bytes:
     return written(f"Compared: {title}", "The first run is the reference.", parts(found))
 
 
-def parts(found: Comparison) -> list[object]:
+def parts(found: Comparison) -> list[Part]:
     """What a page shows of a comparison."""
     from pipeline.post.overview.page import Part, media
     from pipeline.post.plotting.table import as_html, from_markdown

@@ -108,7 +108,7 @@ def make(place: Workplace) -> Path:
     if s6_render.gl_state().endswith("none"):
         from pipeline.post.render import gl
 
-        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.REMEDY}")
+        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(shown)
     return place.store.root / "report" / "index.html"
 

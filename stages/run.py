@@ -16,7 +16,7 @@ from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors
 from pipeline.core.scene import lines
-from pipeline.core.scene.load import load_scene, read_toml
+from pipeline.core.scene.load import load_scene, read_toml, scene_name
 from pipeline.core.scene.references import dangling
 from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import Monitor
@@ -157,6 +157,35 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     outcome = place.bring([task], jobs=1)
     check(outcome)
     return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+
+
+def graph(scene: Scene) -> Graph:
+    """The tasks of a scene; an edited one does not take the place of its file's results under results/runs."""
+    require_names(scene)
+    return Graph(scene, shown=scene.path is None or _as_in_its_file(scene))
+
+
+def rendered(scene: Scene, place: Workplace | None = None) -> Path:
+    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
+    place, wanted = place or workplace(), Graph(scene)
+    require_names(scene)
+    check(place.bring([wanted.render], jobs=1))
+    return place.store.root / wanted.render.folder
+
+
+def results(scene: Scene | str | Path) -> xr.DataTree:
+    """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
+    import xarray as xr
+
+    import_module("pipeline.core.artifacts.modal")
+    name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
+    name = scene_name(Path(name)) if name.endswith(".toml") else name
+    folder = results_root() / "runs" / name
+    files = sorted(path for path in folder.rglob("*.nc") if len(path.relative_to(folder).parts) <= 2)
+    if not files:
+        raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
+    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.open_dataset(path) for path in files}
+    return xr.DataTree.from_dict(tree, name=folder.name)
 
 
 def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:

@@ -242,6 +242,24 @@ class Scene(Part):
         """The file it was read from."""
         return self._path
 
+    def __repr__(self) -> str:
+        """In one line: a whole scene is some pages."""
+        return f"<Scene {self.name}: {self.summary()}; {self.time.start:g} to {self.time.end:g} s>"
+
+    __str__ = __repr__
+
+    def summary(self) -> str:
+        """Which parts there are, in words."""
+        counts = {
+            ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
+            ("flexible body", "flexible bodies"): len(self.flexible()),
+            ("joint", "joints"): len(self.joint) - len(self.contacts()),
+            ("joint with clearance", "joints with clearance"): len(self.contacts()),
+            ("drive", "drives"): len(self.drive),
+            ("load", "loads"): len(self.load),
+        }
+        return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
+
     def rigid(self) -> dict[str, RigidBody]:
         """Rigid bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, RigidBody)}

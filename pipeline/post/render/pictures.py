@@ -31,7 +31,7 @@ def pictures(
     result is empty, and one line on stderr says what to install.
     """
     if not gl.works():
-        print(f"flexclear: no pictures; {gl.REMEDY}", file=sys.stderr)
+        print(f"flexclear: no pictures; {gl.remedy()}", file=sys.stderr)
         return {}
     # pyvista is imported only where it can draw
     from pipeline.post.render import film, mechanism
