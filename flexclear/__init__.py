@@ -7,7 +7,7 @@ from pipeline import (
     equilibrium,
     frequencies,
     load_scene,
-    open,  # noqa: A004 - what `fc.open` does
+    open,
     render,
     report,
     run,

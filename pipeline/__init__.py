@@ -39,6 +39,7 @@ __all__ = [
     "render",
     "report",
     "run",
+    "sections",
 ]
 
 
@@ -56,7 +57,7 @@ def __getattr__(name: str) -> Any:
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
 
-    override: dotted place -> value.  A scene may be made part by part as well, ``Scene(title=..., time=..., body=...)``.
+    override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
     """
     from pipeline.core.scene.load import load_scene as load
@@ -90,6 +91,16 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
     """
     dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").workplace())
     return dataset
+
+
+def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
+    """A motion that its laws repeat, looked at once in each period (schema SECTIONS), and the verdict on it.
+
+    The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
+    why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
+    """
+    found: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
+    return found
 
 
 def equilibrium(
@@ -148,7 +159,7 @@ def report(scene: Scene | str | Path) -> Path:
     return _stages("own_report").make(_stages("run").graph(_loaded(scene)), _stages("run").workplace())
 
 
-def open(scene: Scene | str | Path) -> xr.DataTree:  # noqa: A001 - `fc.open` is what it does
+def open(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
 
     Nothing is run.  Raises InputError when there is nothing yet.

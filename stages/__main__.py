@@ -23,6 +23,7 @@ COMMANDS = {
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
     "compare": "scenes beside each other or their ideal twins: differences, errors, events, costs",
+    "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
     "frequencies": "equilibrium in a pose, and natural frequencies there",
     "report": "all figures and tables of the paper, and results/report/index.html",
     "schema": "JSON schema of scene files",

@@ -1,4 +1,4 @@
-"""``flexclear compare``: scenes beside each other, or beside their ideal twins; differences, and each run's own error."""
+"""``flexclear compare``: scenes beside each other or their ideal twins: differences, and each run's own error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ if TYPE_CHECKING:
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
 #: files of a comparison that its page shows: pictures with their captions, then tables
-PICTURES = {"compare.png": "Watched quantities, and their distance from the reference", "compare_contacts.png": "Orbits"}
+PICTURES = {
+    "compare.png": "Watched quantities, and their distance from the reference",
+    "compare_contacts.png": "Orbits",
+}
 TABLES = ("differences.md", "costs.md")
 
 
@@ -129,7 +132,9 @@ def parts(found: Comparison) -> list[Part]:
     from pipeline.post.plotting.table import as_html, from_markdown
 
     tables = "".join(as_html(from_markdown(found.file(name).read_text())) for name in TABLES)
-    pictures = [media(name, found.file(name).read_bytes(), text) for name, text in PICTURES.items() if _there(found, name)]
+    pictures = [
+        media(name, found.file(name).read_bytes(), text) for name, text in PICTURES.items() if _there(found, name)
+    ]
     return [Part("differences", "Differences and errors", tables), Part("runs", "Side by side", "".join(pictures))]
 
 

@@ -1,4 +1,4 @@
-"""The report of one scene: film, figures, the comparison with its ideal twin, what it assumes and what is to be doubted."""
+"""The report of one scene: film, figures, comparison with its ideal twin, assumptions, doubts."""
 
 from __future__ import annotations
 

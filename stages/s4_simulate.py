@@ -15,10 +15,16 @@ if TYPE_CHECKING:
     from pipeline.core.scene.schema import Scene
 
 
-def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, views and the place of files on disk are not part
-    of it, nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
-    left_out = {"title", "description", "view", "accuracy" if ensemble else "ensemble"}
+def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
+    """What the engine sees of a scene. Titles, views and the place of files on disk are not part of it,
+    nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
+    whether that may be missed."""
+    unseen = ("title", "description", "view", "accuracy" if ensemble else "ensemble")
+    left_out: dict[str, Any] = dict.fromkeys(unseen, True)
+    if not ensemble:
+        left_out["accuracy"] = {"allow_missed"}
+    if not sections:
+        left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in (*scene.flexible(), *scene.meshed()):
         table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
@@ -81,8 +87,6 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scen
     from pipeline.core.scene.schema import Scene
 
     table = params["scene"]
-    scene = Scene.model_validate(
-        {**table, "body": s3_rigid.filled(table["body"], inputs), "title": params["name"]}
-    )
+    scene = Scene.model_validate({**table, "body": s3_rigid.filled(table["body"], inputs), "title": params["name"]})
     scene._name = params["name"]
     return scene

@@ -3,6 +3,8 @@
 (file, what stands there, what is written instead).  What is said of each is in `typical_mistakes.txt`.
 """
 
+# ruff: noqa: E501 - an edit is easier to read on one line
+
 from __future__ import annotations
 
 SCENE, ROD = "slider_crank.toml", "rod.toml"

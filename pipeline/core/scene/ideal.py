@@ -47,8 +47,11 @@ def _without_owners(scene: Scene, effects: tuple[str, ...]) -> dict[str, Any]:
         owners = {**owners, "contact": ()}
         found["ensemble"] = None
         if scene.accuracy is not None:
-            wanted = {n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)}
-            found["accuracy"] = {"quantities": wanted} if wanted else None
+            wanted = {
+                n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
+            }
+            rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
+            found["accuracy"] = {**rest, "quantities": wanted} if wanted else None
         if scene.view is not None and scene.view.watch is not None:
             watched = [name for name in scene.view.watch if _has(name, owners)]
             found["view.watch"] = watched or None

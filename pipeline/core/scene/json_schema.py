@@ -54,7 +54,9 @@ def _edit(text: str, properties: dict[str, Any], more: tuple[str, ...] = ()) -> 
 def _accuracy(flat: dict[str, Any]) -> dict[str, Any]:
     """A file writes quantities as they are, nested or quoted, not below a key of their own."""
     value = {"type": ["number", "string", "object"], "description": '"1 um", "0.1 %", or { relative = 1e-6 }'}
-    return {"type": "object", "description": flat.get("description", ""), "additionalProperties": value}
+    settings = {name: flat["properties"][name] for name in ("source", "allow_missed")}
+    told = flat.get("description", "")
+    return {"type": "object", "description": told, "properties": settings, "additionalProperties": value}
 
 
 def _partial(node: Any) -> Any:

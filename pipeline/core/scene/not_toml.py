@@ -64,7 +64,8 @@ def _said(message: str, line: str) -> tuple[str, str | None]:
     if "key part" in text and line.strip().endswith("{"):
         return f"{text}: {line.strip()}", "a table in { } stands on one line; longer ones have a [heading] of their own"
     if "Unclosed" in text or "Expected ']'" in text:
-        return f"{text}: {line.strip()}", _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
+        hint = _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
+        return f"{text}: {line.strip()}", hint
     return text, _OTHER if "after a key" in text or "table declaration" in text else None
 
 

@@ -54,6 +54,7 @@ def assemble(
                 if quantities.is_series(quantity):
                     when, distance = quantities.deviation(run, reference, quantity)
                     series["distance"][i, j] = distance[_at(when, time)]
+    data: dict[str, tuple[tuple[str, ...], np.ndarray]]
     data = {name: (("run", "quantity"), values) for name, values in numbers.items()}
     data |= {name: (("run", "quantity", "time"), values) for name, values in series.items()}
     horizon = [float(run["horizon"]) if "horizon" in run else float(run["time"].values[-1]) for run in runs.values()]
@@ -81,7 +82,9 @@ def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
     time = reduce(both, (run["time"].values for run in runs.values()))
     if time.size < 2:
         raise InputError(
-            " and ".join(runs), "have no output times in common", "give the scenes the same [time] and [output] interval"
+            " and ".join(runs),
+            "have no output times in common",
+            "give the scenes the same [time] and [output] interval",
         )
     return time
 
@@ -124,9 +127,9 @@ def table(compared: xr.Dataset) -> Table:
             apart = "reference" if i == 0 else _difference(compared, i, j, unit)
             rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), apart))
     notes = [
-        "Own error: largest distance from the same run at a tolerance a hundred times tighter (of fixed steps: at half "
-        "the step). Difference: largest distance from the reference at the output times of both; behind ± the sum of "
-        "both runs' own errors."
+        "Own error: largest distance from the same run at a tolerance a hundred times tighter (of fixed steps: at "
+        "half the step). Difference: largest distance from the reference at the output times of both; behind ± the "
+        "sum of both runs' own errors."
     ]
     end = float(compared["time"].values[-1])
     notes += [
@@ -134,10 +137,8 @@ def table(compared: xr.Dataset) -> Table:
         for label, horizon in zip(labels, compared["horizon"].values, strict=True)
         if horizon < end
     ]
-    return Table(
-        "Differences, and the error of each run", ("quantity", "run", "largest", "own error", "difference"), tuple(rows),
-        tuple(notes),
-    )  # fmt: skip
+    columns = ("quantity", "run", "largest", "own error", "difference")
+    return Table("Differences, and the error of each run", columns, tuple(rows), tuple(notes))
 
 
 def costs(compared: xr.Dataset) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -53,7 +54,7 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[C
             continue
         color, last = COLORS[k % len(COLORS)], _horizon(run)
         firm = curve.time <= last
-        look = {"color": color, "lw": 1.8 if k == 0 else 1.0, "zorder": 1.5 if k == 0 else 2.0}
+        look: dict[str, Any] = {"color": color, "lw": 1.8 if k == 0 else 1.0, "zorder": 1.5 if k == 0 else 2.0}
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
@@ -62,9 +63,7 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[C
     axes.set_title(f"{there[0].title} ({unit})")
 
 
-def _apart(
-    axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, found: Sequence[Curve | None]
-) -> None:
+def _apart(axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, found: Sequence[Curve | None]) -> None:
     """Distance of the whole quantity, all its components, from the reference; of a force its difference."""
     (_, reference), *others = runs.items()
     lines: list[tuple[int, np.ndarray, np.ndarray]] = []

@@ -95,18 +95,14 @@ def write(frames: Iterator[np.ndarray], rate: int) -> tuple[str, bytes]:
         return path.suffix.lstrip("."), path.read_bytes()
 
 
-def _frames(
-    drawn: Mechanism, post: xr.Dataset, watched: Sequence[str], progress: Progress
-) -> Iterator[np.ndarray]:
+def _frames(drawn: Mechanism, post: xr.Dataset, watched: Sequence[str], progress: Progress) -> Iterator[np.ndarray]:
     time = drawn.run.time.values
     steps = np.searchsorted(time, np.linspace(time[0], time[-1], round(SECONDS * RATE)) - 1e-9)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
     _look(scene, drawn)
     slow = SECONDS / (time[-1] - time[0])
-    scene.add_text(
-        f"{_pace(slow)}{_exaggeration(drawn)}", position=(16, HEIGHT - 34), font_size=9, color=SOFT
-    )
+    scene.add_text(f"{_pace(slow)}{_exaggeration(drawn)}", position=(16, HEIGHT - 34), font_size=9, color=SOFT)
     with style.style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched)
         for k, step in enumerate(steps):

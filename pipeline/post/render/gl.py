@@ -22,7 +22,7 @@ _PROBE = (
 
 
 def state() -> str:
-    """Which GL libraries are there, in a few words; quick, fit for a cache key. It ends with none where nothing draws."""
+    """Which GL libraries are there, in a few words; quick, fit for a cache key; with none at its end, nothing draws."""
     if missing():
         return f"without {' and '.join(missing())}: none"
     if not sys.platform.startswith("linux"):

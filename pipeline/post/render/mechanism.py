@@ -179,7 +179,7 @@ def _plausible(solid: Solid | None, frames: Mapping[str, np.ndarray], size: floa
     """
     if solid is None:
         return None
-    places = np.array(list(frames.values()) or [(0.0, 0.0, 0.0)])
+    places = np.array(list(frames.values()) or [np.zeros(3)])
     span = float(np.linalg.norm(places[:, None] - places[None], axis=-1).max())
     reach = float(solid.half.max())
     if span <= JOINT_SHARE * size:  # all frames in one place: a block or a disc there
