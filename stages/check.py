@@ -62,7 +62,7 @@ def examined(name: str) -> tuple[list[InputError], Scene | None]:
     if scene is not None:
         found += _collect([lambda: Graph(scene).up_to("post")], path)
         found += _collect(_laws(scene), path)
-        if not found and not scene.flexible() and not scene.meshed():
+        if not found and not scene.recipes():
             found += _collect([lambda: _assembled(scene)], path)
     return list({str(error): error for error in found}.values()), scene
 
@@ -71,8 +71,7 @@ def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
     """A check for each mesh recipe that a scene names."""
     bodies = compose(path).get("body", {})
     meshes = dict.fromkeys(body["mesh"] for body in bodies.values() if isinstance(body.get("mesh"), str))
-    if meshes:
-        yield from (partial(_recipe, Path(mesh)) for mesh in meshes)
+    yield from (partial(_recipe, Path(mesh)) for mesh in meshes)
 
 
 def _recipe(path: Path) -> None:

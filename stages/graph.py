@@ -44,16 +44,16 @@ class Graph:
 
     @cached_property
     def mesh(self) -> dict[str, Task]:
-        """By flexible body."""
+        """By body with a recipe."""
         return {
             body: self._body_task(
                 "mesh",
                 body,
                 "stages.s1_mesh:run",
-                s1_mesh.params(Path(part.mesh), self.recipe),
-                modules=s1_mesh.modules(Path(part.mesh)),
+                s1_mesh.params(Path(recipe), self.recipe),
+                modules=s1_mesh.modules(Path(recipe)),
             )
-            for body, part in (*self.scene.flexible().items(), *self.scene.meshed().items())
+            for body, recipe in self.scene.recipes().items()
         }
 
     @cached_property

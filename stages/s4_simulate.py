@@ -26,7 +26,7 @@ def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> d
     if not sections:
         left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
-    for body in (*scene.flexible(), *scene.meshed()):
+    for body in scene.recipes():
         table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
     return {"name": scene.name, "scene": table}
 

@@ -294,6 +294,10 @@ class Scene(Part):
         """Rigid bodies whose mass, inertia and frames are those of a mesh recipe, by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, MeshedRigidBody)}
 
+    def recipes(self) -> dict[str, str]:
+        """Mesh recipe of each body that has one, by name: flexible bodies first."""
+        return {name: body.mesh for name, body in (*self.flexible().items(), *self.meshed().items())}
+
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
