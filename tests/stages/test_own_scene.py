@@ -48,7 +48,8 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
     (folder / file).write_text(text + new if old is None else text.replace(old, new, 1))
     assert main(["check", str(folder / "slider_crank.toml")]) == 2
     said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
-    assert said.strip() == TOLD[name].strip()
+    # lists of all names that there are grow with the program
+    assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == TOLD[name].strip()
 
 
 def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(

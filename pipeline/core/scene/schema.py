@@ -296,7 +296,8 @@ class Scene(Part):
 
     def recipes(self) -> dict[str, str]:
         """Mesh recipe of each body that has one, by name: flexible bodies first."""
-        return {name: body.mesh for name, body in (*self.flexible().items(), *self.meshed().items())}
+        flexible = {name: body.mesh for name, body in self.flexible().items()}
+        return flexible | {name: body.mesh for name, body in self.meshed().items()}
 
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""
