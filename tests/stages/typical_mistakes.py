@@ -116,8 +116,8 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "half a mode": (SCENE, "count = 13 }", "count = 12.5 }"),
     "damping of zero": (SCENE, "damping = 0.02", "damping = 0"),
     "unknown integrator": (SCENE, 'integrator = "radau"', 'integrator = "rado"'),
-    "tolerance as text": (SCENE, "rtol = 1e-6", 'rtol = "tight"'),
-    "tolerance above one": (SCENE, "rtol = 1e-6", "rtol = 2"),
+    "tolerance as text": (SCENE, "rtol = 1e-5", 'rtol = "tight"'),
+    "tolerance above one": (SCENE, "rtol = 1e-5", "rtol = 2"),
     "gravity as a number": (SCENE, 'acceleration = [0, "-9.81 m/s^2", 0]', "acceleration = 9.81"),
     # recipes
     "misspelt key of a recipe": (ROD, "elements = 10", "element = 10"),
