@@ -25,6 +25,14 @@ LOADS: dict[str, Any] = {
         "stiffness": 60.0, "damping": 2.0, "free_length": 0.3,
     },
     "tie": {"type": "spring-damper", "between": ["b.end", "c.tip"], "stiffness": 20.0, "free_length": 0.1},
+    "mount": {
+        "type": "bushing", "between": ["a.far", "c.tip"],
+        "stiffness": [
+            [40.0, 5.0, 0.0, 1.0, 0.0, 0.0], [5.0, 60.0, -8.0, 0.0, 2.0, 0.0], [0.0, -8.0, 50.0, 0.0, 0.0, -1.5],
+            [1.0, 0.0, 0.0, 0.9, 0.2, 0.0], [0.0, 2.0, 0.0, 0.2, 1.1, 0.3], [0.0, 0.0, -1.5, 0.0, 0.3, 0.7],
+        ],
+        "damping": [0.3, 0.2, 0.4, 0.01, 0.02, 0.03],
+    },
     "motor": {"type": "joint-force", "joint": "U", "coordinate": "second", "force": WAVE},
     "coil": {
         "type": "joint-spring", "joint": "U", "coordinate": "first", "stiffness": 4.0, "damping": 0.1, "rest": 0.5,
@@ -162,7 +170,7 @@ def test_forces_and_loads_change_momentum_and_nothing_else_does() -> None:
     """Newton for the free body: what is recorded of loads and accelerations is one motion."""
     dataset = run()
     free = dataset.sel(body="c")
-    force = dataset.load_force.sel(load="push").values + dataset.load_force.sel(load="tie").values
+    force = sum(dataset.load_force.sel(load=name).values for name in ("push", "tie", "mount"))
     assert free.acceleration.values == pytest.approx(force + np.array([0.0, 0.0, -9.81]), abs=1e-10)
 
 

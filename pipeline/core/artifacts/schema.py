@@ -74,6 +74,12 @@ RUN: Schema = {
     "load_length": _V(
         ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
     ),
+    "bushing_displacement": _V(
+        ("time", "bushing", "axis"), "m", "second frame's origin in the first one's axes", optional=True
+    ),
+    "bushing_rotation": _V(
+        ("time", "bushing", "axis"), "rad", "rotation vector from the first frame to the second", optional=True
+    ),
     "load_power": _V(
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
     ),

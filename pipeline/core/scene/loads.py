@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness
 from pipeline.core.scene.laws import Bare, Value
+from pipeline.core.scene.matrices import NOTHING, BushingDamping, BushingStiffness
 
 Components = tuple[Bare, Bare, Bare]
 
@@ -106,8 +107,27 @@ class JointFriction(Part):
     coulomb: Coulomb | None = None
 
 
+class Bushing(Part):
+    """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second one.
+
+    The displacements are those of the second frame in the first one's axes: x, y, z of its origin and the rotation
+    vector.  stiffness, damping: six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy.
+    """
+
+    type: Literal["bushing"]
+    between: tuple[FrameName, FrameName]
+    stiffness: BushingStiffness = NOTHING
+    damping: BushingDamping = NOTHING
+
+    @model_validator(mode="after")
+    def _acts(self) -> Bushing:
+        if self.stiffness == NOTHING and self.damping == NOTHING:
+            raise ValueError("a bushing needs a stiffness, a damping, or both; it has neither")
+        return self
+
+
 Load = Annotated[
-    Gravity | PointForce | PointTorque | SpringDamper | JointForce | JointSpring | JointFriction,
+    Gravity | PointForce | PointTorque | SpringDamper | JointForce | JointSpring | JointFriction | Bushing,
     Field(discriminator="type"),
 ]
 #: all of them

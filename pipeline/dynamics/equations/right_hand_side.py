@@ -136,8 +136,8 @@ def make_right_hand_side(
         for k in range(h[m.NV]):
             w[h[m.U] + k] = w[y + h[m.NQ] + k]
             w[h[m.DU] + k] = 0.0
-        for k in range(h[m.N_TURNS]):
-            w[h[m.TURN] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_TURNS] + k]
+        for k in range(h[m.N_INTERNAL]):
+            w[h[m.INTERNAL] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_INTERNAL] + k]
 
     @kernel
     def gather_forces(h, f, w, n):

@@ -37,7 +37,7 @@ def fill(numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching:
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
         kinds_of = (parts.forms.index(law.form), friction_kind, parts.surfaces.index(joint.type))
         rows.append((*sites, *kinds_of, place))
-        reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers])
+        reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers, 0.0, 0.0])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 

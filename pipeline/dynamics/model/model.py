@@ -18,6 +18,7 @@ from pipeline.dynamics.model import loads as loading
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.gauges import Gauges
 from pipeline.dynamics.model.loads import Load
 from pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
@@ -79,20 +80,23 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
     closures, order = wiring.closures(numbering, site_pairs)
-    loaded = loading.tabulate(mechanism, numbering, given)
+    gauges = Gauges()
+    loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
     contact_ledger = contacting.ledger_size(mechanism)
     gravity = loading.gravity(mechanism.scene)
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
-    groups, floors = _error_groups(numbering, ledger, loaded.turns)
+    groups, floors = _error_groups(numbering, ledger, gauges.internal)
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     arrays = pack(
         {
             m.NQ: numbering.nq,
-            m.N_LEDGER: contact_ledger + ledger + loaded.turns,
+            m.N_LEDGER: contact_ledger + ledger + gauges.internal,
             m.N_DRIVES: numbering.known,
-            m.N_TURNS: loaded.turns,
+            m.N_INTERNAL: gauges.internal,
+            m.N_COUPLINGS: 0,
+            m.N_SURFACES: len(mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
@@ -107,6 +111,9 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
             **contacting.fill(numbering, parts, normals, touching),
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
+            m.GAUGES: gauges.rows,
+            m.COUPLINGS: [],
+            m.COUPLING_NUMBERS: [],
             m.GRAVITY: gravity,
             m.GROUPS: groups,
             m.FLOORS: floors,
@@ -175,12 +182,12 @@ def _link_numbers(link: Link) -> np.ndarray:
     return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
 
-def _error_groups(numbering: Numbering, loads: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
+def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and the floor below which a group is resolved absolutely.
 
     A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
-    loads: number of the loads' energies; turns: number of angles after them.
+    loads: number of the loads' energies; internal: number of internal states of parts after them.
     """
     mechanism, floors = numbering.mechanism, list[float]()
     L = mechanism.length
@@ -203,7 +210,7 @@ def _error_groups(numbering: Numbering, loads: int, turns: int) -> tuple[np.ndar
                 target[mine] = len(floors) - 1
     groups = [*q_group, *v_group]
     energy = sum(link.mass for link in mechanism.links) * L**2
-    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * turns]
+    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * internal]
     for floor, count in tail:
         floors.append(floor)
         groups += [len(floors) - 1] * count

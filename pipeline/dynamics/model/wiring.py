@@ -67,8 +67,8 @@ def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tu
     closure: list[tuple[int, ...]] = []
     rows: list[tuple[int, int, int]] = []
     support: list[int] = []
-    entries: list[tuple[int, int, int]] = []
-    known: list[tuple[int, int, int, int]] = []
+    entries: list[tuple[int, ...]] = []
+    known: list[tuple[int, ...]] = []
     supports: list[list[int]] = []
     row0 = jacobian0 = 0
     for new, old in enumerate(order):
@@ -78,10 +78,11 @@ def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tu
         slots = sorted({c for c, _, _ in routes[old] if c < numbering.nv})
         moved = uncommon(routes[old])
         entry0 = len(entries)
-        entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < numbering.nv]
-        known += [(new, c - numbering.nv, col, sign) for c, col, sign in moved if c >= numbering.nv]
+        entries += [(slots.index(c), col, sign, 0) for c, col, sign in moved if c < numbering.nv]
+        known += [(new, c - numbering.nv, col, sign, 0) for c, col, sign in moved if c >= numbering.nv]
         n_entries = len(entries) - entry0
-        closure.append((a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine)))
+        own = (a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine), -1)
+        closure.append(own)
         rows += mine
         support += slots
         supports.append(slots)

@@ -34,6 +34,10 @@ def dataset(run: Run) -> xr.Dataset:
     parts = [_motion(motions), _modes(motions), _drives(run), _joint_coordinates(model, seen)]
     if model.loads:
         parts.append(_loads(model, seen))
+    if "bushing" in model.parts.loads:
+        from pipeline.dynamics.record.bushings import give
+
+        parts.append(give(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(trajectory), {})]
     if run.twin is not None:

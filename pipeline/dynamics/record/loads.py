@@ -35,7 +35,7 @@ def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndar
     """Force [N] or torque [N m] of loads along their joint coordinates, shape (time, names)."""
     forces, numbers = [], {name: k for k, (name, _) in enumerate(model.loads)}
     for k in (numbers[name] for name in names):
-        row = model.arrays.table(m.LOADS)[k]
+        row = model.arrays.table(m.GAUGES)[model.arrays.table(m.LOADS)[k]["gauge"]]
         axes = seen.sites["axes"][:, row["b"] if row["side"] else row["a"]]
         acting = seen.loads["moment" if row["turning"] else "force"]
         forces.append(np.einsum("ti,ti->t", axes[:, :, row["axis"]], acting[:, k]))

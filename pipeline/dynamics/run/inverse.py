@@ -171,9 +171,9 @@ def _closure_jacobian(engine: Engine) -> np.ndarray:
     closures, entries, support = (model.arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
     for c in closures:
         mine = slice(c["row0"], c["row0"] + c["n_rows"])
-        for slot, col, sign in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
+        for slot, col, sign, _ in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
             J[mine, support["coordinate"][c["support0"] + slot]] += sign * rows[mine] @ columns[col]
-    for c, d, col, sign in model.arrays.table(m.KNOWN_ENTRIES):
+    for c, d, col, sign, _ in model.arrays.table(m.KNOWN_ENTRIES):
         mine = slice(closures["row0"][c], closures["row0"][c] + closures["n_rows"][c])
         J[mine, model.nv + d] += sign * rows[mine] @ columns[col]
     return J

@@ -35,9 +35,10 @@ def consistent_start(engine: Engine) -> np.ndarray:
     y = initial.given_velocities(model, motion, y)
     if not engine.mobility.singular_start:
         y = project(engine, y)
-    if model.loads:
+    if model.loads or model.arrays.size(m.N_INTERNAL):
         _look(engine, y)
-        y = initial.start_loads(model, y, engine.table(m.LOAD))
+        y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
+        initial.check_loads(model, engine.table(m.LOAD))
     _refuse_penetration(engine, y)
     return y
 
