@@ -20,6 +20,7 @@ from pipeline.core.scene.parts import (
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
+from pipeline.core.scene.stops import Stop
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
@@ -115,6 +116,7 @@ class Scene(Part):
     joint: dict[PartName, Joint] = Field(default_factory=dict)
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
+    stop: dict[PartName, Stop] = Field(default_factory=dict)
     time: TimeSpan
     solver: Solver = PlainIntegrator()
     output: Output = Output()
@@ -155,7 +157,7 @@ class Scene(Part):
             "body": moving,
             "joint": tuple(self.joint),
             "drive": tuple(self.drive),
-            "contact": tuple(self.contacts()),
+            "contact": tuple([*self.contacts(), *self.stop_ends()]),
         }
 
     def wanted(self) -> list[Quantity]:
@@ -169,7 +171,9 @@ class Scene(Part):
             if joint.type != "fixed"
         }
         hosts = self._hosts()
-        return usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+        return usual(
+            {n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple([*self.contacts(), *self.stop_ends()])
+        )
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""
@@ -206,6 +210,10 @@ class Scene(Part):
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""
         return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
+
+    def stop_ends(self) -> list[str]:
+        """Names of all ends of stops, as records have them."""
+        return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""

@@ -105,11 +105,12 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),
         "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
-    if parts.surfaces and scheme.located:
+    touching = parts.surfaces or parts.stops
+    if touching and scheme.located:
         located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
         regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
         given["events"] = f"{located}({regimes})"
-    elif parts.surfaces:
+    elif touching:
         given["events"] = _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
     _import(imports, DYNAMICS, "memory as m")
     maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
@@ -133,6 +134,9 @@ def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
         forms, frictions = _family(imports, FORMS, parts.forms), _family(imports, FRICTION_LAWS, parts.frictions)
         maker = _import(imports, f"{DYNAMICS}.contact.forces", "make_contacts")
         given["contacts"] = f"{maker}(surfaces={surfaces}, forms={forms}, frictions={frictions})"
+    if parts.stops:
+        forms = _family(imports, FORMS, parts.forms)
+        given["stops"] = f"{_import(imports, f'{DYNAMICS}.contact.stops', 'make_stops')}({forms})"
     if parts.loads:
         kinds = _family(imports, LOADS, parts.loads)
         given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}({kinds})"

@@ -7,30 +7,31 @@ from collections.abc import Sequence
 from typing import Any
 
 from pipeline.core.registry import lookup
-from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics.contact.law import Resolved
 
 #: above this share of the inner radius a contact is no longer small and Hertz's theory ends
 SMALL = 0.3
 
 
-def warnings(name: str, joint: Clearance, law: Resolved, depth: float, force: float) -> list[str]:
+def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -> list[str]:
     """Sentences about a contact that was used outside the range of its law; empty when it was not.
 
-    depth, force: largest penetration [m] and normal force [N] of the run.
+    name: in words.  depth, force: largest penetration [m] and normal force [N] of the run.
     """
-    found = [] if law.warning is None else [f"joint {name}: {law.warning}"]
-    surfaces = lookup("pipeline.dynamics.contact", joint.type, where=f"[joint.{name}]")
+    found = [] if law.warning is None else [f"{name}: {law.warning}"]
+    if joint.normal.stiffness is not None:
+        return found
+    surfaces = lookup("pipeline.dynamics.contact", joint.type, where=name)
     size = surfaces.contact_size(joint, depth, force)
-    if joint.normal.stiffness is None and size > SMALL * joint.radius:
+    if size > SMALL * joint.radius:
         found.append(
-            f"joint {name}: the contact grows to a radius of {size:.3g} m, {size / joint.radius:.2g} of the inner "
+            f"{name}: the contact grows to a radius of {size:.3g} m, {size / joint.radius:.2g} of the inner "
             f"surface's; its stiffness from radii and materials (Hertz) holds below {SMALL:g}"
         )
     return found
 
 
-def laws(contacts: Sequence[tuple[str, Clearance, Any, Any]], resolved: Sequence[Resolved]) -> str:
+def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resolved]) -> str:
     """What every contact was made with, as JSON for the dataset's attributes."""
     found = {
         name: {

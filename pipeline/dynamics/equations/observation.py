@@ -107,13 +107,14 @@ def make_observation(
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
+    stops: Callable | None = None,
 ) -> Callable:
     """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
 
     evaluate, project: as the stepper calls them; the other arguments are those of `make_right_hand_side`.
     """
     kinematics = make_kinematics(joints, flexible)
-    forces = make_forces(flexible, contacts, loads)
+    forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
     flexible_energy = no_energy if flexible is None else flexible.energies
 

@@ -23,6 +23,7 @@ from pipeline.dynamics.model.loads import Load
 from pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.numbering import Numbering, number
+from pipeline.dynamics.model.stops import STOP
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
@@ -87,8 +88,9 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     contact_ledger = contacting.ledger_size(mechanism)
     gravity = loading.gravity(mechanism.scene)
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
-    groups, floors = _error_groups(numbering, ledger, gauges.internal)
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
+    contacts = contacting.fill(numbering, parts, normals, touching, gauges)
+    groups, floors = _error_groups(numbering, ledger, gauges.internal)
     arrays = pack(
         {
             m.NQ: numbering.nq,
@@ -96,7 +98,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
             m.N_COUPLINGS: 0,
-            m.N_SURFACES: len(mechanism.contacts),
+            m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
@@ -108,7 +110,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
             **flexible_bodies.fill(numbering),
             **wiring.mass_entries(numbering),
             **closures,
-            **contacting.fill(numbering, parts, normals, touching),
+            **contacts,
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
             m.GAUGES: gauges.rows,
@@ -146,10 +148,11 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
     contacts = [contact.joint for contact in mechanism.contacts]
     return Parts(
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
-        surfaces=tuple(sorted({joint.type for joint in contacts})),
+        surfaces=tuple(sorted({joint.type for joint in contacts} - {STOP})),
         forms=tuple(sorted({law.form for law in normals})),
         frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
         loads=loads,
+        stops=any(joint.type == STOP for joint in contacts),
         closures=bool(mechanism.closures),
         flexible=not mechanism.all_rigid,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),

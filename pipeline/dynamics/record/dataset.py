@@ -93,10 +93,10 @@ def _contact_warnings(model: Model, trajectory: Trajectory) -> list[str]:
     from pipeline.dynamics.contact import validity
 
     sentences = list[str]()
-    for c, ((name, joint, *_), law) in enumerate(zip(model.contacts, model.laws, strict=True)):
+    for c, (contact, law) in enumerate(zip(model.contacts, model.laws, strict=True)):
         mine = trajectory.events[trajectory.events["contact"] == c]
         depth, force = (float(np.fmax.reduce(mine[peak], initial=0.0)) for peak in ("peak_depth", "peak_force"))
-        sentences += validity.warnings(name, joint, law, depth, force)
+        sentences += validity.warnings(contact.words, contact.joint, law, depth, force)
     return sentences
 
 

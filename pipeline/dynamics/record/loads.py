@@ -42,23 +42,11 @@ def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndar
     return np.stack(forces, axis=1)
 
 
-def on_body(model: Model, seen: Observed, body: str) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the loads on a body: moment about the kernels' origin, force; (time, 3) each."""
-    moment, force = np.zeros((len(seen.loads), 3)), np.zeros((len(seen.loads), 3))
-    for _, n, f in on_frames(model, seen, body):
-        moment, force = moment + n, force + f
-    return moment, force
-
-
-def on_frames(model: Model, seen: Observed, body: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Each load on a body: its frame, moment about the kernels' origin, force; (time, 3) each."""
+def on_loaded_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Each load on every frame that it acts on: frame, moment about the kernels' origin, force; (time, 3) each."""
     ends = [
         (k, frame, sign)
         for k, (_, frames) in enumerate(model.loads)
         for frame, sign in zip(reversed(frames), (1.0, -1.0), strict=False)  # the last frame is acted on
     ]
-    return [
-        (frame, sign * seen.loads["moment"][:, k], sign * seen.loads["force"][:, k])
-        for k, frame, sign in ends
-        if model.mechanism.frames[frame].body == body
-    ]
+    return [(frame, sign * seen.loads["moment"][:, k], sign * seen.loads["force"][:, k]) for k, frame, sign in ends]
