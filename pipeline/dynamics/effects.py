@@ -30,7 +30,7 @@ class Parts:
     """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
 
     surfaces, forms, frictions: of contacts.  stops: whether joint coordinates have ends.
-    harmonics: whether a law of time has some.
+    couplings: whether they follow each other.      harmonics: whether a law of time has some.
     """
 
     joints: tuple[str, ...]
@@ -39,6 +39,7 @@ class Parts:
     frictions: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
     stops: bool = False
+    couplings: bool = False
     closures: bool = False
     flexible: bool = False
     stiffening: bool = False
@@ -88,6 +89,7 @@ def most_parts(scene: Scene) -> Parts:
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load.type for load in scene.forces().values()})),
         stops=bool(scene.stop),
+        couplings=bool(scene.gear),
         closures=True,
         flexible=bool(scene.flexible()),
         stiffening=any(body.stiffening is not None for body in scene.flexible().values()),

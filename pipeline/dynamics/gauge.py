@@ -10,7 +10,7 @@ import numpy as np
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import ZERO, add, at, at9, axis, cross, dot, sub
+from pipeline.dynamics.vectors import ZERO, add, at, at9, axis, cross, dot, scale, sub
 
 
 @kernel
@@ -51,3 +51,23 @@ def counted(h, w, g):
     if m.GAUGES.turns(h, g) >= 0:
         value = unwound(h, w, g, value, rate)
     return value, rate, moment, force
+
+
+@kernel
+def bias(h, w, g):
+    """Second rate of the coordinate of gauge g at the accelerations that its sites' frames have now."""
+    a, b = m.SITE_FRAMES.row(h, m.GAUGES.a(h, g)), m.SITE_FRAMES.row(h, m.GAUGES.b(h, g))
+    side = a if m.GAUGES.side(h, g) == 0 else b
+    along, omega, alpha = (
+        axis(at9(w, side + m.FRAME.axes), m.GAUGES.axis(h, g)),
+        at(w, a + m.FRAME.omega),
+        at(w, a + m.FRAME.alpha),
+    )
+    if m.GAUGES.turning(h, g):
+        swing = cross(at(w, side + m.FRAME.omega), along)
+        turning = sub(at(w, b + m.FRAME.omega), omega)
+        return dot(along, sub(at(w, b + m.FRAME.alpha), alpha)) + dot(swing, turning)
+    r = sub(at(w, b + m.FRAME.origin), at(w, a + m.FRAME.origin))
+    slide = sub(sub(at(w, b + m.FRAME.velocity), at(w, a + m.FRAME.velocity)), cross(omega, r))
+    second = sub(sub(at(w, b + m.FRAME.acceleration), at(w, a + m.FRAME.acceleration)), cross(alpha, r))
+    return dot(along, sub(second, add(cross(omega, cross(omega, r)), scale(2.0, cross(omega, slide)))))

@@ -162,9 +162,9 @@ ENVELOPE = wiring("first start")  # first column, start of each row of the mass 
 CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept coupling")
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
-ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its second joint
+ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
 KNOWN_ENTRIES = wiring("closure drive column sign part")
-COUPLINGS = wiring("first second")  # gauges of two joint coordinates of which one follows the other
+COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
@@ -172,9 +172,9 @@ CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
 CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
-#: a: site, -1 where the world holds against it; gauge: of its joint coordinate or -1; internal0: first of its states;
-#: follows: whether it turns with its frame
-LOADS = wiring("a b law0 number0 gauge internal0 follows")
+#: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame
+LOADS = wiring("a b law0 number0 gauge measured internal0 follows")
 LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: place of the angle with its full turns among the internal states or -1
@@ -211,7 +211,8 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _places(9)
-ROWS = work("moment:3 force:3")  # wrenches of the closure rows
+#: wrenches of the closure rows; then, of the couplings, those on their first joints
+ROWS = work("moment:3 force:3")
 #: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
 JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _places(6)

@@ -14,6 +14,7 @@ from pipeline.dynamics import loads
 from tests.properties.mechanisms import GRAVITY, body, frame, joint, matrix, scene, simulate, turned
 
 WAVE = {"type": "harmonic", "amplitude": [2.0], "frequency": ["3 Hz"], "offset": 1.0}
+WAVE_OF_LENGTH = {**WAVE, "amplitude": [0.02], "offset": 0.1}
 #: every load but gravity, on a free body, on joints with one and several axes, and on the ground
 LOADS: dict[str, Any] = {
     "push": {"type": "point-force", "frame": "c.tip", "force": [3.0, WAVE, -1.0]},
@@ -38,6 +39,14 @@ LOADS: dict[str, Any] = {
         "type": "joint-spring", "joint": "U", "coordinate": "first", "stiffness": 4.0, "damping": 0.1, "rest": 0.5,
     },
     "rail": {"type": "joint-spring", "joint": "Y", "coordinate": "translation", "stiffness": 90.0, "damping": 1.0},
+    "servo": {
+        "type": "pid", "joint": "U", "coordinate": "second", "measured": "U.first", "reference": 0.2,
+        "proportional": 0.3, "integral": 0.5, "derivative": 0.02, "limits": [-0.2, 0.1],
+    },
+    "digital": {
+        "type": "sampled-pid", "joint": "Y", "coordinate": "translation", "reference": WAVE_OF_LENGTH,
+        "proportional": 9.0, "integral": 5.0, "derivative": 0.1, "period": 0.02,
+    },
     "rub": {
         "type": "joint-friction", "joint": "Y", "coordinate": "rotation", "viscous": 0.02,
         "coulomb": {"static": 0.05, "dynamic": 0.04, "v_static": 0.5, "v_dynamic": 1.0},

@@ -17,7 +17,7 @@ from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
-FAMILIES = ("body", "joint", "drive", "load", "stop")
+FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
 SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
 #: bytes that no scene or recipe needs
 LARGEST = 16 << 20

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness
+from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
 from pipeline.core.scene.laws import Bare, Value
 from pipeline.core.scene.matrices import NOTHING, BushingDamping, BushingStiffness
 
@@ -126,8 +126,56 @@ class Bushing(Part):
         return self
 
 
+class _Controller(Part):
+    """What controllers have. They push `joint` along its coordinate by a law of the error = reference - measured.
+
+    measured: the coordinate that is measured, ``A`` or ``A.rotation``; default: the one that is pushed.
+    reference: a law of time of the measured coordinate.
+    proportional, integral, derivative: gains [force, or torque, per unit of the measured coordinate;
+    1/s of it; s of it].
+    limits: least and largest force.  tracking_time: how fast the integral follows a limited output [s]; default
+    proportional/integral.
+    """
+
+    joint: str
+    coordinate: str | None = None
+    measured: str | None = None
+    reference: Bare
+    proportional: Value = 0.0
+    integral: Value = 0.0
+    derivative: Value = 0.0
+    limits: tuple[Value, Value] | None = None
+    tracking_time: Annotated[Time, Field(gt=0.0)] | None = None
+
+
+class Pid(_Controller):
+    """Continuous PID: proportional e + integral of (integral e + (force - asked)/tracking_time) + derivative de/dt."""
+
+    type: Literal["pid"]
+
+
+class SampledPid(_Controller):
+    """PID that looks every `period`, from the start of the run on, and holds its output in between (zero-order hold).
+
+    At sample k: proportional e_k + I_k + derivative (e_k - e_(k-1))/period, no derivative at the first;
+    I_(k+1) = I_k + period (integral e_k + (force - asked)/tracking_time).
+    """
+
+    type: Literal["sampled-pid"]
+    period: Annotated[Time, Field(gt=0.0)]
+
+
 Load = Annotated[
-    Gravity | PointForce | PointTorque | SpringDamper | JointForce | JointSpring | JointFriction | Bushing,
+    Gravity
+    | PointForce
+    | PointTorque
+    | SpringDamper
+    | JointForce
+    | JointSpring
+    | JointFriction
+    | Bushing
+    | Pid
+    | SampledPid,
     Field(discriminator="type"),
 ]
 #: all of them

@@ -10,7 +10,8 @@ from pydantic import Field, PrivateAttr, model_validator
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
-from pipeline.core.scene.loads import Gravity, Load
+from pipeline.core.scene.gears import Gear
+from pipeline.core.scene.loads import Gravity, Load, SampledPid
 from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
     Body,
@@ -26,6 +27,8 @@ from pipeline.core.units import quantity
 
 #: rows of a run that a machine can be asked to hold
 MOST_ROWS = 1e7
+#: samples of a controller; at each of them a step ends
+MOST_SAMPLES = 1e6
 
 
 class TimeSpan(Part):
@@ -117,6 +120,7 @@ class Scene(Part):
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
     stop: dict[PartName, Stop] = Field(default_factory=dict)
+    gear: dict[PartName, Gear] = Field(default_factory=dict)
     time: TimeSpan
     solver: Solver = PlainIntegrator()
     output: Output = Output()
@@ -131,6 +135,19 @@ class Scene(Part):
                 f"output.interval = {self.output.interval:g} s asks for {rows:.3g} rows, more than {MOST_ROWS:g}: "
                 "choose a longer one"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _samples_can_be_made(self) -> Scene:
+        for name, load in self.load.items():
+            if not isinstance(load, SampledPid):
+                continue
+            samples = (self.time.end - self.time.start) / load.period
+            if samples > MOST_SAMPLES:
+                raise ValueError(
+                    f"load.{name}.period = {load.period:g} s asks for {samples:.3g} samples, more than "
+                    f"{MOST_SAMPLES:g}: choose a longer one, or a continuous 'pid'"
+                )
         return self
 
     @model_validator(mode="after")

@@ -43,7 +43,7 @@ def no_link_load(h, w, i):
 
 
 @kernel
-def no_closures(h, w, n):
+def no_closures(h, f, w, n):
     """A tree needs no multipliers."""
 
 
@@ -193,7 +193,7 @@ def make_right_hand_side(
         for k in range(h[m.NV]):
             w[h[m.FORCE] + k] = -w[h[m.BIAS] + k]
         forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-        close(h, w, n)
+        close(h, f, w, n)
         backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
         for k in range(h[m.NV]):
             w[h[m.DU] + k] = w[h[m.FORCE] + k]

@@ -27,6 +27,12 @@ def law(h, w, k, which):
 
 
 @kernel
+def law_rate(h, w, k, which):
+    """Its present rate [1/s of it]."""
+    return w[m.LAW.row(h, m.LOADS.law0(h, k) + which) + m.LAW.rate]
+
+
+@kernel
 def act(h, w, k, moment, force, value, rate, stored, power, loss):
     """Apply the wrench of load k on b and against it on a; note what it does, and book power and loss."""
     o = m.LOAD.row(h, k)

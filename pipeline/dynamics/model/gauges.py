@@ -38,10 +38,23 @@ def angles(gauges: np.ndarray, sites: np.ndarray) -> dict[int, float]:
 
     gauges: rows of GAUGES; sites: frames of all sites, rows of SITE_FRAMES; both with named fields.
     """
-    found = {}
-    for row in gauges[gauges["turns"] >= 0]:
-        F, G = sites["axes"][row["a"]], sites["axes"][row["b"]]
-        sine = float(F[:, row["sine_f"]] @ G[:, row["sine_g"]])
-        cosine = float(F[:, row["cosine_f"]] @ G[:, row["cosine_g"]])
-        found[int(row["turns"])] = atan2(sine, cosine)
+    mine = gauges[gauges["turns"] >= 0]
+    nothing = np.zeros(int(mine["turns"].max(initial=-1)) + 1)
+    return {int(row["turns"]): angle for row, angle in zip(mine, values(mine, sites, nothing), strict=True)}
+
+
+def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[float]:
+    """Coordinates [rad, or m] that gauges measure, full turns counted as the internal states say; as of `angles`."""
+    found = []
+    for row in gauges:
+        a, b = sites[row["a"]], sites[row["b"]]
+        if row["turning"]:
+            sine = float(a["axes"][:, row["sine_f"]] @ b["axes"][:, row["sine_g"]])
+            cosine = float(a["axes"][:, row["cosine_f"]] @ b["axes"][:, row["cosine_g"]])
+            angle = atan2(sine, cosine)
+            turns = round((internal[row["turns"]] - angle) / (2.0 * np.pi)) if row["turns"] >= 0 else 0
+            found.append(angle + 2.0 * np.pi * turns)
+        else:
+            along = (b if row["side"] else a)["axes"][:, row["axis"]]
+            found.append(float(along @ (b["origin"] - a["origin"])))
     return found

@@ -16,7 +16,7 @@ from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.effects import LOADS
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.driving import coordinate_of, named_coordinate
 from pipeline.dynamics.model.gauges import Gauges
 from pipeline.dynamics.model.laws import checked_law
 from pipeline.dynamics.model.mechanism import Mechanism
@@ -64,18 +64,24 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     rows: list[tuple[int, ...]] = []
     numbers, laws = list[float](), list[Pieces]()
     for name in names:
-        row, coordinate = _describe(scene, name)
+        row, coordinate, measured = _describe(scene, name)
         frames = row.frames if row.joint is None else tuple(scene.joint[row.joint].between)
         loads.append(Load(name, frames))
         a, b = _sites(mechanism, numbering, loads[-1])
         gauge = -1 if coordinate is None else gauges.add(a, b, coordinate, counts=row.counts_turns)
+        look = -1
+        if measured is not None:
+            first_end, second_end = (
+                numbering.site(mechanism.site(frame)) for frame in scene.joint[measured[0]].between
+            )
+            look = gauges.add(first_end, second_end, measured[1], counts=True)
         internal = gauges.states(row.states) if row.states else -1
         first = numbering.known + len(laws)
         if f"load.{name}" in given:
             laws.append(given[f"load.{name}"])
         else:
             laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
-        rows.append((a, b, first, len(numbers), gauge, internal, int(row.follows)))
+        rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows)))
         numbers += row.numbers
     counts = [sum(forces[n].type == kind for n in names) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
@@ -87,19 +93,28 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     return Loaded(kinds, tuple(loads), tables, laws)
 
 
-def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
-    """What a load acts on and with; InputError for what cannot be."""
+def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[str, Coordinate] | None]:
+    """What a load acts on and with, its joint coordinate, and the one that it measures with that joint's name.
+
+    Raises InputError for what cannot be.
+    """
     load: Any = scene.load[name]
     place = f"[load.{name}]"
     part = lookup(LOADS, load.type, where=place)
-    coordinate = None
+    coordinate: Coordinate | None = None
+    measured: tuple[str, Coordinate] | None = None
     if hasattr(load, "joint"):
         coordinate = coordinate_of(scene, load.joint, load.coordinate, place)[2]
+    if hasattr(load, "measured") and coordinate is not None:
+        measured = load.joint, coordinate
+        if load.measured is not None:
+            measured = named_coordinate(scene, load.measured, f"[load.{name}.measured]")
+    given = [*([coordinate] if coordinate else []), *([measured[1]] if measured else [])]
     try:
-        row: Row = part.row(load, place) if coordinate is None else part.row(load, place, coordinate)
+        row: Row = part.row(load, place, *given)
     except ValueError as error:
         raise InputError(place, str(error)) from None
-    return row, coordinate
+    return row, coordinate, measured
 
 
 def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int, int]:

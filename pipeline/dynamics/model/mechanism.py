@@ -49,6 +49,11 @@ class Closure(NamedTuple):
     a: Site
     b: Site
 
+    @property
+    def name(self) -> str:
+        """Of the joint."""
+        return self.edge.name
+
 
 class Contact(NamedTuple):
     """A clearance joint, or an end of a stop: its name, what the scene says of it, and two sites.

@@ -17,6 +17,7 @@ from pipeline.dynamics.model import flexible_bodies, laws, wiring
 from pipeline.dynamics.model import loads as loading
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
+from pipeline.dynamics.model.couplings import Coupling, couplings, tables
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.gauges import Gauges
 from pipeline.dynamics.model.loads import Load
@@ -45,7 +46,7 @@ class Model:
     arrays: Arrays
     scene: Scene
     links: list[Link]
-    closures: tuple[Closure, ...]
+    closures: tuple[Closure | Coupling, ...]
     contacts: list[Contact]
     laws: tuple[Resolved, ...]
     loads: tuple[Load, ...]
@@ -80,8 +81,8 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     normals = contacting.resolve(mechanism)
     site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
-    closures, order = wiring.closures(numbering, site_pairs)
-    gauges = Gauges()
+    coupled, gauges = couplings(mechanism), Gauges()
+    closures, order = wiring.closures(numbering, site_pairs, coupled)
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
@@ -90,6 +91,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
+    coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
     groups, floors = _error_groups(numbering, ledger, gauges.internal)
     arrays = pack(
         {
@@ -97,7 +99,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
             m.N_LEDGER: contact_ledger + ledger + gauges.internal,
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
-            m.N_COUPLINGS: 0,
+            m.N_COUPLINGS: len(coupled),
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
@@ -113,9 +115,8 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
             **contacts,
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
+            **coupling_tables,
             m.GAUGES: gauges.rows,
-            m.COUPLINGS: [],
-            m.COUPLING_NUMBERS: [],
             m.GRAVITY: gravity,
             m.GROUPS: groups,
             m.FLOORS: floors,
@@ -129,7 +130,7 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
         arrays,
         mechanism.scene,
         mechanism.links,
-        tuple(mechanism.closures[k] for k in order),
+        tuple([*mechanism.closures, *coupled][k] for k in order),
         mechanism.contacts,
         normals,
         loaded.loads,
@@ -153,7 +154,8 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
         loads=loads,
         stops=any(joint.type == STOP for joint in contacts),
-        closures=bool(mechanism.closures),
+        couplings=bool(mechanism.scene.gear),
+        closures=bool(mechanism.closures or mechanism.scene.gear),
         flexible=not mechanism.all_rigid,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,

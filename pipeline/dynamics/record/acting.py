@@ -1,4 +1,4 @@
-"""What acts on bodies besides joints and paths: loads and stops, at the frames where they do."""
+"""What acts on bodies besides joints and paths: loads, stops and gears, at the frames where they do."""
 
 from __future__ import annotations
 
@@ -21,6 +21,10 @@ def on_frames(model: Model, seen: Observed, body: str) -> Acting:
         from pipeline.dynamics.record.stops import on_stopped_frames
 
         found += on_stopped_frames(model, seen)
+    if model.parts.couplings:
+        from pipeline.dynamics.record.gears import on_geared_frames
+
+        found += on_geared_frames(model, seen)
     return [acting for acting in found if model.mechanism.frames[acting[0]].body == body]
 
 

@@ -38,6 +38,14 @@ def dataset(run: Run) -> xr.Dataset:
         from pipeline.dynamics.record.bushings import give
 
         parts.append(give(model, seen))
+    if {"pid", "sampled-pid"} & set(model.parts.loads):
+        from pipeline.dynamics.record.controllers import controllers
+
+        parts.append(controllers(model, seen))
+    if model.parts.couplings:
+        from pipeline.dynamics.record.gears import gear_series
+
+        parts.append(gear_series(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(trajectory), {})]
     if run.twin is not None:

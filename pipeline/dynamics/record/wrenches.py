@@ -10,6 +10,7 @@ from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.parts import RigidBody
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.record.acting import on_body
 from pipeline.dynamics.record.motion import Motions
@@ -50,7 +51,8 @@ def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
 
 
 def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
-    return {closure.edge.name: _wrench(seen.closure_wrenches[:, c]) for c, closure in enumerate(model.closures)}
+    joints = [(c, closure) for c, closure in enumerate(model.closures) if not isinstance(closure, Coupling)]
+    return {closure.name: _wrench(seen.closure_wrenches[:, c]) for c, closure in joints}
 
 
 def _wrench(rows: np.ndarray, sign: float = 1.0) -> Wrench:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import Progress
+from pipeline.core.scene.loads import SampledPid
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import refusal, singular
 from pipeline.dynamics.run.engine import Engine
@@ -136,6 +137,9 @@ def integrate(
     stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is gone on with from there.
     """
+    sample = _sampler(engine)
+    if left is None:
+        y = sample(y, engine.start)
     tape = _begin(engine, y) if left is None else _resume(engine, left)
     if left is None and engine.mobility.singular_start:
         _depart(engine, tape)
@@ -143,11 +147,22 @@ def integrate(
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
+        if a > (engine.start if left is None else left.time):
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
         engine.select_pieces(0.5 * (a + b))
         control[m.END], engine.n[m.FRESH] = b, 1
         if _segment(engine, tape, progress, stop):
             break
     return _collect(engine, tape)
+
+
+def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
+    """What gives the state after the samples of controllers, from that at a break [s] before them."""
+    if not any(isinstance(load, SampledPid) for load in engine.model.scene.load.values()):
+        return lambda y, t: y
+    from pipeline.dynamics.run.sampling import sampler
+
+    return sampler(engine)
 
 
 def _begin(engine: Engine, y: np.ndarray) -> _Tape:
