@@ -25,6 +25,9 @@ ZERO = 1e-9
 LOW = 0.5
 #: share of the time between two rows to which a pass is located
 WITHIN = 1e-9
+#: a pose with a lower condition number than this is regular, however rows far apart make it look: passes are located to
+#: some 1e-8 of the time between two rows, where what passes through zero has about that share of its size beside
+PASSED = 1e4
 #: a pass with less than this share of the run's largest kinetic energy does not choose its branch
 AT_REST = 1e-10
 
@@ -111,6 +114,8 @@ def _pass_before(engine: Engine, trajectory: Trajectory, regular: np.ndarray, k:
     share = float(minimize_scalar(least, bounds=(0.0, 1.0), method="bounded", options={"xatol": WITHIN}).x)
     start, end = trajectory.time[regular[k - 1]], trajectory.time[regular[k]]
     there = np.linalg.svd(jacobian(share))
+    if singular.condition(there[1]) < PASSED:
+        return None
     joint = singular.worst_joint(engine, there[0][:, -1])
     return Pass(float(start + share * (end - start)), singular.condition(there[1]), lost, joint)
 

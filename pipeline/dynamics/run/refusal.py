@@ -46,7 +46,16 @@ def text(engine: Engine) -> str:
         f"({where}): give it another motion{_other_integrator(engine)}",
         m.LOST_CLOSURE: unsolvable,
     }
-    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}"
+    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}{_doubts(engine)}"
+
+
+def _doubts(engine: Engine) -> str:
+    """What flexible bodies are doubted for where the run ended, which may well be why; or nothing."""
+    if not engine.model.numbering.flexible:
+        return ""
+    from pipeline.dynamics.run.validity import doubts
+
+    return "".join(f"; {sentence}" for sentence in doubts(engine))
 
 
 def _other_integrator(engine: Engine) -> str:

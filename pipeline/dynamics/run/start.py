@@ -8,6 +8,8 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.core.scene.drives import PathDrive
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import initial
+from pipeline.dynamics.model.given_start import moved
+from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.stops import End
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
@@ -33,7 +35,8 @@ def consistent_start(engine: Engine) -> np.ndarray:
         _look(engine, state)
         return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
 
-    y = initial.given_velocities(model, motion, y)
+    # a singular pose has no rates to project on
+    y = initial.given_velocities(model, motion, y, 0.0 if engine.mobility.singular_start else initial.WRONG)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads or model.arrays.size(m.N_INTERNAL):
@@ -42,6 +45,14 @@ def consistent_start(engine: Engine) -> np.ndarray:
         initial.check_loads(model, engine.table(m.LOAD))
     _refuse_penetration(engine, y)
     return y
+
+
+def mends(engine: Engine, y: np.ndarray) -> list[str]:
+    """Sentences about what a consistent start y has changed of the poses and velocities that the scene gives."""
+    _look(engine, y)
+    frames = engine.table(m.LINK_FRAMES)
+    now = [Placement(frame["origin"], frame["axes"]) for frame in frames]
+    return [*moved(engine.model.mechanism, now), *initial.changed_velocities(engine.model, frames, y)]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
