@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
+from pipeline.core.scene.clearance import CONTACTS, Clearance
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
 from pipeline.core.scene.gears import Gear
@@ -247,8 +247,8 @@ class Scene(Part):
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
 
     def contacts(self) -> dict[str, Clearance]:
-        """Clearance joints by name."""
-        return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
+        """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
 
     def stop_ends(self) -> list[str]:
         """Names of all ends of stops, as records have them."""

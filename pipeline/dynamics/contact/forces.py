@@ -1,10 +1,11 @@
 """Forces of the contacts: geometry of two nested surfaces, laws by their kinds.
 
 gap = c - |p_OI|, with p_OI from the centre of the outer surface (socket, journal) to that of the
-inner one (ball, pin), where the surfaces part; depth d = -gap; d' = n . (velocity of the inner
-centre as seen from the outer body), n along p_OI. Both forces act at one point Q on the line of
-centres, on the inner surface (Wang & Wang 2019, eq. 23); the sliding velocity is that of the
-material points there, so that rolling is no sliding. Acting at one point keeps angular momentum.
+inner one (ball, pin), where the surfaces part (a slot and a plane measure the gap otherwise, see
+`joints`); depth d = -gap; d' = n . (velocity of the inner centre as seen from the outer body), n
+along p_OI. Both forces act at one point Q on the line of centres, on the inner surface (Wang & Wang
+2019, eq. 23); the sliding velocity is that of the material points there, so that rolling is no
+sliding. Acting at one point keeps angular momentum.
 """
 
 from __future__ import annotations
@@ -151,11 +152,11 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
             cross(at(w, outer + m.FRAME.omega), p_OI),
         )
         kind, numbers = m.CONTACTS.surfaces(h, c), m.CONTACT_NUMBERS.row(h, c)
-        gap, rate, axis, turning = separation(kind, f, w, outer, numbers, p_OI, v_OI)
+        gap, rate, axis, turning, offset = separation(kind, f, w, outer, numbers, p_OI, v_OI)
         w[o + m.TOUCH.gap], w[o + m.TOUCH.rate] = gap, rate
         for k in range(m.TOUCH.normal_force, m.TOUCH.offset):
             w[o + k] = 0.0
-        put(w, o + m.TOUCH.offset, turn_back(at9(w, outer + m.FRAME.axes), p_OI))
+        put(w, o + m.TOUCH.offset, turn_back(at9(w, outer + m.FRAME.axes), offset))
         return axis, turning
 
     @kernel

@@ -18,7 +18,7 @@ def separation(f, w, outer, numbers, p, v):
     """As `clearance_spherical.separation`, of the parts of p and v normal to the journal's axis."""
     z = axis(at9(w, outer + m.FRAME.axes), 2)
     distance, rate, normal, turning = radial(sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z)))
-    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning
+    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning, p
 
 
 class ClearanceRevolute:

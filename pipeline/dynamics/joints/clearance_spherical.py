@@ -12,12 +12,13 @@ from pipeline.dynamics.vectors import radial
 
 @kernel
 def separation(f, w, outer, numbers, p, v):
-    """Gap [m], rate of penetration, normal towards the socket, its rate; p, v: offset of the ball's centre, its rate.
+    """Gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
 
+    p, v: offset of the ball's centre from the socket's, its rate as seen from the socket, world axes.
     outer: frame of the socket.  numbers: of the contact.
     """
     distance, rate, normal, turning = radial(p, v)
-    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning
+    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning, p
 
 
 class ClearanceSpherical:

@@ -45,7 +45,7 @@ def fill(
         if isinstance(joint, End):
             surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
         else:
-            surfaces, shape = parts.surfaces.index(joint.type), (0.0, 0.0)
+            surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         rows.append((*sites, *kinds_of, place))
         reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers, *shape])
