@@ -71,7 +71,7 @@ def test_a_scotch_yoke_follows_the_cosine_within_its_clearance() -> None:
     clearance, t = 1e-4, dataset.time.values
     off = dataset.position.sel(body="yoke").values[:, 0] - 0.05 * np.cos(20.0 * t)
     deep = float(dataset.contact_penetration.sel(contact="slot").max())
-    assert 0.0 < deep < 0.1 * clearance
+    assert 0.0 < deep < 0.5 * clearance
     assert np.abs(off).max() <= clearance + deep + 1e-9
     assert off.max() > 0.9 * clearance
     assert off.min() < -0.9 * clearance
