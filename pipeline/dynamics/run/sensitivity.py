@@ -88,16 +88,19 @@ def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
 
-    From the velocities that unit speeds give, so that no step width enters.
+    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds
+    give, so that no step width enters.
     """
     engine.select_pieces_after(engine.start)
-    contacts, columns = engine.model.arrays.table(m.CONTACTS), []
+    contacts, stops, columns = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES), []
     for k in range(engine.model.nv):
         moved = y.copy()
         moved[engine.model.speeds] = np.eye(engine.model.nv)[k]
         engine.evaluate(project(engine, moved), engine.start)
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
-        columns.append((velocity[contacts["inner"]] - velocity[contacts["outer"]]).ravel())
+        offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
+        offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
+        columns.append(offset.ravel())
     return np.array(columns).T
 
 
