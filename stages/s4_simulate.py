@@ -79,7 +79,7 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
-def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scene:
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
     """The scene again, from what `params` kept of it; its title is its name.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
@@ -87,6 +87,8 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scen
     from pipeline.core.scene.schema import Scene
 
     table = params["scene"]
-    scene = Scene.model_validate({**table, "body": s3_rigid.filled(table["body"], inputs), "title": params["name"]})
+    scene = Scene.model_validate(
+        {**table, "body": s3_rigid.filled(table["body"], inputs or {}), "title": params["name"]}
+    )
     scene._name = params["name"]
     return scene
