@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 # One thread in BLAS and OpenMP, before NumPy is loaded: the matrices are small, and sums whose
 # order depends on the number of cores would break the promise of equal bytes for equal inputs.
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
+    os.environ[_variable] = "1"  # also where somebody asked for more: that would change the bytes
 
 __all__ = [
     "Scene",

@@ -45,6 +45,8 @@ class Graph:
     @cached_property
     def mesh(self) -> dict[str, Task]:
         """By body with a recipe."""
+        for recipe in self.scene.recipes().values():
+            s1_mesh.check_size(Path(recipe), self.scene.limits, self.recipe)
         return {
             body: self._body_task(
                 "mesh",
@@ -52,6 +54,7 @@ class Graph:
                 "stages.s1_mesh:run",
                 s1_mesh.params(Path(recipe), self.recipe),
                 modules=s1_mesh.modules(Path(recipe)),
+                context={"folder": str(Path(recipe).parent.resolve())},
             )
             for body, recipe in self.scene.recipes().items()
         }
@@ -128,7 +131,9 @@ class Graph:
     def verdict(self) -> Task:
         """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
         inputs = {"sections": self.sections}
-        return self._scene_task("verdict", "stages.s5_verdict:run", {}, inputs, names={"nc": "verdict.nc"})
+        # the figure is headed by the name, which is a fact for once
+        params: dict[str, object] = {"scene": self.scene.name}
+        return self._scene_task("verdict", "stages.s5_verdict:run", params, inputs, names={"nc": "verdict.nc"})
 
     @cached_property
     def post(self) -> Task:
@@ -231,6 +236,7 @@ class Graph:
         return Task(
             stage=stage,
             scene=self.scene.name,
+            context={"name": self.scene.name, "limits": self.scene.limits.written()},
             run=run,
             params=params,
             folder=self._folder(),
@@ -247,11 +253,13 @@ class Graph:
         params: dict[str, object],
         inputs: dict[str, Task] | None = None,
         modules: tuple[str, ...] = (),
+        context: dict[str, str] | None = None,
     ) -> Task:
         return Task(
             stage=stage,
             scene=self.scene.name,
             part=body,
+            context=context or {},
             run=run,
             params=params,
             folder=self._folder(stage),

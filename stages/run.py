@@ -12,16 +12,19 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipeline.core.artifacts.disk import disk_limits
 from pipeline.core.artifacts.paths import results_root
-from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
+from pipeline.core.artifacts.store import Store, write_dataset
 from pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
 from pipeline.core.scene import lines
-from pipeline.core.scene.load import load_scene, read_toml, scene_name
+from pipeline.core.scene.demand import check_run
+from pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from pipeline.core.scene.references import dangling
 from pipeline.core.workflow.fingerprint import TREE, Sources
 from pipeline.core.workflow.progress import WARNING, Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
 from pipeline.core.workflow.task import Task
+from stages import owner
 from stages.graph import STAGES, Graph
 
 if TYPE_CHECKING:
@@ -47,6 +50,11 @@ def command(options: argparse.Namespace) -> None:
         check_target(options.out)
     wanted = graphs(options.scenes, options.set)
     place = workplace(options)
+    for graph in wanted:
+        check_run(graph.scene, place.store.root)
+        taken = owner.claim(graph.scene, place.store)
+        if taken is not None:
+            place.monitor.say(taken)
     outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
@@ -133,10 +141,10 @@ def workplace(options: argparse.Namespace | None = None) -> Workplace:
 def find_scene(name: str) -> Path:
     """The file of a scene given by path or by name (``sps4/csj``). InputError names what is near."""
     path = Path(name)
-    if path.suffix == ".toml" or path.is_file():
+    if path.suffix == ".toml" or is_file(path):
         return path
     named = TREE / "scenes" / f"{name}.toml"
-    if named.is_file():
+    if is_file(named):
         return named
     raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
 
@@ -149,7 +157,7 @@ def _known(name: str) -> str:
 
 
 def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
-    """Dataset of the simulate stage, brought up to date; titled as the scene is.
+    """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
     An edited scene (`override`) is cached like any other but does not take the place of its file's
     results under results/runs.  Raises FlexclearError.
@@ -161,7 +169,7 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
 def graph(scene: Scene) -> Graph:
@@ -236,7 +244,7 @@ def linear(
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
 def check(outcome: Outcome) -> None:
@@ -297,7 +305,7 @@ def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are told together."""
-    found: dict[str, Graph] = {}
+    found: dict[Path | str, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
         try:
@@ -305,7 +313,8 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
             require_names(graph.scene)
             with in_file(graph.scene.path):
                 graph.up_to("post")
-            found[graph.scene.name] = graph
+            path = graph.scene.path
+            found[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputErrors as errors:
             wrong.extend(errors.errors)
         except InputError as error:
@@ -313,6 +322,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     if wrong:
         told = [lines.located(error) for error in wrong]
         raise told[0] if len(told) == 1 else InputErrors(told)
+    owner.refuse_namesakes([graph.scene for graph in found.values()])
     return list(found.values())
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 from pipeline.core.errors import InputError
 from pipeline.core.units import unit
 
+#: characters of a line that is worth mending
+LONGEST = 300
 _LINE = re.compile(r"\(at line (\d+)")
 _PLACE = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
 _OTHER = "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
@@ -37,7 +39,7 @@ def _guessed(line: str) -> tuple[str, str] | None:
         return f"a comment begins with #: {bare}", f"write # {bare.lstrip('/;* ')}"
     if len(re.findall(r"(?<!\\)\"", bare.partition(" #")[0])) % 2:
         return f"a quotation mark is missing: {bare}", 'text and quantities with units stand between two marks: "1 mm"'
-    quoted = _quoted(line)
+    quoted = _quoted(line) if len(line) <= LONGEST else line
     if quoted != line:
         return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"
     if value and re.fullmatch(r"[-+]?\d+,\d+", value[2]):

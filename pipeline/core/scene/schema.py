@@ -10,6 +10,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from pipeline.core.scene.limits import Limits
 from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
@@ -164,6 +165,7 @@ class Scene(Part):
     ensemble: Ensemble | None = None
     sections: Sections | None = None
     accuracy: Accuracy | None = None
+    limits: Limits = Limits()
     view: View | None = None
 
     @model_validator(mode="after")
