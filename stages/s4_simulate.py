@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.core.artifacts.paths import results_root
 from pipeline.core.scene.demand import check_run
+from stages import s3_rigid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -16,17 +17,17 @@ if TYPE_CHECKING:
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, limits, and places and names of files are not part of it,
+    """What the engine sees of a scene. Titles, views, limits, and places and names of files are not part of it,
     nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
     whether that may be missed."""
-    whole = ("title", "description", "limits", "accuracy" if ensemble else "ensemble")
-    left_out: dict[str, Any] = dict.fromkeys(whole, True)
+    unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
+    left_out: dict[str, Any] = dict.fromkeys(unseen, True)
     if not ensemble:
         left_out["accuracy"] = {"allow_missed"}
     if not sections:
         left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
-    for body in scene.flexible():
+    for body in scene.recipes():
         table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
     return {"scene": without_file_names(table)}
 
@@ -53,7 +54,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
     from pipeline import dynamics
 
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
     check_run(scene, results_root())
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
@@ -80,7 +81,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
     from pipeline import dynamics
 
-    scene = rebuild(params)
+    scene = rebuild(params, inputs)
     check_run(scene, results_root())
     return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
 
@@ -90,11 +91,15 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
-def rebuild(params: Mapping[str, Any]) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name, where that is told."""
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scene:
+    """The scene again, from what `params` kept of it; its title is its name, where that is told.
+
+    inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
+    """
     from pipeline.core.scene.schema import Scene
 
-    name = str(params.get("name", "scene"))
-    scene = Scene.model_validate({**params["scene"], "title": name, "limits": params.get("limits", {})})
+    table, name = params["scene"], str(params.get("name", "scene"))
+    told = {"body": s3_rigid.filled(table["body"], inputs), "title": name, "limits": params.get("limits", {})}
+    scene = Scene.model_validate({**table, **told})
     scene._name = name
     return scene

@@ -8,6 +8,9 @@ import sys
 from collections.abc import Iterable
 from functools import lru_cache
 
+#: a number that is written with a comma
+_COMMA = re.compile(r"\s*[-+]?\d+,\d")
+
 Exponents = tuple[float, float, float, float]
 
 #: factor to SI and physical dimension of every unit that a scene or recipe may use
@@ -218,7 +221,10 @@ def _read(value: object, dimension: str) -> float:
     if isinstance(value, str):
         match = _parts(value)
         if match is None:
-            raise ValueError(f"'{value}' is not a number with a unit")
+            what = "a number" if dimension == "number" else f"a number with a unit, as '1 {_example(dimension)}'"
+            raise ValueError(f"'{value}' is not {what}")
+        if _COMMA.match(value):
+            raise ValueError(f"'{value}' has a decimal comma; numbers have a decimal point")
         number, written = float(match[1]), match[2]
         factor, found = (1.0, dimension) if written is None else _known_unit(written, dimension)
         if found != dimension:

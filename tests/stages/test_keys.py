@@ -225,7 +225,7 @@ def test_a_scene_survives_the_way_through_its_parameters(root: Path):
     """What the engine is given says the same as the file, apart from what is left out on purpose."""
     for path in sorted((root / "scenes").rglob("*.toml")):
         scene = load_scene(path)
-        again = s4_simulate.rebuild({"name": scene.name, **s4_simulate.params(scene, ensemble=True)})
+        again = s4_simulate.rebuild({"name": scene.name, **s4_simulate.params(scene, ensemble=True)}, {})
         assert again.name == scene.name
         left_out = {"title", "description", "accuracy", "sections"}
         one, other = scene.model_dump(exclude=left_out), again.model_dump(exclude=left_out)

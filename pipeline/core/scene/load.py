@@ -21,7 +21,7 @@ from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
-SETTINGS = ("time", "solver", "output", "ensemble", "accuracy", "limits")
+SETTINGS = ("time", "solver", "output", "ensemble", "accuracy", "limits", "view")
 #: bytes that no scene or recipe needs
 LARGEST = 4 << 20
 #: a key of more parts than a scene has levels; the reader of TOML takes their number squared
@@ -47,6 +47,27 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
         raise input_errors(path, error, Scene) from None
     scene._name = name
     scene._path = path
+    return scene
+
+
+def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
+    """The scene in a table with the keys of a scene file; files in it are relative to the current folder.
+
+    override and errors as of `load_scene`.  Its name is its title's.
+    """
+    place = Path("scene")
+    found = copy.deepcopy(dict(table))
+    _require_tables(found, place)
+    if any(key in found for key in EDITS):
+        raise InputError("scene", "edits another scene, which only files do", "use edited(scene, changes)")
+    _absolute_files(found, Path.cwd() / place)
+    for key, value in (override or {}).items():
+        _put(found, key, value, "override of scene")
+    try:
+        scene = Scene.model_validate(found)
+    except ValidationError as error:
+        raise input_errors("scene", error, Scene) from None
+    scene._name = "-".join(re.findall(r"\w+", scene.title.lower())) or "scene"
     return scene
 
 
