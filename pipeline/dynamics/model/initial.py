@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -49,23 +50,24 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
-    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+@dataclass(frozen=True)
+class Velocities:
+    """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
-    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
-    of deformation if joints, drives and given velocities allow that.
-    Raises InputError when joints and drives do not allow the velocities.
+    bodies: those that are given velocities, which the first `told` rows ask for; the others keep the loops closed.
+    fastest: size of the speeds that are asked for, those of a slow motion at least.
     """
-    wanted = {
-        n: b
-        for n, b in model.scene.body.items()
-        if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
-    }
-    elastic = np.zeros(model.nv, dtype=bool)
-    for modes in model.numbering.modal_coordinates.values():
-        elastic[modes] = True
-    if not wanted and not elastic.any():
-        return y
+
+    matrix: np.ndarray
+    target: np.ndarray
+    told: int
+    bodies: tuple[str, ...]
+    fastest: float
+
+
+def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
+    """What bodies and loops ask of the speeds in a state."""
+    wanted = _given(model)
     y = y.copy()
     y[model.speeds] = 0.0
     given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
@@ -86,25 +88,49 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    matrix = np.array(columns).T.reshape(len(base), model.nv)
     asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
-    target = asked - base
     # a radian, or the mechanism's size, in the time of the whole run is slow
     slow = 1.0 / (model.scene.time.end - model.scene.time.start)
     fastest = slow + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
-    speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * fastest:
-        speeds, miss = _least(matrix, target)
-    if wanted and miss > CONTRADICTS * fastest:
-        names = ", ".join(wanted)
+    matrix = np.array(columns).T.reshape(len(base), model.nv)
+    return Velocities(matrix, asked - base, int(told.sum()), tuple(wanted), fastest)
+
+
+def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
+    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
+    Raises InputError when joints and drives do not allow the velocities.
+    """
+    elastic = np.zeros(model.nv, dtype=bool)
+    for modes in model.numbering.modal_coordinates.values():
+        elastic[modes] = True
+    if not _given(model) and not elastic.any():
+        return y
+    asked = velocity_equations(model, motion, y)
+    speeds, miss = _least(asked.matrix * ~elastic, asked.target)
+    if miss > RIGID * asked.fastest:
+        speeds, miss = _least(asked.matrix, asked.target)
+    if asked.bodies and miss > CONTRADICTS * asked.fastest:
         raise InputError(
-            f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
-            "mechanism's size, or radians, per second)",
+            f"[body.{asked.bodies[0]}.velocity]",
+            f"joints and drives do not allow the velocities given for {', '.join(asked.bodies)} (they miss by "
+            f"{miss:.3g} of the mechanism's size, or radians, per second)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[model.speeds] = unit * speeds
+    y = y.copy()
+    y[model.speeds] = model.speed_scales * speeds
     return y
+
+
+def _given(model: Model) -> dict[str, Any]:
+    """Bodies that are given velocities."""
+    return {
+        name: body
+        for name, body in model.scene.body.items()
+        if not isinstance(body, Ground) and (body.velocity is not None or body.angular_velocity is not None)
+    }
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:

@@ -27,12 +27,7 @@ def consistent_start(engine: Engine) -> np.ndarray:
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
-
-    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        _look(engine, state)
-        return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
-
-    y = initial.given_velocities(model, motion, y)
+    y = initial.given_velocities(model, start_motions(engine), y)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads:
@@ -40,6 +35,16 @@ def consistent_start(engine: Engine) -> np.ndarray:
         y = initial.start_loads(model, y, engine.table(m.LOAD))
     _refuse_penetration(engine, y)
     return y
+
+
+def start_motions(engine: Engine) -> initial.Motions:
+    """What speeds at the start mean: motions of the links, and rates at which the loops open."""
+
+    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        _look(engine, state)
+        return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
+
+    return motion
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
