@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 from pipeline.core.artifacts.paths import results_root
 from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
-from pipeline.core.errors import FlexclearError, InputError, InputErrors
+from pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import TREE, Sources
-from pipeline.core.workflow.progress import Monitor
+from pipeline.core.workflow.progress import WARNING, Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
 from pipeline.core.workflow.task import Task
 from stages.graph import STAGES, Graph
@@ -48,6 +48,7 @@ def command(options: argparse.Namespace) -> None:
         print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in wanted))))
     if options.out is not None:
         copy_run(wanted[0], place, options.out)
+    conclude(wanted, place, outcome)
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,10 @@ class FailedTasksError(FlexclearError):
     def __init__(self, failures: tuple[Failure, ...]) -> None:
         super().__init__("\n".join(failure.message for failure in failures))
         self.exit_code = failures[0].exit_code
+
+
+class MissedAccuracyError(SolverError):
+    """Runs are not as accurate as their scenes ask; what there is is kept, and says so."""
 
 
 def workplace() -> Workplace:
@@ -104,7 +109,7 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     """
     place = place or workplace()
     import_module("pipeline.core.artifacts.modal")  # gives the dataset its accessor
-    task = Graph(scene, shown=_as_in_its_file(scene)).simulate
+    task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
@@ -150,7 +155,7 @@ def linear(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
     place = place or workplace()
-    graph = Graph(scene, shown=_as_in_its_file(scene))
+    graph = Graph(scene, shown=as_in_its_file(scene))
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     outcome = place.bring([task], jobs=1)
     check(outcome)
@@ -163,7 +168,31 @@ def check(outcome: Outcome) -> None:
         raise FailedTasksError(outcome.failures)
 
 
-def _as_in_its_file(scene: Scene) -> bool:
+def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome) -> None:
+    """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
+
+    Raises MissedAccuracyError, after that, for runs that are not as accurate as their scene asks.
+    """
+    missed = []
+    for graph in graphs:
+        record = outcome.records.get(id(graph.simulate))
+        if record is None:
+            continue
+        for sentence in filter(None, record.said.get("warnings", "").split("\n")):
+            place.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
+        verdict, wanted = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
+        if verdict != "met" and wanted is not None:
+            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is kept"
+            if wanted.allow_missed:
+                place.monitor.say(text)
+            else:
+                missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
+    if missed:
+        raise MissedAccuracyError("\n".join(missed))
+
+
+def as_in_its_file(scene: Scene) -> bool:
+    """Whether a scene is what its file says, so that its results take their place below results/runs."""
     return scene.path is not None and load_scene(scene.path) == scene
 
 

@@ -198,7 +198,7 @@ NUMBERS: dict[str, object] = {
     "body.platform.inertia": ["2000 kg mm^2", "2000 kg mm^2", "3000 kg mm^2"],
     "body.ball_A1.com": [0.0, 0.0, 0.0],
     "body.platform.frames.A1.position": ["90 mm", "50 mm", 0.0],
-    "body.rod1.frames.bottom.position": [0.0, 0.0, "-60 mm"],
+    "body.rod1.frames.bottom.position": [0.0, 0.0, "-119 mm"],
     "body.platform.pose.position": [0.0, 0.0, "360 mm"],
     "drive.P1.law.change": ["30 mm", "-30 mm"],
     "drive.P2.law": {"type": "constant", "value": 0.0},

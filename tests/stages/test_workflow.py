@@ -13,6 +13,8 @@ import xarray as xr
 
 from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
 
+AddScene = Callable[[str, str], None]
+
 
 def test_what_is_fresh_is_not_run_again(project: Project):
     assert project.run("run", "tiny/contact").returncode == 0
@@ -213,3 +215,31 @@ def _wait_for(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.02)
+
+
+def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(project: Project, add_scene: AddScene):
+    add_scene("doubtful", SCENE + JOINT)
+    told = ["tiny/doubtful: warning: the rod bends too far", "tiny/doubtful: warning: the contact is too deep"]
+    for _ in range(2):  # the second time nothing runs
+        done = project.run("run", "tiny/doubtful")
+        assert done.returncode == 0
+        assert done.stderr.splitlines()[-2:] == [f"flexclear: {sentence}" for sentence in told]
+
+
+def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(project: Project, add_scene: AddScene):
+    wanted = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
+    add_scene("wanted", wanted)
+    for _ in range(2):
+        done = project.run("run", "tiny/wanted")
+        assert done.returncode == 3
+        assert "tiny/wanted [accuracy]: missed: ball.position is good to 2e-06, 2 times what is wanted" in done.stderr
+        assert "allow_missed = true" in done.stderr
+        assert "Traceback" not in done.stderr
+    kept = xr.load_dataset(project.results / "runs" / "tiny" / "wanted" / "run.nc", decode_times=False)
+    assert "2 times what is wanted" in kept.attrs["accuracy_verdict"]
+    project.calls()
+    add_scene("wanted", wanted + "allow_missed = true\n")
+    done = project.run("run", "tiny/wanted")
+    assert done.returncode == 0
+    assert "missed: ball.position" in done.stderr
+    assert project.calls() == []  # whether it may be missed changes nothing of the run

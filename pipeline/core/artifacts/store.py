@@ -15,7 +15,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,18 +28,24 @@ if TYPE_CHECKING:
 
 #: the file of an artifact that other stages read
 MAIN = "nc"
+#: attributes of the main file that a command tells, without opening the file
+TOLD = ("warnings", "accuracy_verdict")
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key."""
+    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
+
+    said: those of the main file's attributes that a command tells its user (`TOLD`).
+    """
 
     stage: str
     key: str
     files: Mapping[str, str]
     facts: Mapping[str, str]
+    said: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -92,7 +98,8 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
-            record = Record(stage, key, digests, dict(facts))
+            said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
+            record = Record(stage, key, digests, dict(facts), said)
             text = json.dumps(asdict(record), indent=1, sort_keys=True, ensure_ascii=False)
             publish(self.path(stage, key, "json"), text.encode() + b"\n")
         return record
@@ -153,9 +160,15 @@ def read_record(path: Path) -> Record | None:
     """The record in a file; None when there is none or it cannot be understood."""
     try:
         table = json.loads(path.read_bytes())
-        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]))
+        said = dict(table.get("said", {}))
+        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]), said)
     except (OSError, ValueError, KeyError, TypeError):
         return None
+
+
+def _attributes(product: Product) -> Mapping[str, object]:
+    """Attributes of the main file; none where it is no dataset."""
+    return getattr(product.get(MAIN), "attrs", {})
 
 
 def publish(path: Path, content: bytes) -> str:

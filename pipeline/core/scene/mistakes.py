@@ -12,6 +12,8 @@ from pydantic import BaseModel, ValidationError
 from pipeline.core.errors import InputError, InputErrors
 from pipeline.core.registry import suggestion
 
+#: findings that a value is no whole number
+WHOLE = ("int_type", "int_parsing", "int_from_float")
 #: kinds of findings -> what was expected
 EXPECTED = {
     **dict.fromkeys(("tuple_type", "list_type"), "expected a list [...]"),
@@ -20,19 +22,13 @@ EXPECTED = {
     "missing": "is missing",
     "extra_forbidden": "unknown key",
     "union_tag_not_found": "is missing",
-    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "expected a whole number"),
+    **dict.fromkeys(WHOLE, "expected a whole number"),
 }
 #: findings that a value is of another kind than one alternative of several: another alternative may fit better
-OTHER_KIND: tuple[str, ...] = (
-    "literal_error",
-    "model_type",
-    "dict_type",
-    "tuple_type",
-    "list_type",
-    "string_type",
-    "float_type",
+OTHER_KIND = (
+    *("literal_error", "model_type", "dict_type", "tuple_type", "list_type", "string_type", "float_type"),
+    *WHOLE,
 )
-OTHER_KIND += ("int_type", "int_parsing", "int_from_float")
 #: keys by which a part says which of several it is
 CHOOSING = ("type", "law")
 #: bounds of numbers, whose messages hold the bound

@@ -115,7 +115,8 @@ class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
     origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
-    start_residual: largest residual of a joint in the poses that the scene gives [m, or the sine of an angle].
+    start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
+    placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     """
 
     scene: Scene
@@ -127,6 +128,7 @@ class Mechanism:
     origin: np.ndarray
     length: float
     start_residual: float = 0.0
+    placed: tuple[Placement, ...] = ()
 
     @cached_property
     def drives(self) -> tuple[str, ...]:

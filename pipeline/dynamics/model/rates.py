@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import demands, freedoms, outboard_place
+from pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
 from pipeline.dynamics.model.mechanism import Closure
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model

@@ -65,9 +65,9 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
-def warnings(model: Model, trajectory: Trajectory) -> list[str]:
+def warnings(run: Run) -> list[str]:
     """Sentences about what a run is to be doubted for."""
-    return [*_contact_warnings(model, trajectory), *_step_warnings(model, trajectory)]
+    return [*run.mended, *_contact_warnings(run), *_flexible_warnings(run), *_step_warnings(run.model, run.trajectory)]
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
@@ -82,18 +82,26 @@ def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
     ]
 
 
-def _contact_warnings(model: Model, trajectory: Trajectory) -> list[str]:
+def _contact_warnings(run: Run) -> list[str]:
     """Sentences about contacts that left the range for which their laws were made."""
-    if not model.contacts:
+    if not run.model.contacts:
         return []
     from pipeline.dynamics.contact import validity
 
+    depths, forces = validity.deepest(run.trajectory.events, run.observed.touch)
     sentences = list[str]()
-    for c, ((name, joint, *_), law) in enumerate(zip(model.contacts, model.laws, strict=True)):
-        mine = trajectory.events[trajectory.events["contact"] == c]
-        depth, force = (float(np.fmax.reduce(mine[peak], initial=0.0)) for peak in ("peak_depth", "peak_force"))
-        sentences += validity.warnings(name, joint, law, depth, force)
+    for (name, joint, *_), law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
+        sentences += validity.warnings(name, joint, law, float(depth), float(force))
     return sentences
+
+
+def _flexible_warnings(run: Run) -> list[str]:
+    """Sentences about flexible bodies that left the range of linear modes."""
+    if not run.model.numbering.flexible:
+        return []
+    from pipeline.dynamics.run import validity
+
+    return validity.warnings(run.model, run.trajectory.time, run.observed)
 
 
 def _report(run: Run) -> dict[str, float | int | str]:
@@ -110,11 +118,13 @@ def _report(run: Run) -> dict[str, float | int | str]:
     if run.twin is not None:
         told["twin_perturbation"] = run.twin.perturbation
     told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
+    if run.mended:
+        told["start_mended"] = "\n".join(run.mended)
     if run.switched:
         told["switched"] = run.switched
     if redundant:
         told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
-    doubts = "\n".join(warnings(run.model, run.trajectory))
+    doubts = "\n".join(warnings(run))
     if run.model.contacts:
         from pipeline.dynamics.contact import validity
 

@@ -54,7 +54,16 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     status = int(n[m.STATUS])
     if status == m.NO_CONVERGENCE and not engine.method.traits.implicit:
         status = m.LOST_CLOSURE  # it was the loops that could not be closed
-    return f"at t = {control[m.TIME]:.6g} s: {reasons[status]}"
+    return f"at t = {control[m.TIME]:.6g} s: {reasons[status]}{_doubts(engine)}"
+
+
+def _doubts(engine: Engine) -> str:
+    """What flexible bodies are doubted for where the run ended, which may well be why; or nothing."""
+    if not engine.model.numbering.flexible:
+        return ""
+    from pipeline.dynamics.run.validity import doubts
+
+    return "".join(f"; {sentence}" for sentence in doubts(engine))
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:

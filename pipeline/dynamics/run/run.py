@@ -26,7 +26,7 @@ from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, prepare
 from pipeline.dynamics.run.ledger import require_closed
 from pipeline.dynamics.run.observation import beside, blurred, observe_flat
-from pipeline.dynamics.run.start import consistent_start
+from pipeline.dynamics.run.start import consistent_start, mends
 from pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ class Run:
 
     scene: as the user gave it; the engine may hold another, made for it.
     twin: the run's twin, of scenes with contacts.
+    mended: what was changed of the start that the scene gives, in words.
     switched: from when on and why an implicit integrator took the place of the scene's; empty when none did.
     """
 
@@ -48,6 +49,7 @@ class Run:
     observed: Observed
     twin: Twin | None = None
     switched: str = ""
+    mended: tuple[str, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -88,10 +90,14 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
+    mended = tuple(mends(engine, start))
+    for sentence in mended:
+        progress(None, sentence)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
+    _require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched)
+    return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched, mended)
 
 
 def follow(
@@ -107,6 +113,17 @@ def follow(
         progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
         second = other()
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
+
+
+def _require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+    """SolverError for a contact so deep that its surfaces mean nothing."""
+    if not model.contacts:
+        return
+    from pipeline.dynamics.contact.validity import deepest, refuse_deep
+
+    depths, _ = deepest(trajectory.events, seen.touch)
+    for (name, joint, *_), depth in zip(model.contacts, depths, strict=True):
+        refuse_deep(name, joint, float(depth))
 
 
 def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:

@@ -8,6 +8,8 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.core.scene.drives import PathDrive
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import initial
+from pipeline.dynamics.model.given_start import moved
+from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.observation import observe
@@ -27,7 +29,9 @@ def consistent_start(engine: Engine) -> np.ndarray:
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
-    y = initial.given_velocities(model, start_motions(engine), y)
+    # a singular pose has no rates to project on
+    share = 0.0 if engine.mobility.singular_start else initial.WRONG
+    y = initial.given_velocities(model, start_motions(engine), y, share)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads:
@@ -45,6 +49,14 @@ def start_motions(engine: Engine) -> initial.Motions:
         return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
 
     return motion
+
+
+def mends(engine: Engine, y: np.ndarray) -> list[str]:
+    """Sentences about what a consistent start y has changed of the poses and velocities that the scene gives."""
+    _look(engine, y)
+    frames = engine.table(m.LINK_FRAMES)
+    now = [Placement(frame["origin"], frame["axes"]) for frame in frames]
+    return [*moved(engine.model.mechanism, now), *initial.changed_velocities(engine.model, frames, y)]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:

@@ -120,7 +120,10 @@ class StiffError(SolverError):
 
 @dataclass
 class _Tape:
-    """The arrays of one integration; rows and events may be replaced by larger ones."""
+    """The arrays of one integration; rows and events may be replaced by larger ones.
+
+    doubted: flexible bodies of which has been said that they left the range of their modes.
+    """
 
     outputs: np.ndarray
     rows: np.ndarray
@@ -128,6 +131,7 @@ class _Tape:
     selections: list[tuple[float, np.ndarray]]
     collocations: list[Collocation] = field(default_factory=list)
     passes: list[Pass] = field(default_factory=list)
+    doubted: set[str] = field(default_factory=set)
 
 
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
@@ -270,8 +274,23 @@ def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> boo
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif _crawls(engine):
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
-        elif stop(tape.rows[: n[m.N_RECORDED]]):
-            return True
+        else:
+            _warn(engine, tape, progress)
+            if stop(tape.rows[: n[m.N_RECORDED]]):
+                return True
+
+
+def _warn(engine: Engine, tape: _Tape, progress: Progress) -> None:
+    """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
+    if not engine.model.numbering.flexible:
+        return
+    from pipeline.dynamics.run.validity import doubts
+
+    for sentence in doubts(engine):
+        body = sentence.partition(":")[0]
+        if body not in tape.doubted:
+            tape.doubted.add(body)
+            progress(None, f"warning: {sentence}")
 
 
 def _pass_over(engine: Engine, tape: _Tape) -> bool:
