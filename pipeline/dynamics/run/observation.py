@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
 
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14
-#: pivot ratio of the closures at which the equations hold eight digits of accelerations where loops are closed to 1e-14
-CLEAR = 1e-4
+#: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
+#: 1e-14, and six, with which a motion must do that is slow beside a pose
+CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
 #: first distance in time from a singular pose, as share of the polynomial over it, its factor from try to try, and how
 #: many tries there are
 NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
@@ -60,11 +62,11 @@ def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: fl
     return out
 
 
-def blurred(engine: Engine, row: np.ndarray) -> bool:
+def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     """Whether a row of the record is so near to a singular pose that its accelerations and forces are rounding."""
     one = m.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
-    return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < CLEAR
+    return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
 
 def beside(engine: Engine, row: np.ndarray, motion: Collocation) -> np.ndarray | None:
@@ -76,15 +78,13 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation) -> np.ndarray |
     between them.
     """
     pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))
-    distance = NEAREST * motion.span
-    for _ in range(TRIES):
+    for clear, k in product((CLEAR, NEARLY_CLEAR), range(TRIES)):
         rows = np.tile(row, (len(SIDES), 1))
         near = m.record(rows, len(engine.model.contacts))
-        near.time[:] += distance * SIDES
+        near.time[:] += NEAREST * motion.span * WIDER**k * SIDES
         near.state[:] = motion.states(near.time)
-        if not any(blurred(engine, side) for side in rows):
+        if not any(blurred(engine, side, clear) for side in rows):
             out = observe_with(engine, rows, pieces, ROUNDING)
             if not np.any(observation.by_name(out, engine.model.arrays.size).status):
                 return np.asarray(WEIGHTS @ out)
-        distance *= WIDER
     return None

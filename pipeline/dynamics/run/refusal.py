@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.reach import at_rest, beyond_reach
+from pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
@@ -21,7 +21,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
     control, n, contacts = engine.control, engine.n, engine.model.contacts
     if n[m.STATUS] in LOOPS:
-        told = beyond_reach(engine) or at_rest(engine, rows)
+        told = beyond_reach(engine) or end_in_pose(engine, rows)
         if told:
             return told
     where = singular.diagnosis(engine)

@@ -16,6 +16,7 @@ from pipeline.core.progress import Progress
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.equations import observation
 from pipeline.dynamics.equations.observation import Observed
@@ -151,9 +152,13 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     seen = observation.by_name(np.concatenate(parts), engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
     if len(bad):
-        raise SolverError(
-            f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
-        )
+        at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
+        if seen.status[bad[0]] == m.SINGULAR:
+            lost = (
+                "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "
+                "the mechanism pass the pose at speed, or stop elsewhere"
+            )
+        raise SolverError(at + lost)
     return seen
 
 

@@ -14,11 +14,13 @@ from pipeline.dynamics.model import selection
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
 from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.reach import beyond_reach
+from pipeline.dynamics.run.reach import beyond_reach, rest
 
 #: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
 #: then half of that, and so on
 REACH, HALVINGS = 0.3, 10
+#: share of its unit that the fastest coordinate goes back for the rate of the rows' independence
+A_LITTLE = 1e-4
 #: least share of a row with which a polynomial may begin: where other motions are fast it must be short
 NEAREST = 3e-4
 #: speeds in a pose that a polynomial led to may be off by this share of the fastest
@@ -81,6 +83,28 @@ def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.n
     if not sound or not sampler.attempt(t, closed):
         return y, None
     return closed, sampler.slope()
+
+
+def foresee_at_start(engine: Engine) -> bool:
+    """Put a pose that is near ahead of the stepper's state into its memory, where no step has led to; whether it is so.
+
+    From how fast the closure rows come to depend on each other there.
+    """
+    control, model = engine.control, engine.model
+    t, sampler = float(control[m.TIME]), Sampler(engine)
+    here = sampler.sample(t, engine.view(m.Y).copy())
+    fastest = float(np.max(np.abs(here.slope / model.state_scales)[: model.nq], initial=0.0))
+    back = A_LITTLE / fastest if fastest > 0.0 else np.inf
+    before = sampler.sample(t - back, here.y - back * here.slope) if here.sound and fastest > 0.0 else here
+    sampler.restore()
+    engine.n[m.EVALUATIONS] += sampler.evaluations
+    fall = before.independence - here.independence
+    falling = fall > 0.0
+    ahead = back * float(np.min(here.independence[falling] / fall[falling], initial=np.inf))
+    if not before.sound or not ahead * fastest < REACH:
+        return False
+    control[[m.PASS_TIME, m.REACH, m.LEFT]] = t + ahead, REACH / fastest, ahead * fastest
+    return True
 
 
 def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple[Collocation | None, float]:
@@ -196,8 +220,4 @@ def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray)
     times = np.append(np.linspace(made.start, made.end, LOOKS + 1), one.time)
     rates = np.max(np.abs(made.states(times)[:, speeds] / engine.model.speed_scales)[:, moving], axis=1, initial=0.0)
     if rates[-1] <= AT_REST * np.max(rates):
-        raise SolverError(
-            f"at t = {one.time:.6g} s: the mechanism comes to rest in a singular pose (joint {one.joint}, condition "
-            f"number {one.condition:.3g}), where it can go on in several ways and no motion chooses one: let it pass "
-            "the pose at speed, or stop elsewhere"
-        )
+        raise SolverError(rest(one.time, f"joint {one.joint}, condition number {one.condition:.3g}"))

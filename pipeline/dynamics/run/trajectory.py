@@ -14,7 +14,7 @@ from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from pipeline.dynamics.run import refusal, singular
 from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.singular_pass import SAME, Pass, lay_over
+from pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from pipeline.dynamics.run.singular_start import start_motion
 from pipeline.dynamics.run.start import overlapping
 
@@ -313,10 +313,10 @@ def _pass_over(engine: Engine, tape: _Tape) -> bool:
 def _rescued(engine: Engine, tape: _Tape) -> bool:
     """Whether a stepper that cannot go on has got a polynomial: the singular pose ahead may be what stopped it."""
     control, status = engine.control, engine.n[m.STATUS]
-    ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
-    if status not in STOPPED or not engine.model.closures or not ahead or control[m.MOST_REACH] == 0.0:
+    if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
-    return _pass_over(engine, tape)
+    ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
+    return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
 
 
 def _crawls(engine: Engine) -> bool:
