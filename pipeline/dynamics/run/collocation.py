@@ -45,7 +45,7 @@ EXACT, SENSITIVE = 1e-10, 1e-9
 #: all of that may be so much more out of a pose in which the motion begins at rest: it is long near the pose then
 SLOWLY = 100.0
 #: and where the polynomial is so short that a row has less than this share left at its ends, by the square of that
-NEAR = 0.01
+NEAR = 0.03
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ OBVIOUS = 0.02
 #: what is left of a segment after the polynomial, in shares of its length, that belongs to it
 REMAINDER = 1e-3
 #: looks at a polynomial for the poses that it passes; singular values below this share of the largest vanish there
-LOOKS, VANISHED = 64, 1e-6
+LOOKS, VANISHED = 32, 1e-6
 #: shares of the polynomial to which a pose is found, and at which it is looked at from both sides
 NEAR, NEARLY = 1e-7, 1e-4
 #: two looks that find a pose at times which differ by less than this share of the polynomial have found the same one
@@ -150,22 +150,26 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     """The singular poses on a polynomial; SolverError where the mechanism comes to rest in one."""
     from scipy.optimize import minimize_scalar  # slow to import, and most runs pass nothing
 
-    times = np.linspace(made.start, made.end, LOOKS + 1)
-    values = np.array([_independence(sampler, made, t) for t in times])
-    best = np.max(values, axis=0)
+    engine, times = sampler.engine, np.linspace(made.start, made.end, LOOKS + 1)
 
     def least(t: float) -> float:
-        return float(np.min(_independence(sampler, made, t) / best))
+        """The least singular value of all closures, whichever of them are solved for."""
+        sampler.attempt(t, made.states(np.array([t]))[0])
+        J = singular.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
+        return float(np.linalg.svd(J, compute_uv=False)[engine.mobility.rank - 1])
 
-    low, found = np.min(values / best, axis=1), list[Pass]()
+    kept = engine.kept.copy()
+    engine.keep(np.ones(len(kept), dtype=bool))
+    low, found = np.array([least(t) for t in times]), list[float]()
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
         bracket = float(times[max(int(k) - 1, 0)]), float(times[min(int(k) + 1, LOOKS)])
         t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": NEAR * made.span}).x)
-        one = _pass(sampler, made, _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket))
-        if one is not None and not (found and one.time - found[-1].time < SAME * made.span):
-            found.append(one)
-    return tuple(found)
+        t = _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket)
+        if least(t) < VANISHED * np.max(low) and not (found and t - found[-1] < SAME * made.span):
+            found.append(t)
+    engine.keep(kept)
+    return tuple(_pass(sampler, made, t) for t in found)
 
 
 def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
@@ -175,42 +179,17 @@ def _between(least: Callable[[float], float], t: float, aside: float, bracket: t
     return float(np.clip(t - aside + 2.0 * aside * share, *bracket))
 
 
-def _independence(sampler: Sampler, made: Collocation, t: float) -> np.ndarray:
-    return sampler.engine.independence() if sampler.attempt(t, made.states(np.array([t]))[0]) else _none(sampler.engine)
-
-
-def _none(engine: Engine) -> np.ndarray:
-    return np.zeros(int(engine.h[m.N_KEPT_ROWS]))
-
-
-def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass | None:
-    """The singular pose at a time, if it is one; SolverError for one in which the mechanism comes to rest."""
+def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
+    """The singular pose at a time; SolverError where the mechanism comes to rest in it."""
     engine = sampler.engine
-    y = made.states(np.array([t]))[0]
-    sampler.attempt(t, y)
-    J = singular.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
-    U, values, _ = np.linalg.svd(J)
-    lost = int(np.sum(values < VANISHED * values[0]))
-    if not lost or _other_rows_do(engine, t, y):
-        return None
-    reported = np.linalg.svd(singular.scaled(engine.model, engine.h, engine.rows(m.JACOBIAN)), compute_uv=False)
+    sampler.attempt(t, made.states(np.array([t]))[0])
+    J = engine.rows(m.JACOBIAN)
+    U, values, _ = np.linalg.svd(singular.natural(engine.model, engine.h, J))
+    lost = max(int(np.sum(values < VANISHED * values[0])), 1)
+    reported = np.linalg.svd(singular.scaled(engine.model, engine.h, J), compute_uv=False)
     one = Pass(t, singular.condition(reported), lost, singular.worst_joint(engine, U[:, -1]))
     _refuse_rest(engine, made, one, U[:, -lost:])
     return one
-
-
-def _other_rows_do(engine: Engine, t: float, y: np.ndarray) -> bool:
-    """Whether it is only the rows solved for that depend on each other, not all that there are."""
-    if not engine.mobility.redundant:
-        return False
-    kept, scale = engine.kept.copy(), engine.view(m.ROW_SCALE).copy()
-    engine.keep(np.ones(len(kept), dtype=bool))
-    engine.attempt(y, t)
-    values = np.linalg.svd(singular.natural(engine.model, engine.h, engine.rows(m.JACOBIAN)), compute_uv=False)
-    engine.keep(kept)
-    engine.view(m.ROW_SCALE)[:] = scale
-    engine.attempt(y, t)
-    return bool(values[engine.mobility.rank - 1] > VANISHED * values[0])
 
 
 def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray) -> None:
