@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14
 #: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
-#: 1e-14, and six, with which a motion must do that is slow beside a pose
+#: 1e-14, and six, with which a row must do in whose own pose they hold nothing
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
 #: first distance in time from a singular pose, as share of the polynomial over it, its factor from try to try, and how
 #: many tries there are
@@ -69,16 +68,17 @@ def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
 
-def beside(engine: Engine, row: np.ndarray, motion: Collocation) -> np.ndarray | None:
+def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> np.ndarray | None:
     """What is observed of such a row: the limit from both sides, shape (columns,); None without one.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
     of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states
     there are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold
     between them.
+    clear: pivot ratio of the closures that the sides must have.
     """
     pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))
-    for clear, k in product((CLEAR, NEARLY_CLEAR), range(TRIES)):
+    for k in range(TRIES):
         rows = np.tile(row, (len(SIDES), 1))
         near = m.record(rows, len(engine.model.contacts))
         near.time[:] += NEAREST * motion.span * WIDER**k * SIDES

@@ -26,7 +26,7 @@ from pipeline.dynamics.run import trajectory as stepping
 from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, prepare
 from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.observation import beside, blurred, observe_flat
+from pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
 from pipeline.dynamics.run.start import consistent_start, mends
 from pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
@@ -145,7 +145,10 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
         engine.keep(kept)
         out = observe_flat(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
-            limit = beside(engine, trajectory.rows[part][k], motion)
+            row, lost = trajectory.rows[part][k], observation.by_name(out, engine.model.arrays.size).status[k]
+            limit = beside(engine, row, motion, CLEAR)
+            if limit is None and lost:
+                limit = beside(engine, row, motion, NEARLY_CLEAR)
             if limit is not None:
                 out[k] = limit
         parts.append(out)
