@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
+from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from pipeline.core.scene.output import VARIABLES
 from pipeline.core.variable import Schema, Variable
@@ -21,6 +21,7 @@ __all__ = [
     "MATRICES",
     "MESH",
     "MODES",
+    "RIGID",
     "RUN",
     "SOLID",
     "STRESS",
@@ -164,6 +165,9 @@ ENSEMBLE: Schema = {
     ),
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
+    "peak_acceleration": _V(
+        ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
+    ),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
 }
 
@@ -237,7 +241,7 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         variable, values = schema[name], dataset[name]
         if values.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
-        may_be_open = name.startswith(("event_", "impact_"))  # an event that the run's end cuts short has no duration
+        may_be_open = name.startswith(("event_", "impact_"))  # what the run's end cuts short has no duration
         if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}

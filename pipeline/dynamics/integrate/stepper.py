@@ -55,7 +55,7 @@ def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, proj
     """The kernel resolve_events of a stepper that looks for none."""
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, rows, events):
         return 0, False, t_new, step
 
     return resolve_events
@@ -97,6 +97,7 @@ def make_advance(
     def must_stop(h, w, n, outputs, rows, events):
         """Whether to return now, with the reason in n[STATUS]."""
         c, waiting = h[m.CONTROL], outputs.shape[0] - n[m.NEXT_OUTPUT]
+        room = m.ROOM + m.EVENTS_OF_A_CONTACT * h[m.N_CONTACTS]
         if w[c + m.TIME] >= w[c + m.END]:
             n[m.STATUS] = m.SEGMENT_END
         elif n[m.EVALUATIONS] >= n[m.CAP]:
@@ -107,10 +108,7 @@ def make_advance(
             n[m.STATUS] = m.AT_SINGULAR
         elif w[h[m.PIVOT] + m.LAST_PIVOT] < w[h[m.PIVOT] + m.WANTED_PIVOT]:
             n[m.STATUS] = m.WORN_ROWS
-        elif (
-            n[m.N_RECORDED] + waiting + m.ROOM > rows.shape[0]
-            or n[m.N_EVENTS] + m.ROOM + m.EVENTS_OF_A_CONTACT * h[m.N_CONTACTS] > events.shape[0]
-        ):
+        elif n[m.N_RECORDED] + waiting + room > rows.shape[0] or n[m.N_EVENTS] + room > events.shape[0]:
             n[m.STATUS] = m.FULL
         else:
             return False
@@ -228,7 +226,7 @@ def make_advance(
             along = ready(h, w)
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, events)
+            happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
             if happened < 0:
                 return
             n[m.STEPS] += 1

@@ -98,7 +98,7 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     seen = observed(engine, trajectory)
     _require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched, mended)
+    return Run(scene, engine, trajectory, seen, twin_of(engine, start, trajectory), switched, mended)
 
 
 def follow(
@@ -127,7 +127,8 @@ def _require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> No
         refuse_deep(name, joint, float(depth))
 
 
-def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+def twin_of(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+    """The twin of a run with contacts."""
     if not engine.model.contacts:
         return None
     from pipeline.dynamics.run.sensitivity import twin

@@ -144,14 +144,22 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
 
 
 def integrate(
-    engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = never, left: Handover | None = None
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    stop: Stop = never,
+    left: Handover | None = None,
+    outputs: np.ndarray | None = None,
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
     stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is gone on with from there.
+    outputs: times of output [s], the start first; the scene's where there are none.
     """
-    tape = _begin(engine, y) if left is None else _resume(engine, left)
+    if outputs is None:
+        outputs = output_times(engine.breaks, engine.model.scene.output.interval)
+    tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
     if left is None and engine.mobility.singular_start:
         _leave_singular_start(engine, tape)
     control = engine.control
@@ -165,9 +173,9 @@ def integrate(
     return _collect(engine, tape)
 
 
-def _begin(engine: Engine, y: np.ndarray) -> _Tape:
+def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> _Tape:
     """A tape with its first row, and contacts that are closed at the start."""
-    tape = _prepare(engine, y, engine.start)
+    tape = _prepare(engine, y, engine.start, outputs)
     first = m.record(tape.rows[:1], len(engine.model.contacts))
     first.time[:], first.state[:] = engine.start, y
     engine.n[m.N_RECORDED], engine.n[m.NEXT_OUTPUT] = 1, 1
@@ -177,9 +185,9 @@ def _begin(engine: Engine, y: np.ndarray) -> _Tape:
     return tape
 
 
-def _resume(engine: Engine, left: Handover) -> _Tape:
+def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> _Tape:
     """A tape with what another method has recorded; the engine as that method left it."""
-    tape, n = _prepare(engine, left.y, left.time), engine.n
+    tape, n = _prepare(engine, left.y, left.time, outputs), engine.n
     cap = n[m.CAP]
     n[m.STATUS : m.INTEGERS] = left.counters
     n[m.CAP] = cap
@@ -192,7 +200,7 @@ def _resume(engine: Engine, left: Handover) -> _Tape:
     return tape
 
 
-def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Tape:
+def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> _Tape:
     """Work space and tape of an integration from state y at time t, nothing recorded yet."""
     model, n, control = engine.model, engine.n, engine.control
     solver, contacts = model.scene.solver, len(model.contacts)
@@ -206,7 +214,6 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Tape:
     n[m.STATUS : m.INTEGERS] = 0
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
-    outputs = output_times(engine.breaks, model.scene.output.interval)
     room = EVENT_ROWS if contacts else m.ROOM
     rows = m.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
@@ -276,7 +283,7 @@ def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> boo
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
         else:
             _warn(engine, tape, progress)
-            if stop(tape.rows[: n[m.N_RECORDED]]):
+            if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):
                 return True
 
 
@@ -345,11 +352,19 @@ def _hand_over(engine: Engine, tape: _Tape) -> Handover:
     )
 
 
+def _in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
+    """The rows by time: those of a step's inner events were written before its outputs.
+
+    An event on an output time is one row, the later.
+    """
+    time = m.record(rows, contacts).time
+    order = np.argsort(time, kind="stable")
+    return rows[order[np.append(np.diff(time[order]) > 0.0, True)]]
+
+
 def _collect(engine: Engine, tape: _Tape) -> Trajectory:
     n, contacts = engine.n, len(engine.model.contacts)
-    rows = tape.rows[: n[m.N_RECORDED]]
-    # an event on an output time is one row, the later
-    keep = np.append(np.diff(m.record(rows, contacts).time) > 0.0, True)
+    rows = _in_order(tape.rows[: n[m.N_RECORDED]], contacts)
     counters = {
         "evaluations": int(n[m.EVALUATIONS]),
         "steps": int(n[m.STEPS]),
@@ -364,6 +379,4 @@ def _collect(engine: Engine, tape: _Tape) -> Trajectory:
     in_order = events[np.argsort(events["time"], kind="stable")]
     drift, rate_drift, steepest = (float(engine.control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
     laid = tuple(tape.collocations), tuple(tape.passes)
-    return Trajectory(
-        rows[keep], in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid
-    )
+    return Trajectory(rows, in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid)
