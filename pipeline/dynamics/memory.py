@@ -141,8 +141,8 @@ class Room:
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
-    MOST_MODES, N_LAWS, N_LOADS, N_TURNS, LOAD_SLOT,
-) = _places(25)
+    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES,
+) = _places(27)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 EVALUATE, PROJECT, RETRACT = ADDRESSES = _places(3)
@@ -158,22 +158,27 @@ PORTS = wiring("flex column shapes")  # column, shapes: first of them
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
 ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
-CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept")
+#: coupling: that this closure is, or -1
+CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept coupling")
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
-ENTRIES = wiring("slot column sign")  # slot: in the support
-KNOWN_ENTRIES = wiring("closure drive column sign")
+ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
+KNOWN_ENTRIES = wiring("closure drive column sign part")
+COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
 #: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
-CONTACTS = wiring("outer inner normal friction surfaces bristle")
+CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
-#: a: site, -1 where the world holds against it; turns: angle that it follows or -1; follows: whether it turns with its
-#: frame; how its coordinate is measured: turning or sliding, frame (side) and axis, entries of R_FG
-LOADS = wiring("a b law0 turns follows turning side axis sine_f sine_g cosine_f cosine_g")
+#: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame
+LOADS = wiring("a b law0 number0 gauge measured internal0 follows")
 LOAD_KINDS = wiring("load0 n_loads")
+#: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
+#: turns: place of the angle with its full turns among the internal states or -1
+GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
 GROUPS = wiring("group")  # error group of each state variable
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
@@ -184,11 +189,12 @@ FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), sti
 MOMENT_VALUES = numbers("value")
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
-#: radius: of the inner surface
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6")
+#: radius: of the inner surface; shape: what else its kind of surfaces has
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2")
+COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
-LOAD_NUMBERS = numbers("value:5")  # see `loads`
+LOAD_NUMBERS = numbers("value")  # see `loads`
 GRAVITY = numbers("acceleration:3")
 FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
 
@@ -205,7 +211,8 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _places(9)
-ROWS = work("moment:3 force:3")  # wrenches of the closure rows
+#: wrenches of the closure rows; then, of the couplings, those on their first joints
+ROWS = work("moment:3 force:3")
 #: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
 JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _places(6)
@@ -222,7 +229,7 @@ LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
-TURN, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
+INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
 MAGNITUDE, CORRECTION, LATCHED = _places(3)
 #: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
 #: slip_rate: rate of the sliding speed, 0 where it is not known; event_row: of its last closing; mode0, latched0: mode

@@ -15,6 +15,7 @@ from pipeline.dynamics.model.assembly import chain_positions
 from pipeline.dynamics.model.constraints import outboard_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.flexible_bodies import bow, shift
+from pipeline.dynamics.model.gauges import angles
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.model import Model
 
@@ -223,17 +224,18 @@ def _centre(model: Model, name: str) -> _Centre:
     return _Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
-def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """Y with the angles that loads follow; `loads`: what each does at y, rows of LOAD with named fields.
+def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:
+    """Y with the internal states of parts as they start; `sites`: their frames at y, rows of SITE_FRAMES."""
+    y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
+    for place, angle in angles(model.arrays.table(m.GAUGES), sites).items():
+        y[first + place] = angle
+    return y
 
-    Raises InputError for a spring or damper of no length, which has no direction.
-    """
-    y = y.copy()
-    turns, first = model.arrays.table(m.LOADS)["turns"], model.ny - model.arrays.size(m.N_TURNS)
-    for (name, _), turn, value in zip(model.loads, turns, loads["value"], strict=True):
+
+def check_loads(model: Model, loads: np.ndarray) -> None:
+    """InputError for a spring or damper of no length, which has no direction; `loads`: rows of LOAD at the start."""
+    for (name, _), value in zip(model.loads, loads["value"], strict=True):
         load = model.scene.load[name]
-        if turn >= 0:
-            y[first + turn] = value
         has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
         if has_direction and value <= SHORTEST * model.length:
             raise InputError(
@@ -241,4 +243,3 @@ def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
                 "its two ends start in one place, so that it pulls in no direction",
                 "move an end; only a spring of no free length and no damping may start so",
             )
-    return y

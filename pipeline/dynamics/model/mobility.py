@@ -19,9 +19,10 @@ from pipeline.core.errors import InputError
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.assembly import LEAST_GYRATION, close, settled
 from pipeline.dynamics.model.constraints import constraints
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, sites
+from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
 
 #: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
 #: how many are enough; share of the displacement that such a pose must keep when its loops are closed
@@ -132,7 +133,7 @@ def _distance(one: Sequence[Placement], other: Sequence[Placement], length: floa
 
 def _singular_start(model: Model, here: Rates) -> str:
     """What is said of a start in a singular pose."""
-    names = {closure.edge.name: None for closure in model.closures}
+    names = {closure.name: None for closure in model.closures}
     values = here.values
     ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
     return (
@@ -161,6 +162,14 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
     joints, row = set[str](), 0
     for closure in model.closures:
+        if isinstance(closure, Coupling):
+            share = stresses[:, row]
+            for side, factor in closure.parts:
+                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), share)
+                carried[side.a.link] -= wrench
+                carried[side.b.link] += wrench
+            row += 1
+            continue
         edge, a, b = closure
         along, about, force = row_axes(closure, poses)
         point = sites(closure, poses)[1].p

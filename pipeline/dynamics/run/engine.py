@@ -11,6 +11,7 @@ import numpy as np
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
+from pipeline.core.scene.loads import SampledPid
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile import functions
 from pipeline.dynamics.effects import INTEGRATORS, scheme_of
@@ -48,10 +49,12 @@ class Engine:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads in between, end [s]; breaks that only rounding sets apart are one."""
+        """Start, breaks of drives and loads and samples in between, end [s]; what only rounding sets apart is one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
         for first, count in self.model.arrays.table(m.LAWS):
             inner |= {float(t) for t in starts[first + 1 : first + count]}
+        for period in {load.period for load in self.model.scene.load.values() if isinstance(load, SampledPid)}:
+            inner |= set((self.start + period * np.arange(1, np.ceil((self.end - self.start) / period))).tolist())
         shortest = SHORTEST_SEGMENT * (self.end - self.start)
         times = [self.start]
         for t in sorted(inner):

@@ -25,7 +25,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         if told:
             return told
     where = singular.diagnosis(engine)
-    culprit = contacts[n[m.CULPRIT]].name if contacts else ""
+    culprit = contacts[n[m.CULPRIT]].words if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
     unsolvable = (
@@ -43,9 +43,9 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         "divides by zero",
         m.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
-        m.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time: a smaller rtol tells these "
+        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol tells these "
         "times apart, a softer contact or more damping parts them",
-        m.STEPPED_OVER: f"the contact of joint {culprit} began unseen within a step: a smaller rtol or a shorter "
+        m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
         "step finds it",
         m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can go on in several ways "
         f"({where}): let it pass the pose at speed, or stop elsewhere",

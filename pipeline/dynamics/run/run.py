@@ -123,8 +123,8 @@ def _require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> No
     from pipeline.dynamics.contact.validity import deepest, refuse_deep
 
     depths, _ = deepest(trajectory.events, seen.touch)
-    for (name, joint, *_), depth in zip(model.contacts, depths, strict=True):
-        refuse_deep(name, joint, float(depth))
+    for contact, depth in zip(model.contacts, depths, strict=True):
+        refuse_deep(contact.words, contact.joint, float(depth))
 
 
 def twin_of(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:

@@ -88,15 +88,18 @@ def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
 
-    From the velocities that unit speeds add to those of the drives, so that no step width enters.
+    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds add
+    to those of the drives, so that no step width enters.
     """
     engine.select_pieces_after(engine.start)
-    contacts = engine.model.arrays.table(m.CONTACTS)
+    contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
 
     def offset_rates(speeds: np.ndarray) -> np.ndarray:
         _moving(engine, y, speeds)
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
-        return np.asarray(velocity[contacts["inner"]] - velocity[contacts["outer"]]).ravel()
+        offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
+        offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
+        return np.asarray(offset).ravel()
 
     driven = offset_rates(np.zeros(engine.model.nv))
     return np.array([offset_rates(unit) - driven for unit in np.eye(engine.model.nv)]).T

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import Progress
+from pipeline.core.scene.loads import SampledPid
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from pipeline.dynamics.run import refusal, singular
@@ -157,8 +158,11 @@ def integrate(
     left: what another method left of this run; it is gone on with from there.
     outputs: times of output [s], the start first; the scene's where there are none.
     """
+    sample = _sampler(engine)
     if outputs is None:
         outputs = output_times(engine.breaks, engine.model.scene.output.interval)
+    if left is None:
+        y = sample(y, engine.start)
     tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
     if left is None and engine.mobility.singular_start:
         _leave_singular_start(engine, tape)
@@ -166,11 +170,22 @@ def integrate(
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
+        if a > (engine.start if left is None else left.time):
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
         engine.select_pieces(0.5 * (a + b))
         control[m.END], engine.n[m.FRESH] = b, 1
         if _segment(engine, tape, progress, stop):
             break
     return _collect(engine, tape)
+
+
+def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
+    """What gives the state after the samples of controllers, from that at a break [s] before them."""
+    if not any(isinstance(load, SampledPid) for load in engine.model.scene.load.values()):
+        return lambda y, t: y
+    from pipeline.dynamics.run.sampling import sampler
+
+    return sampler(engine)
 
 
 def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> _Tape:
