@@ -22,7 +22,7 @@ from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
-SETTINGS = ("time", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
+SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
 #: bytes that no scene or recipe needs
 LARGEST = 4 << 20
 #: a key of more parts than a scene has levels; the reader of TOML takes their number squared
