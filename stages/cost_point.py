@@ -34,7 +34,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline.core.errors import SolverError
     from pipeline.core.scene.wanted import parse
 
-    scene = rebuild(params["simulate"])
+    scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
     warm(scene, reduced, progress)
     try:
@@ -66,7 +66,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     from pipeline.core.errors import SolverError
     from pipeline.core.scene.wanted import parse
 
-    scene, reduced = rebuild(params["simulate"]), bundles(inputs)
+    scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)
     try:
         done = dynamics.ensemble(scene, reduced, progress)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from pipeline.core.progress import Progress, silent
-from stages.s4_simulate import rebuild
+from stages.s4_simulate import bundles, rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,17 +47,17 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     tolerance: dict[str, dict[str, float]] = {"equal": {}, "tolerance": {}, "size": {}}
     refused = []
     for i, name in enumerate(params):
-        scene = rebuild(params[name])
-        bundles = {body: inputs[f"{name}:bundle/{body}"] for body in scene.flexible()}
+        mine = {key.removeprefix(f"{name}:"): data for key, data in inputs.items() if key.startswith(f"{name}:")}
+        scene, reduced = rebuild(params[name], mine), bundles(mine)
         progress(i / len(params), f"timing {name}")
-        tolerance["equal"][name], equal = _at_equal_error(scene, bundles)
+        tolerance["equal"][name], equal = _at_equal_error(scene, reduced)
         costs["equal"][name] = equal
         damped = damped_scene(scene, TOLERANCE / STROKE)
         tolerance["tolerance"][name] = damped.solver.rtol
         tolerance["size"][name] = TOLERANCE / equal.length
-        costs["size"][name], _ = _measured(damped_scene(scene, TOLERANCE / equal.length), bundles, checked=False)
+        costs["size"][name], _ = _measured(damped_scene(scene, TOLERANCE / equal.length), reduced, checked=False)
         for way, wanted in (("step", paper_scene(scene)), ("tolerance", damped)):
-            costs[way][name], why = _measured(wanted, bundles, checked=way == "step")
+            costs[way][name], why = _measured(wanted, reduced, checked=way == "step")
             refused += [f"{name}: {why}"] if why else []
     data: dict[str, Any] = {}
     for way, found in costs.items():

@@ -19,7 +19,7 @@ JOINT, BODY = "A1", "platform"
 
 def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
     """Motion of the platform and force of A1 at the regular times of one run, evaluations, processor time."""
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
     found = dynamics.cost(scene, reduced, progress)
     run = found.run
     regular = np.arange(round((scene.time.end - scene.time.start) / scene.output.interval) + 1) * scene.output.interval
@@ -35,7 +35,7 @@ def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
 
 def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
     """Members of an ensemble: motion of the platform, peak contact force, impacts; cost of one run."""
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
     found = dynamics.ensemble(scene, reduced, progress)
     names = ["position", "quaternion", "velocity", "peak_acceleration", "peak_force", "impact_count"]
     return {"nc": found[names].assign_attrs(_costs(dynamics.cost(scene, reduced, progress)))}

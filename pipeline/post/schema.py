@@ -43,7 +43,7 @@ POST: Schema = {
         ("body", "axis"), "m s-2", "largest magnitude of each component of the acceleration, of outputs and events"
     ),
     "eccentricity": _V(("time", "contact"), "m", "distance of ball and socket centres", optional=True),
-    "clearance": _V(("contact",), "m", "radial clearance", optional=True),
+    "clearance": _V(("contact",), "m", "radial clearance; of a plane without meaning", optional=True),
     "impact_time": _V(("impact",), "s", "time of a closing above the impact threshold", optional=True),
     "impact_contact": _V(("impact",), "1", "index of the contact", optional=True),
     "impact_approach_speed": _V(("impact",), "m s-1", "rate of penetration at the closing", optional=True),

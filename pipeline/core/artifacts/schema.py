@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
+from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from pipeline.core.scene.output import VARIABLES
 from pipeline.core.variable import Schema, Variable
@@ -21,6 +21,7 @@ __all__ = [
     "MATRICES",
     "MESH",
     "MODES",
+    "RIGID",
     "RUN",
     "SOLID",
     "STRESS",
@@ -74,8 +75,21 @@ RUN: Schema = {
     "load_length": _V(
         ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
     ),
+    "bushing_displacement": _V(
+        ("time", "bushing", "axis"), "m", "second frame's origin in the first one's axes", optional=True
+    ),
+    "bushing_rotation": _V(
+        ("time", "bushing", "axis"), "rad", "rotation vector from the first frame to the second", optional=True
+    ),
     "load_power": _V(
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
+    ),
+    "controller_force": _V(
+        ("time", "controller"), "N or N m", "force of the controller along the coordinate it pushes", optional=True
+    ),
+    "controller_integral": _V(("time", "controller"), "N or N m", "integral part of that force", optional=True),
+    "gear_force": _V(
+        ("time", "gear"), "N or N m", "force of the gear along its second coordinate, on its second body", optional=True
     ),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),

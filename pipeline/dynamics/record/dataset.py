@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -34,6 +33,18 @@ def dataset(run: Run) -> xr.Dataset:
     parts = [_motion(motions), _modes(motions), _drives(run), _joint_coordinates(model, seen)]
     if model.loads:
         parts.append(_loads(model, seen))
+    if "bushing" in model.parts.loads:
+        from pipeline.dynamics.record.bushings import give
+
+        parts.append(give(model, seen))
+    if {"pid", "sampled-pid"} & set(model.parts.loads):
+        from pipeline.dynamics.record.controllers import controllers
+
+        parts.append(controllers(model, seen))
+    if model.parts.couplings:
+        from pipeline.dynamics.record.gears import gear_series
+
+        parts.append(gear_series(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(trajectory), {})]
     if run.twin is not None:
@@ -52,12 +63,11 @@ def dataset(run: Run) -> xr.Dataset:
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """What the run was made from: parameters, assumptions, sources, versions; no times, no paths."""
-    parameters = scene.model_dump(mode="json", exclude={"title", "description"}, exclude_none=True)
+    """What the run was made from: parameters, assumptions, sources, versions; no times, no names of files."""
+    parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
-        parameters["body"][body]["mesh"] = Path(parameters["body"][body]["mesh"]).name
+        del parameters["body"][body]["mesh"]
     return {
-        "scene": scene.name,
         "parameters": json.dumps(parameters, sort_keys=True),
         "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
         "sources": json.dumps(scene.sources(), sort_keys=True),
@@ -90,8 +100,8 @@ def _contact_warnings(run: Run) -> list[str]:
 
     depths, forces = validity.deepest(run.trajectory.events, run.observed.touch)
     sentences = list[str]()
-    for (name, joint, *_), law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
-        sentences += validity.warnings(name, joint, law, float(depth), float(force))
+    for contact, law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
+        sentences += validity.warnings(contact.words, contact.joint, law, float(depth), float(force))
     return sentences
 
 

@@ -31,9 +31,11 @@ from pipeline.dynamics.run.trajectory import Trajectory, output_times
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
     wanted = scene.ensemble or Ensemble()
-    if not scene.contacts():
+    if not scene.contacts() and not scene.stop:
         raise InputError(
-            "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
+            "[ensemble]",
+            "its members differ by the ball's offset, but there is no clearance joint and no stop",
+            "remove it",
         )
     engine, other = engines(scene, bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
@@ -42,7 +44,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     random = np.random.default_rng(wanted.seed)
     members, reasons = [], []
     for k in range(wanted.members):
-        offsets = random.normal(size=(len(scene.contacts()), 3))
+        offsets = random.normal(size=(len(engine.model.contacts), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
         last, trajectory, switched = follow(engine, moved, silent, other)

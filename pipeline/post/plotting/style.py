@@ -95,9 +95,8 @@ def heading(figure: Figure, title: str, subtitle: str = "") -> None:
     lines = textwrap.wrap(title, round(TITLE_LETTERS * width))
     below = textwrap.wrap(subtitle, round(SUBTITLE_LETTERS * width))
     # the layout leaves room for the title's lines: empty ones are for the text below
-    figure.suptitle(
-        "\n".join([*lines, *("" for _ in below)]), x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK
-    )
+    text = "\n".join([*lines, *("" for _ in below)])
+    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK, parse_math=False)
     if below:
         top = 0.995 - (0.07 + 0.2 * len(lines)) / figure.get_figheight()
         figure.text(0.012, top, "\n".join(below), ha="left", va="top", fontsize=8.6, color=SOFT)
