@@ -18,7 +18,7 @@ from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load")
-SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
+SETTINGS = ("time", "start", "solver", "output", "ensemble", "accuracy")
 #: bytes that no scene or recipe needs
 LARGEST = 16 << 20
 EDITS = ("extends", "replace", "set", "remove")

@@ -20,6 +20,7 @@ from pipeline.core.scene.parts import (
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
+from pipeline.core.scene.start import Start
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
@@ -120,6 +121,7 @@ class Scene(Part):
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
     time: TimeSpan
+    start: Start | None = None
     solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
