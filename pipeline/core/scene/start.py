@@ -38,7 +38,7 @@ class JointStart(Part):
 
 def _coordinates(value: Any) -> Any:
     """A joint with one coordinate need not name it; the empty name stands for it."""
-    if isinstance(value, Mapping) and set(value) & {*KEYS, "source"}:
+    if isinstance(value, Mapping) and (not value or set(value) & {*KEYS, "source"}):
         return {"": value}
     return value
 

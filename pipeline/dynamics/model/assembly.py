@@ -67,10 +67,11 @@ def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], 
     """The mechanism with links without poses put where the joints allow it; InputError where they do not."""
     found = assemblies(mechanism, joints, placed, starts)
     if not found:
-        poses = [link.start for link in mechanism.links]
         _refuse_starts(mechanism, joints, placed, starts)
-        _refuse_drives(mechanism, joints, poses)
-        raise _impossible(mechanism, joints, poses)
+        driven = any(joint.values for joint in joints)
+        if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
+            raise _out_of_reach(mechanism, joints)
+        raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
     return replace(settled(mechanism, found[0].poses), choice=chosen(mechanism, joints, found, starts))
 
 
@@ -152,9 +153,15 @@ def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[P
     driven = [joint for joint in joints if joint.values]
     if not driven or close(mechanism, [replace(joint, values={}) for joint in joints], poses) is None:
         return
+    raise _out_of_reach(mechanism, driven)
+
+
+def _out_of_reach(mechanism: Mechanism, joints: Sequence[Constraint]) -> InputError:
+    """What is said of joints that fit together, but not where their drives start."""
+    driven = {joint.name for joint in joints if joint.values}
     scene = mechanism.scene
-    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in {joint.name for joint in driven}]
-    raise InputError(
+    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in driven]
+    return InputError(
         f"[drive.{names[0]}.law]",
         f"the joints fit together, but not where the drives ({', '.join(names)}) are at t = {scene.time.start:.6g} s: "
         "the mechanism is over-driven, or a drive starts out of reach",

@@ -20,8 +20,8 @@ from pipeline.dynamics.model.mechanism import Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.start_table import Given
 
-#: guesses from which assemblies are looked for: the first has nothing at random, the others more and more
-GUESSES = 24
+#: guesses from which assemblies are looked for; the first has nothing at random
+GUESSES = 16
 #: size of random slides, as a share of the mechanism's size
 SLIDE = 0.3
 #: assemblies are one if no coordinate differs by more than this, in radians or shares of the mechanism's size
@@ -56,7 +56,9 @@ def assemblies(
         guess = _guess(mechanism, joints, placed, hints | known, random if k else None, k / GUESSES)
         if k == 0:
             aim = _coordinates(joints, guess) | hints
-        poses = close(mechanism, joints, guess, placed) or close(mechanism, joints, guess)
+        poses = close(mechanism, joints, guess, placed)
+        if poses is None and len(placed) > 1:
+            poses = close(mechanism, joints, guess)
         if poses is None or opposite(joints, poses) is not None:
             continue
         made = Assembly(poses, _coordinates(joints, poses))
