@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow bench atlas clean
+.PHONY: all help setup check test test-slow bench atlas chaos clean
 
 VENV := .venv
 READY := $(VENV)/.ready
@@ -33,6 +33,9 @@ test-slow: $(READY) ## The tests marked slow
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation runs growth exudyn
+
+chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (two hours; keeps every scene that is finished)
+	@$(RUN) -m stages sections sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb) --page docs/chaos.md
 
 atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour; goes on where it stopped)
 	@$(RUN) -m benchmarks stability

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
     os.environ.setdefault(_variable, "1")
 
-__all__ = ["cost", "equilibrium", "frequencies", "load_scene", "run"]
+__all__ = ["cost", "equilibrium", "frequencies", "load_scene", "run", "sections"]
 
 
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
@@ -52,6 +52,16 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
     """
     dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").workplace())
     return dataset
+
+
+def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
+    """A motion that its laws repeat, looked at once in each period (schema SECTIONS), and the verdict on it.
+
+    The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
+    why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
+    """
+    found: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
+    return found
 
 
 def equilibrium(

@@ -20,6 +20,7 @@ COMMANDS = {
     "why": "for each stage: fresh, or why it would run again",
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
+    "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
     "frequencies": "equilibrium in a pose, and natural frequencies there",
     "report": "all figures and tables of the paper, and results/report/index.html",
     "schema": "JSON schema of scene files",

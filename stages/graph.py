@@ -13,12 +13,13 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s3_bundle, s4_linear, s4_simulate, s6_render
+from stages import s1_mesh, s2_modes, s3_bundle, s4_linear, s4_sections, s4_simulate, s6_render
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
 #: artifacts as figures refer to them, ``<scene>:<artifact>[/<body>]``, and the stage that makes each
-ARTIFACTS = {name: name for name in STAGES} | {"run": "simulate", "tight": "tight", "fine-modes": "fine_modes"}
+ARTIFACTS = {name: name for name in (*STAGES, "sections", "verdict", "tight")}
+ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
 #: how much tighter the tolerance of `tight` is, and how many times more elements `fine-modes` has
 TIGHTER, FINER = 1e-2, 4
 
@@ -97,6 +98,20 @@ class Graph:
         if self.scene.ensemble is None:
             return None
         return self._simulation("ensemble", "stages.s4_simulate:run_ensemble", "ensemble.nc", ensemble=True)
+
+    @cached_property
+    def sections(self) -> Task:
+        """The motion looked at once in each period of its laws; shown as ``sections.nc``."""
+        params, modules = s4_sections.params(self.scene), s4_simulate.modules(self.scene)
+        return self._scene_task(
+            "sections", "stages.s4_sections:run", params, self._bundles(), names={"nc": "sections.nc"}, modules=modules
+        )
+
+    @cached_property
+    def verdict(self) -> Task:
+        """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
+        inputs = {"sections": self.sections}
+        return self._scene_task("verdict", "stages.s5_verdict:run", {}, inputs, names={"nc": "verdict.nc"})
 
     @cached_property
     def post(self) -> Task:

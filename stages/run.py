@@ -109,7 +109,7 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     """
     place = place or workplace()
     import_module("pipeline.core.artifacts.modal")  # gives the dataset its accessor
-    task = Graph(scene, shown=_as_in_its_file(scene)).simulate
+    task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
@@ -155,7 +155,7 @@ def linear(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
     place = place or workplace()
-    graph = Graph(scene, shown=_as_in_its_file(scene))
+    graph = Graph(scene, shown=as_in_its_file(scene))
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     outcome = place.bring([task], jobs=1)
     check(outcome)
@@ -191,7 +191,8 @@ def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome) -> Non
         raise MissedAccuracyError("\n".join(missed))
 
 
-def _as_in_its_file(scene: Scene) -> bool:
+def as_in_its_file(scene: Scene) -> bool:
+    """Whether a scene is what its file says, so that its results take their place below results/runs."""
     return scene.path is not None and load_scene(scene.path) == scene
 
 

@@ -13,13 +13,15 @@ if TYPE_CHECKING:
     from pipeline.core.scene.schema import Scene
 
 
-def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
+def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
     """What the engine sees of a scene. Titles and the place of files on disk are not part of it,
-    nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run, nor whether that may be
-    missed."""
+    nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
+    whether that may be missed."""
     left_out: dict[str, Any] = dict.fromkeys(("title", "description", "accuracy" if ensemble else "ensemble"), True)
     if not ensemble:
         left_out["accuracy"] = {"allow_missed"}
+    if not sections:
+        left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.flexible():
         table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name

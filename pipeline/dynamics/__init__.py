@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
 
-__all__ = ["ensemble", "equilibrium", "frequencies", "simulate"]
+__all__ = ["ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -40,6 +40,13 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from pipeline.dynamics.record.ensemble import ensemble as run
+
+    return run(scene, bundles, progress)
+
+
+def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """A scene whose laws repeat, looked at once in each period (schema SECTIONS)."""
+    from pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)
 

@@ -53,6 +53,23 @@ class Ensemble(Part):
     bodies: tuple[str, ...] | None = None
 
 
+class Sections(Part):
+    """A motion that its laws repeat, looked at once in each period: see ``flexclear sections``.
+
+    period: of the laws of drives and loads, from the run's start on; without it the run is one period.
+    phase: when in the period the motion is looked at [s].  transient: periods that are not kept, before the `periods`
+    that are.  exponent_periods: how many of these are followed by a neighbour too, which tells the rate at which
+    motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
+    """
+
+    period: Annotated[Time, Field(gt=0.0)] | None = None
+    phase: Annotated[Time, Field(ge=0.0)] = 0.0
+    transient: Annotated[int, Field(ge=0, le=1_000_000)] = 100
+    periods: Annotated[int, Field(ge=20, le=1_000_000)] = 500
+    exponent_periods: Annotated[int, Field(ge=20, le=1_000_000)] = 200
+    bodies: tuple[str, ...] | None = None
+
+
 class Wanted(Part):
     """A wanted accuracy: absolute in SI, or relative to the quantity's own size."""
 
@@ -125,6 +142,7 @@ class Scene(Part):
     solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
+    sections: Sections | None = None
     accuracy: Accuracy | None = None
 
     @model_validator(mode="after")

@@ -37,7 +37,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
             "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
         )
     engine, other = engines(scene, bundles, progress)
-    names = _bodies(engine.model, wanted)
+    names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
     random = np.random.default_rng(wanted.seed)
@@ -55,16 +55,16 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
 
 
-def _bodies(model: Model, wanted: Ensemble) -> list[str]:
-    """Bodies whose motion is kept: those asked for, or those that have contacts."""
+def kept_bodies(model: Model, wanted: tuple[str, ...] | None, place: str) -> list[str]:
+    """Bodies whose motion is kept: those asked for, else those that have contacts, without contacts all."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
-    if wanted.bodies is None:
+    if wanted is None:
         frames = model.mechanism.frames
-        return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known))
-    for name in wanted.bodies:
+        return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known)) or known
+    for name in wanted:
         if name not in known:
-            raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
-    return list(wanted.bodies)
+            raise InputError(place, f"there is no body '{name}'", f"known: {', '.join(known)}")
+    return list(wanted)
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
@@ -76,7 +76,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     require_closed(model, kept, seen)
     bodies = Motions(model, seen).bodies
     variables = {
-        **_series([bodies[n] for n in names], model.mechanism.origin),
+        **motion_series([bodies[n] for n in names], model.mechanism.origin),
         "contact_normal_force": (("time", "contact"), seen.touch["normal_force"]),
         "contact_offset": (("time", "contact", "axis"), seen.touch["offset"]),
         "impact_count": (("contact",), count),
@@ -87,7 +87,8 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
 
 
-def _series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def motion_series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Position, orientation, velocities and acceleration of bodies over time, by variable."""
     dims = ("time", "body", "axis")
     return {
         "position": (dims, np.stack([m.p + origin for m in motions], axis=1)),

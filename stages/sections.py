@@ -1,0 +1,87 @@
+"""``flexclear sections``: is a repeated motion periodic, quasi-periodic or chaotic, and by what evidence."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.core.scene.load import edited
+from stages import run
+from stages.graph import Graph
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+
+#: options and the keys of `[sections]` that they replace
+COUNTS = {"periods": "periods that are kept", "transient": "periods before them that are not"}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    for name, text in COUNTS.items():
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
+    parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print the verdict on each scene."""
+    change: dict[str, object] = {
+        f"sections.{name}": getattr(options, name) for name in COUNTS if getattr(options, name) is not None
+    }
+    if options.period is not None:
+        change["sections.period"] = options.period
+    if options.page is not None:
+        run.check_target(options.page, "--page")
+    place = run.workplace()
+    scenes = [edited(graph.scene, change) if change else graph.scene for graph in run.graphs(options.scenes)]
+    tasks = {scene.name: Graph(scene, shown=not change) for scene in scenes}
+    outcome = place.bring([graph.verdict for graph in tasks.values()])
+    run.check(outcome)
+    kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
+    judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
+    verdicts = {name: place.store.load(record) for name, record in judged.items()}
+    print("\n\n".join(map(text, verdicts.values())))
+    if options.page is not None:
+        pictures = {
+            name: place.store.path(record.stage, record.key, "sections.png").read_bytes()
+            for name, record in judged.items()
+        }
+        write_page(verdicts, {name: place.store.load(record) for name, record in kept.items()}, pictures, options.page)
+
+
+def write_page(
+    verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
+) -> None:
+    """The verdicts as a page, with the figures (PNG) in a folder of its name beside it."""
+    from pipeline.post.verdict_page import markdown
+
+    folder = page.parent / page.stem
+    folder.mkdir(exist_ok=True)
+    for name, picture in pictures.items():
+        (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
+    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem))
+
+
+def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
+    """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
+    place = place or run.workplace()
+    graph = Graph(scene, shown=run.as_in_its_file(scene))
+    outcome = place.bring([graph.sections, graph.verdict], jobs=1)
+    run.check(outcome)
+    kept, judged = (place.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict))
+    return kept, judged
+
+
+def text(verdict: xr.Dataset) -> str:
+    """The verdict in words, and the numbers behind it (schema VERDICT)."""
+    lines = [f"{verdict.attrs['scene']}: {verdict.attrs['verdict']}"]
+    lines += [f"  {reason}" for reason in str(verdict.attrs["reasons"]).split("; ")]
+    if "contraction" in verdict:
+        lines.append(f"  successive returns come closer by {float(verdict.contraction):.3g} a period")
+    return "\n".join(lines)
