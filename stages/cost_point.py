@@ -35,7 +35,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline.core.errors import SolverError
     from pipeline.core.scene.wanted import parse
 
-    scene = rebuild(params["simulate"])
+    scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
     warm(scene, reduced, progress)
     seconds: list[float] = []
@@ -70,7 +70,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     from pipeline.core.errors import SolverError
     from pipeline.core.scene.wanted import parse
 
-    scene, reduced = rebuild(params["simulate"]), bundles(inputs)
+    scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)
     begun = time.process_time()
     try:

@@ -27,4 +27,4 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """Sections (schema SECTIONS); inputs are ``bundle/<body>``."""
     from pipeline import dynamics
 
-    return {"nc": dynamics.sections(s4_simulate.rebuild(params), s4_simulate.bundles(inputs), progress)}
+    return {"nc": dynamics.sections(s4_simulate.rebuild(params, inputs), s4_simulate.bundles(inputs), progress)}

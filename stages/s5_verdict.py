@@ -12,9 +12,10 @@ if TYPE_CHECKING:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Verdict (schema VERDICT) and its figure; the input is ``sections``."""
+    """Verdict (schema VERDICT) and its figure; the input is ``sections``, and `params` names their scene."""
     from pipeline.post.plotting import section_figure
     from pipeline.post.verdict import derive
 
-    judged = derive(inputs["sections"])
-    return {"nc": judged, **section_figure.make(inputs["sections"], judged)}
+    sections = inputs["sections"].assign_attrs(scene=params["scene"])
+    judged = derive(sections)
+    return {"nc": judged, **section_figure.make(sections, judged)}

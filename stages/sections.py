@@ -31,16 +31,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the verdict on each scene."""
-    change: dict[str, object] = {
-        f"sections.{name}": getattr(options, name) for name in COUNTS if getattr(options, name) is not None
-    }
-    if options.period is not None:
-        change["sections.period"] = options.period
+    asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
         run.check_target(options.page, "--page")
     place = run.workplace()
-    scenes = [edited(graph.scene, change) if change else graph.scene for graph in run.graphs(options.scenes)]
-    tasks = {scene.name: Graph(scene, shown=not change) for scene in scenes}
+    scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
+    tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     outcome = place.bring([graph.verdict for graph in tasks.values()])
     run.check(outcome)
     kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
@@ -53,6 +49,12 @@ def command(options: argparse.Namespace) -> None:
             for name, record in judged.items()
         }
         write_page(verdicts, {name: place.store.load(record) for name, record in kept.items()}, pictures, options.page)
+
+
+def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
+    """The scene with some keys of `[sections]` replaced, whether it has that table or not."""
+    present = {} if scene.sections is None else scene.sections.model_dump(mode="json", exclude_none=True)
+    return edited(scene, {"sections": {**present, **asked}}) if asked else scene
 
 
 def write_page(

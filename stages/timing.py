@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pipeline.core.progress import Progress, silent
-from stages.s4_simulate import rebuild
+from stages.s4_simulate import bundles, rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,8 +43,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     evaluations = {way: np.full(len(names), np.nan) for way in ways}
     tolerance, refused = np.full(len(names), np.nan), []
     for i, name in enumerate(names):
-        scene = rebuild(params[name])
-        simulate = _simulation({body: inputs[f"{name}:bundle/{body}"] for body in scene.flexible()})
+        mine = {key.removeprefix(f"{name}:"): data for key, data in inputs.items() if key.startswith(f"{name}:")}
+        scene = rebuild(params[name], mine)
+        simulate = _simulation(bundles(mine))
         progress(i / len(names), f"timing {name}")
         tolerance[i], evaluations["equal"][i], seconds["equal"][i] = _timed_at_equal_error(scene, simulate)
         try:

@@ -20,7 +20,7 @@ JOINT, BODY = "A1", "platform"
 
 def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
     """Motion of the platform and force of A1 at the regular times of one run, evaluations, processor time."""
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
     dynamics.simulate(edited(scene, {"time.end": scene.time.start + 1e-4}), reduced, progress)  # compiles
     begun = time.process_time()
     run = dynamics.simulate(scene, reduced, progress)
@@ -37,7 +37,7 @@ def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
 
 def members(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Any) -> Files:
     """Members of an ensemble: motion of the platform, peak contact force, impacts; cost of one run."""
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
     found = dynamics.ensemble(scene, reduced, progress)
     names = ["position", "quaternion", "velocity", "acceleration", "peak_force", "impact_count"]
     begun = time.process_time()

@@ -36,7 +36,6 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
         coords["quantile"] = np.array(QUANTILES)
     data["horizon"] = ((), np.array(end))
     attributes = {
-        "scene": str(run.attrs.get("scene", "")),
         "impact_threshold": f"{IMPACT:g} m/s",
         "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {PARTED:g} of the largest",
     }

@@ -12,6 +12,7 @@ from pipeline.core.progress import silent
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.post.verdict import derive
+from stages.__main__ import main
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
 CHAOTIC = 0.112
@@ -74,6 +75,11 @@ def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Sce
 def test_what_cannot_be_looked_at_is_refused(pendulum: Scene, change: dict[str, object], said: str) -> None:
     with pytest.raises(InputError, match=said):
         dynamics.sections(edited(pendulum, change), {}, silent)
+
+
+def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sections", "scenes/checks/pendulum.toml", "--transient", "0", "--periods", "20"]) == 2
+    assert "no drive and no load has a law of time" in capsys.readouterr().err
 
 
 def test_the_repeated_stroke_with_clearance_and_rigid_rods_settles_on_one_period() -> None:

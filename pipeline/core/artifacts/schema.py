@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
+from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from pipeline.core.scene.output import VARIABLES
 from pipeline.core.variable import Schema, Variable
@@ -21,6 +21,7 @@ __all__ = [
     "MATRICES",
     "MESH",
     "MODES",
+    "RIGID",
     "RUN",
     "SOLID",
     "STRESS",

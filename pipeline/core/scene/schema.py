@@ -9,7 +9,8 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
 from pipeline.core.scene.drives import Drive
-from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
+from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from pipeline.core.scene.limits import Limits
 from pipeline.core.scene.loads import Gravity, Load
 from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
@@ -17,6 +18,7 @@ from pipeline.core.scene.parts import (
     FlexibleBody,
     Ground,
     Joint,
+    MeshedRigidBody,
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
@@ -24,6 +26,8 @@ from pipeline.core.scene.start import Start
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
+#: types of joints with one freedom: driving it tells the whole relative motion
+SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
 MOST_ROWS = 1e7
 
@@ -99,6 +103,25 @@ class Accuracy(Part):
         return {"quantities": found} | {name: table[name] for name in plain & set(table)}
 
 
+class View(Part):
+    """What is looked at; no effect on the motion.
+
+    watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.peak_force``;
+    default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
+    direction: from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar
+    mechanism its normal, else from above and in front.
+    """
+
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    direction: Direction | None = None
+
+    @model_validator(mode="after")
+    def _points(self) -> View:
+        if self.direction is not None and not any(self.direction):
+            raise ValueError("a direction of length zero points nowhere")
+        return self
+
+
 def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
     """Dotted name -> value, of nested tables or quoted names alike."""
     found = []
@@ -144,6 +167,8 @@ class Scene(Part):
     ensemble: Ensemble | None = None
     sections: Sections | None = None
     accuracy: Accuracy | None = None
+    limits: Limits = Limits()
+    view: View | None = None
 
     @model_validator(mode="after")
     def _rows_can_be_kept(self) -> Scene:
@@ -157,11 +182,13 @@ class Scene(Part):
 
     @model_validator(mode="after")
     def _quantities_are_there(self) -> Scene:
-        for name in self.accuracy.quantities if self.accuracy else ():
+        named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
+        named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
+        for place, name in named:
             try:
                 parse(name, self.owners())
             except ValueError as error:
-                raise ValueError(f"accuracy.{name}: {error}") from None
+                raise ValueError(f"{place}{name}: {error}") from None
         return self
 
     @model_validator(mode="after")
@@ -193,7 +220,29 @@ class Scene(Part):
             if joint.type != "fixed"
         }
         hosts = self._hosts()
-        return usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+        known = self._prescribed()
+        pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
+        free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
+        return usual(free if any(free.values()) else pairs, tuple(self.contacts()))
+
+    def _prescribed(self) -> set[str]:
+        """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
+        driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
+        told = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
+        known = {name for name, body in self.body.items() if isinstance(body, Ground)}
+        found = set(known)
+        for _ in told:
+            for joint in told:
+                pair = {frame.partition(".")[0] for frame in joint.between}
+                if pair & found:
+                    found |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
+        return found - known
+
+    def watched(self) -> list[Quantity]:
+        """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
+        if self.view is not None and self.view.watch is not None:
+            return [parse(name, self.owners()) for name in self.view.watch]
+        return self.wanted()
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""
@@ -219,6 +268,24 @@ class Scene(Part):
         """The file it was read from."""
         return self._path
 
+    def __repr__(self) -> str:
+        """In one line: a whole scene is some pages."""
+        return f"<Scene {self.name}: {self.summary()}; {self.time.start:g} to {self.time.end:g} s>"
+
+    __str__ = __repr__
+
+    def summary(self) -> str:
+        """Which parts there are, in words."""
+        counts = {
+            ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
+            ("flexible body", "flexible bodies"): len(self.flexible()),
+            ("joint", "joints"): len(self.joint) - len(self.contacts()),
+            ("joint with clearance", "joints with clearance"): len(self.contacts()),
+            ("drive", "drives"): len(self.drive),
+            ("load", "loads"): len(self.load),
+        }
+        return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
+
     def rigid(self) -> dict[str, RigidBody]:
         """Rigid bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, RigidBody)}
@@ -226,6 +293,15 @@ class Scene(Part):
     def flexible(self) -> dict[str, FlexibleBody]:
         """Flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
+
+    def meshed(self) -> dict[str, MeshedRigidBody]:
+        """Rigid bodies whose mass, inertia and frames are those of a mesh recipe, by name."""
+        return {n: b for n, b in self.body.items() if isinstance(b, MeshedRigidBody)}
+
+    def recipes(self) -> dict[str, str]:
+        """Mesh recipe of each body that has one, by name: flexible bodies first."""
+        flexible = {name: body.mesh for name, body in self.flexible().items()}
+        return flexible | {name: body.mesh for name, body in self.meshed().items()}
 
     def contacts(self) -> dict[str, Clearance]:
         """Clearance joints by name."""

@@ -3,6 +3,7 @@ their inputs are there."""
 
 from __future__ import annotations
 
+import os
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pipeline.core.errors import FlexclearError, ResourceError
 from pipeline.core.progress import Progress
 from pipeline.core.workflow import cores
 from pipeline.core.workflow.execute import execute, find, key_of
+from pipeline.core.workflow.family import follow
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import Task, in_order
@@ -22,6 +24,8 @@ from pipeline.core.workflow.task import Task, in_order
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
+#: noted beside what is shown until it has been brought up to date
+UNFINISHED = "making it again was begun and not finished"
 #: how often the progress of workers is looked at [s]
 TICK = 0.2
 
@@ -57,6 +61,7 @@ class _Plan:
     """Book-keeping of one call: what is done, what failed, what still waits."""
 
     waiting: list[Task]
+    tasks: tuple[Task, ...]
     done: dict[int, Record] = field(default_factory=dict)
     failed: dict[int, Failure] = field(default_factory=dict)
 
@@ -81,9 +86,13 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     jobs: processes at most; default: the cores this process may use.  KeyboardInterrupt ends the
     workers and passes through.
     """
-    plan = _Plan(in_order(tasks))
+    store.sweep()
+    plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
     _settle_fresh(plan, store, sources)
     if plan.waiting:
+        for task in plan.waiting:
+            if store.last(task.folder, task.label) is not None:
+                store.outdated(task.folder, task.label, UNFINISHED)
         monitor.start(len(plan.waiting))
         width = min(jobs or cores.cores(), _width(plan.waiting))
         if width == 1:
@@ -91,6 +100,9 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         else:
             _together(plan, store, sources, monitor, width)
         monitor.end()
+        for task in plan.tasks:
+            if id(task) in plan.failed:
+                store.outdated(task.folder, task.label, plan.failed[id(task)].message)
     failures = {id(f): f for f in plan.failed.values()}
     return Outcome(plan.done, tuple(failures.values()))
 
@@ -127,11 +139,14 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
     # imported here, because a run that finds everything fresh must start quickly
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing.managers import SyncManager
 
     context = multiprocessing.get_context("spawn")
-    with context.Manager() as server:
+    server = SyncManager(ctx=context)
+    server.start(follow, (os.getpid(),))
+    with server:
         reports = server.Queue()
-        pool = ProcessPoolExecutor(width, mp_context=context, initializer=_follow_parent)
+        pool = ProcessPoolExecutor(width, mp_context=context, initializer=follow, initargs=(os.getpid(),))
         running: dict[Future[Record | Failure], _Running] = {}
         try:
             while plan.waiting or running:
@@ -164,7 +179,7 @@ def _submit(
         if len(running) >= width or alone or (task.exclusive and running):
             return
         inputs = plan.inputs(task)
-        key = key_of(task, inputs, sources)
+        key = key_of(task, inputs, store, sources)
         if any(other.key == key for other in running.values()):
             continue
         plan.waiting.remove(task)
@@ -200,24 +215,6 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
 def _relay(reports: Any, monitor: Monitor) -> None:
     while not reports.empty():
         monitor.update(*reports.get())
-
-
-def _follow_parent() -> None:
-    """In a worker: Ctrl-C is left to the parent, which ends its workers; where it is gone, they end too."""
-    import os
-    import signal
-    import threading
-    import time
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
 
 
 def _kill(pool: ProcessPoolExecutor) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import FlexibleBody, Ground, RigidBody
+from pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.assembly import chain_positions
 from pipeline.dynamics.model.constraints import outboard_place
@@ -122,7 +122,8 @@ def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
     return {
         name: body
         for name, body in model.scene.body.items()
-        if not isinstance(body, Ground) and (body.velocity is not None or body.angular_velocity is not None)
+        if not isinstance(body, (Ground, MeshedRigidBody))
+        and (body.velocity is not None or body.angular_velocity is not None)
     }
 
 

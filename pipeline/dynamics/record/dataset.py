@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -52,12 +51,11 @@ def dataset(run: Run) -> xr.Dataset:
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """What the run was made from: parameters, assumptions, sources, versions; no times, no paths."""
-    parameters = scene.model_dump(mode="json", exclude={"title", "description"}, exclude_none=True)
+    """What the run was made from: parameters, assumptions, sources, versions; no times, no names of files."""
+    parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
-        parameters["body"][body]["mesh"] = Path(parameters["body"][body]["mesh"]).name
+        del parameters["body"][body]["mesh"]
     return {
-        "scene": scene.name,
         "parameters": json.dumps(parameters, sort_keys=True),
         "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
         "sources": json.dumps(scene.sources(), sort_keys=True),

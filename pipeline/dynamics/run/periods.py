@@ -68,10 +68,15 @@ class Period:
 
 
 def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
-    """InputError unless all laws end the period with the values, and drives with the rates, that they begin it with.
+    """InputError unless there are laws, and all end the period with the values that they begin it with, drives with
+    the rates, too.
 
     Whole turns of a driven angle are no difference.
     """
+    if not len(parts[0].table(m.LAW)):
+        raise InputError(
+            "[sections]", "nothing repeats: no drive and no load has a law of time", "drive a joint, or vary a load"
+        )
     values = list[np.ndarray]()
     for part, t in ((parts[0], parts[0].start), (parts[-1], parts[-1].end)):
         part.select_pieces_after(t)

@@ -89,7 +89,7 @@ def plain(axis: Axis) -> None:
 def heading(figure: Figure, title: str, subtitle: str = "") -> None:
     """Title at the left, and a softer line below it."""
     text = title if not subtitle else f"{title}\n"
-    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK)
+    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK, parse_math=False)
     if subtitle:
         figure.text(
             0.012, 0.995 - 0.27 / figure.get_figheight(), subtitle, ha="left", va="top", fontsize=8.6, color=SOFT

@@ -41,6 +41,8 @@ def equivalent(mass: float, inertia: np.ndarray) -> Solid:
     """The uniform cylinder or box of this mass [kg] and inertia about its centre of mass [kg m^2]."""
     moments, axes = np.linalg.eigh(inertia)
     low, middle, high = moments / mass
+    if high - low <= ROUND * high:  # alike about every axis: a cube shows how it turns
+        return Solid(_right(axes), _visible(np.full(3, np.sqrt(1.5 * low))), round=False)
     if middle - low <= ROUND * high:
         moments, axes = moments[[0, 1, 2]], axes
     elif high - middle <= ROUND * high:
@@ -67,6 +69,36 @@ def mesh(solid: Solid | None, frames: Mapping[str, np.ndarray], arm: float) -> p
     if not parts:
         parts = [pv.Sphere(radius=2.0 * arm)]
     return pv.merge(parts).extract_surface(algorithm="dataset_surface") if len(parts) > 1 else parts[0]
+
+
+def link(frames: Mapping[str, np.ndarray], width: float) -> pv.PolyData:
+    """Bars between the frames of a body, with a boss at each, relative to its centre of mass, body axes [m].
+
+    Two frames are joined by one bar; more by bars from their middle.  A body with one frame gets a bar from its centre
+    of mass to that.  width: half the width of a bar [m].
+    """
+    places = _apart([np.asarray(origin, dtype=float) for origin in frames.values()], 0.1 * width)
+    if len(places) == 1:
+        places = _apart([*places, np.zeros(3)], 0.1 * width)
+    if len(places) < 2:
+        return pv.Sphere(radius=2.0 * width)
+    middle = places[0] if len(places) == 2 else np.mean(places, axis=0)
+    parts = [pv.Sphere(radius=1.35 * width, center=place) for place in places]
+    parts += [
+        pv.Line(middle, place).tube(radius=width, n_sides=24, capping=True)
+        for place in places
+        if np.linalg.norm(place - middle) > 0.1 * width
+    ]
+    return pv.merge(parts).extract_surface(algorithm="dataset_surface")
+
+
+def _apart(places: list[np.ndarray], same: float) -> list[np.ndarray]:
+    """The places, those closer than `same` to an earlier one left out."""
+    found: list[np.ndarray] = []
+    for place in places:
+        if all(np.linalg.norm(place - other) > same for other in found):
+            found.append(place)
+    return found
 
 
 def _shape(solid: Solid) -> pv.PolyData:
