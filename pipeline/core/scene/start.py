@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 
 from pipeline.core.scene.fields import Number, Part, PartName
 
@@ -53,7 +53,16 @@ class ModalStart(Part):
     velocity: tuple[Number, ...] | None = None
 
 
-JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates)]
+class _Either:
+    """Lets the JSON schema say that both forms are written."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        several = handler(schema)
+        return {"anyOf": [several["additionalProperties"], several]}
+
+
+JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates), _Either()]
 
 
 class Start(Part):
