@@ -65,6 +65,23 @@ class _Either:
 JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates), _Either()]
 
 
+class Branch(Part):
+    """One way out of a change point: on which this joint coordinate changes most in the direction of `sign`.
+
+    joint, coordinate: as of a drive.  sign: 1 takes the branch on which the coordinate grows most, or falls least; -1
+    that on which it falls most, or grows least.
+    """
+
+    joint: str
+    coordinate: str | None = None
+    sign: Literal[1, -1]
+
+
+def _several(value: Any) -> Any:
+    """One choice need not be written as a list."""
+    return (value,) if isinstance(value, (Mapping, Branch)) else value
+
+
 class Start(Part):
     """The start of the run.
 
@@ -73,11 +90,14 @@ class Start(Part):
     resting in its socket on the side to which the joint's force presses it.
     joint: of joints, by name; those with several coordinates by the coordinate's name below.
     modal: of flexible bodies, by name.
+    branch: in a change point, which of the branches that cross there the motion takes; with several loops a list, each
+    choosing among what those before it have left.
     """
 
     at: At | None = None
     joint: dict[PartName, JointStarts] = Field(default_factory=dict)
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
+    branch: Annotated[tuple[Branch, ...], BeforeValidator(_several)] = ()
 
     @model_validator(mode="after")
     def _no_two_deformations(self) -> Start:

@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.model.start_table import given_coordinates, given_modal_velocities
 
@@ -59,8 +60,8 @@ def _of_joints(model: Model) -> Iterator[Rate]:
                 numbers = dict(zip(link.joint.positions, model.numbering.coordinates[i], strict=True))
                 if start.number in numbers:
                     yield Rate(place, start.velocity, size, numbers[start.number], link.joint.sign)
-        for row, (edge, *_) in zip(closures, model.closures, strict=True):
-            if edge.name == start.joint:
+        for row, closure in zip(closures, model.closures, strict=True):
+            if not isinstance(closure, Coupling) and closure.edge.name == start.joint:
                 sites = int(row["site_a"]), int(row["site_b"])
                 yield Rate(place, start.velocity, size, sites=sites, coordinate=start.coordinate)
 

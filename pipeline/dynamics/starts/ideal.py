@@ -13,6 +13,7 @@ import xarray as xr
 
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import Progress
+from pipeline.core.scene.clearance import Clearance
 from pipeline.core.scene.parts import IdealJoint
 from pipeline.core.scene.schema import Scene
 from pipeline.core.scene.start import Start
@@ -69,8 +70,9 @@ def _started(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
     """Force of every joint on its second body at the start [N], world axes, by name."""
-    rows = m.empty_record(1, 0, len(y))
-    start = m.record(rows, 0)
+    contacts = len(engine.model.contacts)  # with stops
+    rows = m.empty_record(1, contacts, len(y))
+    start = m.record(rows, contacts)
     start.time[:], start.state[:] = engine.start, y
     seen = observe(engine, rows, after=True)
     return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
@@ -84,6 +86,9 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
         engine.evaluate(y, engine.start)
         sites, missing = engine.table(m.SITE_FRAMES), []
         for row, contact, law in zip(contacts, model.contacts, model.laws, strict=True):
+            if not isinstance(contact.joint, Clearance):
+                missing.append(np.zeros(3))  # the end of a stop
+                continue
             outer, inner = sites[row["outer"]], sites[row["inner"]]
             force, offset = forces[contact.name], inner["origin"] - outer["origin"]
             if contact.joint.type == "clearance-revolute":
@@ -93,7 +98,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
             depth = (size / law.numbers[0]) ** (1.0 / law.exponent)
             there = -force / size * (contact.joint.clearance + depth) if size > NOTHING * weight else 0.0 * force
             missing.append(there - offset)
-        least = min(contact.joint.clearance for contact in model.contacts)
+        least = min(c.joint.clearance for c in model.contacts if isinstance(c.joint, Clearance))
         if np.max(np.abs(missing)) <= THERE * least:
             return y
         y = perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(missing))
