@@ -88,9 +88,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
     found: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
-        scene = timing.paper_scene(graph.scene)
-        bundles = graph.bodies()
-        found.setdefault(kernels.shared(scene), kernels.task(scene, bundles))
+        for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
+            found.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 
@@ -165,7 +164,7 @@ def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
         scene="report",
         part=name,
         run="stages.figure:run",
-        params={"figure": name} | ({"gl": s6_render.gl_state()} if entry["gl"] else {}),
+        params={"figure": name},
         inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
         modules=(f"{FIGURES}.{name}",),
         folder="tables" if name.startswith("table") else "figures",

@@ -92,6 +92,10 @@ UNITS: dict[str, tuple[float, str]] = {
     "N m/rad": (1.0, "torsional stiffness"),
     "N m/deg": (180.0 / math.pi, "torsional stiffness"),
     "N m s/rad": (1.0, "torsional damping"),
+    "m/rad": (1.0, "length per angle"),
+    "rad/m": (1.0, "angle per length"),
+    "N/rad": (1.0, "force per angle"),
+    "N s/rad": (1.0, "force per angular velocity"),
     "%": (1e-2, "number"),
 }
 
@@ -123,6 +127,14 @@ _EXPONENTS: dict[str, Exponents] = {
     "damping": (1, 0, -1, 0),
     "torsional stiffness": (1, 2, -2, -1),
     "torsional damping": (1, 2, -1, -1),
+    "stiffness per time": (1, 0, -3, 0),
+    "torsional stiffness per time": (1, 2, -3, -1),
+    "force per time": (1, 1, -3, 0),
+    "force per angle and time": (1, 1, -3, -1),
+    "length per angle": (0, 1, 0, -1),
+    "angle per length": (0, -1, 0, 1),
+    "force per angle": (1, 1, -2, -1),
+    "force per angular velocity": (1, 1, -1, -1),
 }
 _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d+(?:\.\d+)?))?")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})

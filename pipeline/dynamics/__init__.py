@@ -10,8 +10,9 @@ if TYPE_CHECKING:
 
     from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
+    from pipeline.dynamics.record.cost import Cost
 
-__all__ = ["ensemble", "equilibrium", "frequencies", "sections", "simulate"]
+__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -35,6 +36,13 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     from pipeline.dynamics.run.accuracy import deliver
 
     return deliver(scene, once, progress)
+
+
+def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:
+    """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
+    from pipeline.dynamics.record.cost import measure
+
+    return measure(scene, bundles, progress, checked=checked)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:

@@ -17,7 +17,7 @@ from stages.__main__ import COMMANDS
 
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
-BESIDES |= {"CITATION.cff", "flexclear"}
+BESIDES |= {"CITATION.cff", "SECURITY.md", "flexclear"}
 #: longest module; what does not fit is two things
 LINES = 450
 

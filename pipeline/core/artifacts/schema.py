@@ -75,8 +75,21 @@ RUN: Schema = {
     "load_length": _V(
         ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
     ),
+    "bushing_displacement": _V(
+        ("time", "bushing", "axis"), "m", "second frame's origin in the first one's axes", optional=True
+    ),
+    "bushing_rotation": _V(
+        ("time", "bushing", "axis"), "rad", "rotation vector from the first frame to the second", optional=True
+    ),
     "load_power": _V(
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
+    ),
+    "controller_force": _V(
+        ("time", "controller"), "N or N m", "force of the controller along the coordinate it pushes", optional=True
+    ),
+    "controller_integral": _V(("time", "controller"), "N or N m", "integral part of that force", optional=True),
+    "gear_force": _V(
+        ("time", "gear"), "N or N m", "force of the gear along its second coordinate, on its second body", optional=True
     ),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
@@ -165,6 +178,9 @@ ENSEMBLE: Schema = {
     ),
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
+    "peak_acceleration": _V(
+        ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
+    ),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
 }
 
@@ -238,7 +254,7 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         variable, values = schema[name], dataset[name]
         if values.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
-        may_be_open = name.startswith(("event_", "impact_"))  # an event that the run's end cuts short has no duration
+        may_be_open = name.startswith(("event_", "impact_"))  # what the run's end cuts short has no duration
         if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}

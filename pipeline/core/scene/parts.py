@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSpherical
+from pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -187,4 +187,6 @@ class IdealJoint(Part):
 
 #: types of ideal joints
 IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
-Joint = Annotated[IdealJoint | ClearanceSpherical | ClearanceRevolute, Field(discriminator="type")]
+Joint = Annotated[
+    IdealJoint | ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane, Field(discriminator="type")
+]

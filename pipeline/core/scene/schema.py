@@ -7,11 +7,12 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
+from pipeline.core.scene.clearance import CONTACTS, Clearance
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from pipeline.core.scene.gears import Gear
 from pipeline.core.scene.limits import Limits
-from pipeline.core.scene.loads import Gravity, Load
+from pipeline.core.scene.loads import Gravity, Load, SampledPid
 from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
     Body,
@@ -22,6 +23,8 @@ from pipeline.core.scene.parts import (
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
+from pipeline.core.scene.start import Start
+from pipeline.core.scene.stops import Stop
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
@@ -29,6 +32,8 @@ from pipeline.core.units import quantity
 SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
 MOST_ROWS = 1e7
+#: samples of a controller; at each of them a step ends
+MOST_SAMPLES = 1e6
 
 
 class TimeSpan(Part):
@@ -159,7 +164,10 @@ class Scene(Part):
     joint: dict[PartName, Joint] = Field(default_factory=dict)
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
+    stop: dict[PartName, Stop] = Field(default_factory=dict)
+    gear: dict[PartName, Gear] = Field(default_factory=dict)
     time: TimeSpan
+    start: Start | None = None
     solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
@@ -176,6 +184,19 @@ class Scene(Part):
                 f"output.interval = {self.output.interval:g} s asks for {rows:.3g} rows, more than {MOST_ROWS:g}: "
                 "choose a longer one"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _samples_can_be_made(self) -> Scene:
+        for name, load in self.load.items():
+            if not isinstance(load, SampledPid):
+                continue
+            samples = (self.time.end - self.time.start) / load.period
+            if samples > MOST_SAMPLES:
+                raise ValueError(
+                    f"load.{name}.period = {load.period:g} s asks for {samples:.3g} samples, more than "
+                    f"{MOST_SAMPLES:g}: choose a longer one, or a continuous 'pid'"
+                )
         return self
 
     @model_validator(mode="after")
@@ -204,7 +225,7 @@ class Scene(Part):
             "body": moving,
             "joint": tuple(self.joint),
             "drive": tuple(self.drive),
-            "contact": tuple(self.contacts()),
+            "contact": tuple([*self.contacts(), *self.stop_ends()]),
         }
 
     def wanted(self) -> list[Quantity]:
@@ -221,7 +242,7 @@ class Scene(Part):
         known = self._prescribed()
         pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
         free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
-        return usual(free if any(free.values()) else pairs, tuple(self.contacts()))
+        return usual(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
 
     def _prescribed(self) -> set[str]:
         """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
@@ -302,8 +323,12 @@ class Scene(Part):
         return flexible | {name: body.mesh for name, body in self.meshed().items()}
 
     def contacts(self) -> dict[str, Clearance]:
-        """Clearance joints by name."""
-        return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
+        """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
+
+    def stop_ends(self) -> list[str]:
+        """Names of all ends of stops, as records have them."""
+        return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""

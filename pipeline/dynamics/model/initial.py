@@ -15,6 +15,7 @@ from pipeline.dynamics.model.assembly import chain_positions
 from pipeline.dynamics.model.constraints import outboard_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.flexible_bodies import bow, shift
+from pipeline.dynamics.model.gauges import angles
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.model import Model
 
@@ -53,20 +54,26 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
-    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+@dataclass(frozen=True)
+class Velocities:
+    """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
-    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
-    of deformation if joints, drives and given velocities allow that.
-    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
-    Raises InputError when joints and drives do not allow the velocities.
+    asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
+    bodies: those that are given velocities, which the first `told` rows ask for; the others keep the loops closed.
+    fastest: size of all these velocities, those of a slow motion at least.
     """
+
+    matrix: np.ndarray
+    asked: np.ndarray
+    target: np.ndarray
+    told: int
+    bodies: tuple[str, ...]
+    fastest: float
+
+
+def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
+    """What bodies and loops ask of the speeds in a state."""
     wanted = with_velocities(model)
-    elastic = np.zeros(model.nv, dtype=bool)
-    for modes in model.numbering.modal_coordinates.values():
-        elastic[modes] = True
-    if not wanted and not elastic.any():
-        return y
     y = y.copy()
     y[model.speeds] = 0.0
     given, centres = _given(wanted).ravel(), [_centre(model, name) for name in wanted]
@@ -87,23 +94,40 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float 
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    matrix = np.array(columns).T.reshape(len(base), model.nv)
     asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
-    target = asked - base
     fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
-    speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * fastest:
-        speeds, miss = _least(matrix, target)
-    largest = float(np.max(np.abs(asked), initial=0.0))
-    if wanted and miss > max(WRITTEN * fastest, share * largest):
-        names = ", ".join(wanted)
+    matrix = np.array(columns).T.reshape(len(base), model.nv)
+    return Velocities(matrix, asked, asked - base, int(told.sum()), tuple(wanted), fastest)
+
+
+def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
+    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
+    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
+    Raises InputError when joints and drives do not allow the velocities.
+    """
+    elastic = np.zeros(model.nv, dtype=bool)
+    for modes in model.numbering.modal_coordinates.values():
+        elastic[modes] = True
+    if not with_velocities(model) and not elastic.any():
+        return y
+    equations = velocity_equations(model, motion, y)
+    speeds, miss = _least(equations.matrix * ~elastic, equations.target)
+    if miss > RIGID * equations.fastest:
+        speeds, miss = _least(equations.matrix, equations.target)
+    largest = float(np.max(np.abs(equations.asked), initial=0.0))
+    if equations.bodies and miss > max(WRITTEN * equations.fastest, share * largest):
         raise InputError(
-            f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
-            f"mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the largest one are mended)",
+            f"[body.{equations.bodies[0]}.velocity]",
+            f"joints and drives do not allow the velocities given for {', '.join(equations.bodies)} (they miss by "
+            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the "
+            "largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[model.speeds] = unit * speeds
+    y = y.copy()
+    y[model.speeds] = model.speed_scales * speeds
     return y
 
 
@@ -200,17 +224,18 @@ def _centre(model: Model, name: str) -> _Centre:
     return _Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
-def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """Y with the angles that loads follow; `loads`: what each does at y, rows of LOAD with named fields.
+def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:
+    """Y with the internal states of parts as they start; `sites`: their frames at y, rows of SITE_FRAMES."""
+    y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
+    for place, angle in angles(model.arrays.table(m.GAUGES), sites).items():
+        y[first + place] = angle
+    return y
 
-    Raises InputError for a spring or damper of no length, which has no direction.
-    """
-    y = y.copy()
-    turns, first = model.arrays.table(m.LOADS)["turns"], model.ny - model.arrays.size(m.N_TURNS)
-    for (name, _), turn, value in zip(model.loads, turns, loads["value"], strict=True):
+
+def check_loads(model: Model, loads: np.ndarray) -> None:
+    """InputError for a spring or damper of no length, which has no direction; `loads`: rows of LOAD at the start."""
+    for (name, _), value in zip(model.loads, loads["value"], strict=True):
         load = model.scene.load[name]
-        if turn >= 0:
-            y[first + turn] = value
         has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
         if has_direction and value <= SHORTEST * model.length:
             raise InputError(
@@ -218,4 +243,3 @@ def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
                 "its two ends start in one place, so that it pulls in no direction",
                 "move an end; only a spring of no free length and no damping may start so",
             )
-    return y

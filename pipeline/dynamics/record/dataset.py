@@ -33,6 +33,18 @@ def dataset(run: Run) -> xr.Dataset:
     parts = [_motion(motions), _modes(motions), _drives(run), _joint_coordinates(model, seen)]
     if model.loads:
         parts.append(_loads(model, seen))
+    if "bushing" in model.parts.loads:
+        from pipeline.dynamics.record.bushings import give
+
+        parts.append(give(model, seen))
+    if {"pid", "sampled-pid"} & set(model.parts.loads):
+        from pipeline.dynamics.record.controllers import controllers
+
+        parts.append(controllers(model, seen))
+    if model.parts.couplings:
+        from pipeline.dynamics.record.gears import gear_series
+
+        parts.append(gear_series(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(trajectory), {})]
     if run.twin is not None:
@@ -88,8 +100,8 @@ def _contact_warnings(run: Run) -> list[str]:
 
     depths, forces = validity.deepest(run.trajectory.events, run.observed.touch)
     sentences = list[str]()
-    for (name, joint, *_), law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
-        sentences += validity.warnings(name, joint, law, float(depth), float(force))
+    for contact, law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
+        sentences += validity.warnings(contact.words, contact.joint, law, float(depth), float(force))
     return sentences
 
 

@@ -7,7 +7,6 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -32,9 +31,11 @@ from pipeline.dynamics.run.trajectory import Trajectory, output_times
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
     wanted = scene.ensemble or Ensemble()
-    if not scene.contacts():
+    if not scene.contacts() and not scene.stop:
         raise InputError(
-            "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
+            "[ensemble]",
+            "its members differ by the ball's offset, but there is no clearance joint and no stop",
+            "remove it",
         )
     engine, other = engines(scene, bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
@@ -43,7 +44,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     random = np.random.default_rng(wanted.seed)
     members, reasons = [], []
     for k in range(wanted.members):
-        offsets = random.normal(size=(len(scene.contacts()), 3))
+        offsets = random.normal(size=(len(engine.model.contacts), 3))
         offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
         moved = perturbed(engine, start, jacobian, offsets.ravel())
         last, trajectory, switched = follow(engine, moved, silent, other)
@@ -71,20 +72,23 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     model = engine.model
     regular = output_times(engine.breaks, model.scene.output.interval)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = replace(trajectory, rows=trajectory.rows[np.searchsorted(trajectory.time, regular)])
-    seen = observed(engine, kept)
-    require_closed(model, kept, seen)
+    kept = np.searchsorted(trajectory.time, regular)
+    seen = observed(engine, trajectory)
+    require_closed(model, trajectory, seen)
     bodies = Motions(model, seen).bodies
+    series = motion_series([bodies[n] for n in names], model.mechanism.origin)
     variables = {
-        **motion_series([bodies[n] for n in names], model.mechanism.origin),
-        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"]),
-        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"]),
+        **{name: (dims, values[kept]) for name, (dims, values) in series.items()},
+        # of the rows at events, too: an impact is shorter than the output interval
+        "peak_acceleration": (("body", "axis"), np.abs(series["acceleration"][1]).max(axis=0)),
+        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][kept]),
+        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][kept]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
     contacts = [contact.name for contact in model.contacts]
-    return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
+    return xr.Dataset(variables, coords={"time": regular, "body": names, "contact": contacts})
 
 
 def motion_series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:

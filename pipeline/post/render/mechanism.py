@@ -13,7 +13,7 @@ import xarray as xr
 from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.core.scene.fields import Pose
 from pipeline.post.body_shape import scale_to, surface
-from pipeline.post.render.solids import Solid, equivalent, link, mesh
+from pipeline.post.render.solids import Solid, equivalent, link, mesh, plate
 from pipeline.post.render.view import View, view
 from pipeline.post.series import parameters
 
@@ -156,6 +156,8 @@ def _rigid(
         frames = _frames(run, names.index(name), name)
         inside = any(np.linalg.norm(origin) < radius.get(frame, 0.0) for frame, origin in frames.items())
         solid = None if inside else _plausible(given, frames, size)
+        if solid is not None:
+            solid = plate(solid, np.array(list(frames.values())).reshape(-1, 3))
         # a slim solid is drawn with slim arms
         width = arm if solid is None else min(arm, float(np.sort(solid.half)[1]))
         holds = solid is not None and any(solid.holds(frames[frame]) for frame in frames if frame in sockets)

@@ -109,7 +109,7 @@ def _reaction(
 def _energy(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
     """Instead of a reaction, where there is no joint."""
     axes.set_title("kinetic energy (J)")
-    return _curve(axes, run, run.kinetic.values, "#D55E00")
+    return _curve(axes, run, run.kinetic.values, "#0072B2")
 
 
 def _curve(
