@@ -24,7 +24,7 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
     """
     changes: dict[str, Any] = {}
     if "clearance" in effects:
-        for name, joint in scene.contacts().items():
+        for name, joint in loose(scene).items():
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[joint.type], "between": list(joint.between)}
     if "flexibility" in effects:
         for name, body in scene.flexible().items():
@@ -39,13 +39,19 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
     return edited(scene, changes | _without_owners(scene, effects))
 
 
+def loose(scene: Scene) -> dict[str, Any]:
+    """The joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
+    return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
+
+
 def _without_owners(scene: Scene, effects: tuple[str, ...]) -> dict[str, Any]:
     """Edits of what is asked for, where what it is asked of is taken away."""
     found: dict[str, Any] = {}
     owners = scene.owners()
-    if "clearance" in effects and scene.contacts():
-        owners = {**owners, "contact": ()}
-        found["ensemble"] = None
+    if "clearance" in effects and loose(scene):
+        owners = {**owners, "contact": tuple(name for name in owners["contact"] if name not in loose(scene))}
+        if not owners["contact"]:
+            found["ensemble"] = None
         if scene.accuracy is not None:
             wanted = {
                 n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
