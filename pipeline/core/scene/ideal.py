@@ -41,7 +41,7 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
 
 
 def loose(scene: Scene) -> dict[str, Clearance]:
-    """Joints whose clearance can be taken away, by name."""
+    """The joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
     return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
 
 
