@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from pipeline.core.errors import InputError, shown
 from pipeline.core.registry import suggestion
+from pipeline.core.scene.fields import LONGEST_NAME
 from pipeline.core.scene.limits import check_parts
 from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.not_toml import not_toml
@@ -63,11 +64,12 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
     _absolute_files(found, Path.cwd() / place)
     for key, value in (override or {}).items():
         _put(found, key, value, "override of scene")
+    check_parts(found, Path("scene"), FAMILIES)
     try:
         scene = Scene.model_validate(found)
     except ValidationError as error:
         raise input_errors("scene", error, Scene) from None
-    scene._name = "-".join(re.findall(r"\w+", scene.title.lower())) or "scene"
+    scene._name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     return scene
 
 
