@@ -11,6 +11,7 @@ from pipeline import (
     render,
     report,
     run,
+    sections,
 )
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "render",
     "report",
     "run",
+    "sections",
 ]
 
 

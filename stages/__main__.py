@@ -25,9 +25,10 @@ COMMANDS = {
     "compare": "scenes beside each other or their ideal twins: differences, errors, events, costs",
     "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
     "frequencies": "equilibrium in a pose, and natural frequencies there",
-    "report": "all figures and tables of the paper, and results/report/index.html",
+    "report": "the page of scenes; without scenes, all figures and tables of the paper",
     "schema": "JSON schema of scene files",
     "cite": "sources of the methods and data that a scene uses",
+    "completion": "completion for bash and zsh",
     "cache": "what is kept: size, check, explain, prune",
     "doctor": "is all here that is needed, and does it compute",
 }

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from pipeline.core.artifacts.store import Record, publish
 from pipeline.core.errors import InputError
 from pipeline.core.scene.ideal import EFFECTS, ideal, loose
-from pipeline.core.scene.load import edited
 from pipeline.core.workflow.task import Task
 from stages import run
 from stages.graph import Graph
@@ -113,7 +112,7 @@ def twins(scene: Scene, without: str) -> list[Scene]:
         there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
         if there or not found:
             twin = ideal(scene, effects)
-            same = any(edited(twin, {}) == edited(other, {}) for other in found)
+            same = any(twin.model_dump() == other.model_dump() for other in found)
             twin._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
             found += [] if same else [twin]
     return found

@@ -91,7 +91,7 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
-def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scene:
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
     """The scene again, from what `params` kept of it; its title is its name, where that is told.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
@@ -99,7 +99,8 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> Scen
     from pipeline.core.scene.schema import Scene
 
     table, name = params["scene"], str(params.get("name", "scene"))
-    told = {"body": s3_rigid.filled(table["body"], inputs), "title": name, "limits": params.get("limits", {})}
+    body = s3_rigid.filled(table["body"], inputs or {})
+    told = {"body": body, "title": name, "limits": params.get("limits", {})}
     scene = Scene.model_validate({**table, **told})
     scene._name = name
     return scene

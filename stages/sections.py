@@ -42,7 +42,7 @@ def command(options: argparse.Namespace) -> None:
     kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
     judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
     verdicts = {name: place.store.load(record) for name, record in judged.items()}
-    print("\n\n".join(map(text, verdicts.values())))
+    print("\n\n".join(text(name, verdict) for name, verdict in verdicts.items()))
     if options.page is not None:
         pictures = {
             name: place.store.path(record.stage, record.key, "sections.png").read_bytes()
@@ -76,13 +76,14 @@ def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset,
     graph = Graph(scene, shown=run.as_in_its_file(scene))
     outcome = place.bring([graph.sections, graph.verdict], jobs=1)
     run.check(outcome)
-    kept, judged = (place.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict))
+    made = [place.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]
+    kept, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
     return kept, judged
 
 
-def text(verdict: xr.Dataset) -> str:
+def text(scene: str, verdict: xr.Dataset) -> str:
     """The verdict in words, and the numbers behind it (schema VERDICT)."""
-    lines = [f"{verdict.attrs['scene']}: {verdict.attrs['verdict']}"]
+    lines = [f"{scene}: {verdict.attrs['verdict']}"]
     lines += [f"  {reason}" for reason in str(verdict.attrs["reasons"]).split("; ")]
     if "contraction" in verdict:
         lines.append(f"  successive returns come closer by {float(verdict.contraction):.3g} a period")

@@ -216,6 +216,10 @@ ROWS = work("moment:3 force:3")
 #: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
 JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _places(6)
+#: per kept row its distance from those before it, at the end of the step, at its start, and the most that it has been,
+#: each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
+INDEPENDENCE, COLLOCATION = _places(2)
+COLLOCATION_ROWS = 13
 #: smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
@@ -249,13 +253,15 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 # of a closure before projection, error norm of the last accepted step, largest growth of the next (1 after a
 # rejection), length of fixed steps, the method's parameter, largest rate of a closure before projection, largest rate
 # of the equations that a step met;
-# then what `singular_step` keeps: independence of the closure rows at the end of the step and at its start, its start,
-# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one;
+# then what `singular_step` keeps: independence of the closure rows at the end of the step, time of its start, time of
+# the next singular pose, how far before it the stepper stops, the most that this may be (0: it does not stop), length
+# of the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has
+# left of the most that it had, steps in a row that ended blindly near a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # length of the last first step with a contact closed, whether the next accepted step is the first of a segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS = range(13, 19)
-REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
+SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, SHARE, LEFT, BLIND_STEPS = range(13, 22)
+REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
@@ -269,7 +275,7 @@ REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
 # fmt: on
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
-NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER = range(8, 13)
+NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHEAD = range(8, 14)
 
 # The record ----------------------------------------------------------------------------------------------------------
 #: a row of the event table; speed: rate of penetration at a closing, minus it at an opening [m/s]

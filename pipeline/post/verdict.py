@@ -136,11 +136,7 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
             np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in found], axis=1)),
         )
         coordinates |= {"contact": sections.contact.values}
-    told = {
-        "scene": str(sections.attrs.get("scene", "")),
-        "verdict": verdict.kind,
-        "reasons": "; ".join(verdict.reasons),
-    }
+    told = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
     made = conform(xr.Dataset(data, coords=coordinates), VERDICT, **told)
     made["frequency"].attrs = {"units": "1", "long_name": "cycles per period"}
     return made

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sys
 from pathlib import Path
 
 import meshio
@@ -165,6 +166,17 @@ def test_what_a_task_opens_is_noted_by_whoever_opens_it(tmp_path: Path) -> None:
     (tmp_path / "b.dat").read_text()
     assert read.keys() == {"a.dat", "b.dat"}
     assert read == opened.digests(read, tmp_path)
+
+
+def test_a_project_inside_of_an_environment_is_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `python -m venv .` makes it: only the folders of libraries there are left out."""
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    opened._system.cache_clear()
+    (tmp_path / "a.dat").write_text("a")
+    with opened.watched(tmp_path) as read:
+        (tmp_path / "a.dat").read_text()
+    opened._system.cache_clear()
+    assert read.keys() == {"a.dat"}
 
 
 def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.core.errors import InputError
 from pipeline.core.scene import lines
 from pipeline.core.scene.json_schema import scene_schema
 from pipeline.core.scene.load import load_scene
+from stages import run
 from stages.__main__ import main
 from stages.new import KINDS, TEMPLATES, write
 from tests.stages.typical_mistakes import MISTAKES
@@ -140,6 +142,40 @@ def test_schemas_say_what_they_are(kind: str, capsys: pytest.CaptureFixture[str]
     schema = json.loads(capsys.readouterr().out)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert schema["$id"] == f"urn:flexclear:schema:{kind}"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_completion_knows_every_command_and_its_options(shell: str, capsys: pytest.CaptureFixture[str]):
+    assert main(["completion", shell]) == 0
+    said = capsys.readouterr().out
+    assert 'compare) options="-h --help --set --jobs' in said
+    assert "--ideal" in said
+    assert all(verb in said for verb in ("new", "check", "report"))
+
+
+def test_a_value_is_changed_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene, _ = write("slider-crank", tmp_path)
+    graph = run.graphs([str(scene)], ["joint.pin.clearance=0.3 mm", "solver.rtol=1e-6"])[0]
+    assert graph.scene.joint["pin"].clearance == pytest.approx(3e-4, rel=1e-12)
+    assert graph.scene.solver.rtol == 1e-6
+    assert "joint.pin.clearance=0.3_mm" in graph.simulate.folder  # the results of the file stay
+    assert main(["why", str(scene), "--set", "joint.pin.clearence=1"]) == 2
+    assert "did you mean 'clearance'" in capsys.readouterr().err
+    assert main(["why", str(scene), "--set", "joint"]) == 2
+    assert "is no KEY=VALUE" in capsys.readouterr().err
+
+
+def test_a_scene_from_a_table_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    import flexclear as fc
+
+    path, _ = write("slider-crank", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    scene = fc.load_scene(tomllib.loads(path.read_text()))
+    assert scene.model_dump() == fc.load_scene(path).model_dump()
+    assert repr(scene).startswith("<Scene slider-crank-with-a-flexible-rod")
+    assert len(repr(scene)) < 250
+    with pytest.raises(InputError, match="only files do"):
+        fc.load_scene({"extends": "a.toml"})
 
 
 def test_every_template_is_a_kind_that_new_knows():

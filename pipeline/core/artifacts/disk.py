@@ -186,8 +186,9 @@ def sweep(root: Path) -> int:
         for name in names:
             path = Path(folder, name)
             if name.endswith(".tmp") and _abandoned(path):
-                path.unlink(missing_ok=True)
-                removed += 1
+                with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps
+                    path.unlink()
+                    removed += 1
             elif name.endswith(".lock"):
                 with contextlib.suppress(OSError), locked(path, wait=False) as mine:
                     removed += mine  # gone when it is released

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from pipeline.core.version import version
+
 CHECKOUT = Path(__file__).resolve().parents[3]
 
 
@@ -24,7 +26,7 @@ def kernel_root() -> Path:
     all that they depend on, so that every project of a user may share one folder.
     """
     named = os.environ.get("FLEXCLEAR_KERNELS")
-    return Path(named).resolve() if named else kernel_home() / _version() / "kernels"
+    return Path(named).resolve() if named else kernel_home() / version().replace(" ", "_") / "kernels"
 
 
 def kernel_home() -> Path:
@@ -32,12 +34,3 @@ def kernel_home() -> Path:
     from platformdirs import user_cache_path  # here, since few commands ask for it
 
     return user_cache_path("flexclear", appauthor=False)
-
-
-def _version() -> str:
-    from importlib.metadata import PackageNotFoundError, version
-
-    try:
-        return version("flexclear")
-    except PackageNotFoundError:
-        return "uninstalled"

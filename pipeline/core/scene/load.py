@@ -15,13 +15,14 @@ from pydantic import ValidationError
 
 from pipeline.core.errors import InputError, shown
 from pipeline.core.registry import suggestion
+from pipeline.core.scene.fields import LONGEST_NAME
 from pipeline.core.scene.limits import check_parts
 from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
-SETTINGS = ("time", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
+SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
 #: bytes that no scene or recipe needs
 LARGEST = 4 << 20
 #: a key of more parts than a scene has levels; the reader of TOML takes their number squared
@@ -63,11 +64,12 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
     _absolute_files(found, Path.cwd() / place)
     for key, value in (override or {}).items():
         _put(found, key, value, "override of scene")
+    check_parts(found, Path("scene"), FAMILIES)
     try:
         scene = Scene.model_validate(found)
     except ValidationError as error:
         raise input_errors("scene", error, Scene) from None
-    scene._name = "-".join(re.findall(r"\w+", scene.title.lower())) or "scene"
+    scene._name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     return scene
 
 

@@ -23,6 +23,7 @@ from pipeline.core.scene.parts import (
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
+from pipeline.core.scene.start import Start
 from pipeline.core.scene.stops import Stop
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
@@ -166,6 +167,7 @@ class Scene(Part):
     stop: dict[PartName, Stop] = Field(default_factory=dict)
     gear: dict[PartName, Gear] = Field(default_factory=dict)
     time: TimeSpan
+    start: Start | None = None
     solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None

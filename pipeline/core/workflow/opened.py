@@ -130,8 +130,20 @@ def _system() -> tuple[str, ...]:
     """Folders of the system, of Python and its libraries, and of programs' own state in the home folder."""
     home = os.path.expanduser("~")
     state = os.environ.get("XDG_CACHE_HOME"), os.environ.get("XDG_CONFIG_HOME")
-    own = {*sysconfig.get_paths().values(), sys.prefix, sys.base_prefix}
+    paths = sysconfig.get_paths()  # not its prefix: an environment may be the folder of a project itself
+    own = {paths[name] for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")}
     own |= {os.path.realpath(place) for place in own}
-    system = ("/proc", "/sys", "/dev", "/etc", "/usr", "/lib", "/lib64", "/run")
+    system = (
+        "/proc",
+        "/sys",
+        "/dev",
+        "/etc",
+        "/lib",
+        "/lib64",
+        "/usr/lib",
+        "/usr/lib64",
+        "/usr/local/lib",
+        "/usr/share",
+    )
     programs = [f"{home}/{name}" for name in (".cache", ".config", ".local")] if home != "~" else []
     return (*system, *programs, *filter(None, state), *sorted(own))

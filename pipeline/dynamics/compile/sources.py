@@ -114,6 +114,8 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         given["events"] = f"{located}({regimes})"
     elif touching:
         given["events"] = _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    if parts.closures:
+        given["poses"] = _import(imports, f"{INTEGRATORS}.singular_step", "OVER_POSES")
     _import(imports, DYNAMICS, "memory as m")
     maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
     return _file(f"steps of {scheme}", imports, "steps", maker, given, ADVANCE)

@@ -166,6 +166,8 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
         m.ROW_SCALE: 2 * closure_rows,
         m.PIVOT: m.PIVOT_SIZE,
         m.MULTIPLIER: closure_rows,
+        m.INDEPENDENCE: 3 * closure_rows,
+        m.COLLOCATION: m.COLLOCATION_ROWS * ny if closure_rows else 0,
         m.INTERNAL: int(h[m.N_INTERNAL]),
         m.DRIVE_FORCE: known,
         m.LEDGER_RATE: int(h[m.N_LEDGER]),

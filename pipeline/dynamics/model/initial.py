@@ -54,20 +54,26 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
-    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+@dataclass(frozen=True)
+class Velocities:
+    """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
-    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
-    of deformation if joints, drives and given velocities allow that.
-    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
-    Raises InputError when joints and drives do not allow the velocities.
+    asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
+    bodies: those that are given velocities, which the first `told` rows ask for; the others keep the loops closed.
+    fastest: size of all these velocities, those of a slow motion at least.
     """
+
+    matrix: np.ndarray
+    asked: np.ndarray
+    target: np.ndarray
+    told: int
+    bodies: tuple[str, ...]
+    fastest: float
+
+
+def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
+    """What bodies and loops ask of the speeds in a state."""
     wanted = with_velocities(model)
-    elastic = np.zeros(model.nv, dtype=bool)
-    for modes in model.numbering.modal_coordinates.values():
-        elastic[modes] = True
-    if not wanted and not elastic.any():
-        return y
     y = y.copy()
     y[model.speeds] = 0.0
     given, centres = _given(wanted).ravel(), [_centre(model, name) for name in wanted]
@@ -88,23 +94,40 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float 
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    matrix = np.array(columns).T.reshape(len(base), model.nv)
     asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
-    target = asked - base
     fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
-    speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * fastest:
-        speeds, miss = _least(matrix, target)
-    largest = float(np.max(np.abs(asked), initial=0.0))
-    if wanted and miss > max(WRITTEN * fastest, share * largest):
-        names = ", ".join(wanted)
+    matrix = np.array(columns).T.reshape(len(base), model.nv)
+    return Velocities(matrix, asked, asked - base, int(told.sum()), tuple(wanted), fastest)
+
+
+def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
+    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
+    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
+    Raises InputError when joints and drives do not allow the velocities.
+    """
+    elastic = np.zeros(model.nv, dtype=bool)
+    for modes in model.numbering.modal_coordinates.values():
+        elastic[modes] = True
+    if not with_velocities(model) and not elastic.any():
+        return y
+    equations = velocity_equations(model, motion, y)
+    speeds, miss = _least(equations.matrix * ~elastic, equations.target)
+    if miss > RIGID * equations.fastest:
+        speeds, miss = _least(equations.matrix, equations.target)
+    largest = float(np.max(np.abs(equations.asked), initial=0.0))
+    if equations.bodies and miss > max(WRITTEN * equations.fastest, share * largest):
         raise InputError(
-            f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
-            f"mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the largest one are mended)",
+            f"[body.{equations.bodies[0]}.velocity]",
+            f"joints and drives do not allow the velocities given for {', '.join(equations.bodies)} (they miss by "
+            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the "
+            "largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[model.speeds] = unit * speeds
+    y = y.copy()
+    y[model.speeds] = model.speed_scales * speeds
     return y
 
 

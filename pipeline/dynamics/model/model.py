@@ -64,10 +64,14 @@ class Model:
         return slice(self.nq, self.nq + self.nv)
 
     @property
+    def state_scales(self) -> np.ndarray:
+        """Natural unit of each state variable: the mechanism's size or a radian, both per second, ...; shape (NY,)."""
+        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][self.arrays.table(m.GROUPS)["group"]])
+
+    @property
     def speed_scales(self) -> np.ndarray:
         """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
-        groups = self.arrays.table(m.GROUPS)["group"][self.speeds]
-        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][groups])
+        return self.state_scales[self.speeds]
 
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:

@@ -151,6 +151,15 @@ def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
     return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
+def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Which free coordinates the closures of the chosen kept rows depend on; masks (kept rows,) -> (nv,)."""
+    support, found = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
+    for c in model.arrays.table(m.CLOSURES, h):
+        if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
+            found[support[c["support0"] : c["support0"] + c["n_support"]]] = True
+    return found
+
+
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
     """Name of the joint to which each kept row belongs."""
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]

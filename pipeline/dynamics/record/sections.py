@@ -13,6 +13,7 @@ from pipeline.core.errors import InputError
 from pipeline.core.progress import Progress
 from pipeline.core.quantities import IMPACT
 from pipeline.core.scene.load import edited
+from pipeline.core.scene.loads import SampledPid
 from pipeline.core.scene.schema import Scene, Sections
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.model import Model
@@ -34,6 +35,13 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     Raises InputError for laws that do not repeat, SolverError when the run cannot go on.
     """
     wanted = scene.sections or Sections()
+    for name, load in scene.load.items():
+        if isinstance(load, SampledPid):
+            raise InputError(
+                f"[load.{name}]",
+                "a controller that samples counts its periods from the run's start, which sections repeat",
+                "use a continuous 'pid' here",
+            )
     span = scene.time.end - scene.time.start
     period = wanted.period or span
     _require_inside(wanted, period, span)

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.integrators import DEFAULT
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
+#: why the stepper stops where loops are pulled further than they reach
+LOOPS = (m.STEP_TOO_SMALL, m.NO_START, m.NO_CONVERGENCE, m.AT_SINGULAR, m.LOST_CLOSURE)
 #: events per step from which on they are named as the cause
 OFTEN = 0.05
 
 
-def text(engine: Engine) -> str:
-    """When and why the stepper stopped, in words."""
+def text(engine: Engine, rows: np.ndarray) -> str:
+    """When and why the stepper stopped, in words; rows: of the record so far."""
     control, n, contacts = engine.control, engine.n, engine.model.contacts
+    if n[m.STATUS] in LOOPS:
+        told = beyond_reach(engine) or end_in_pose(engine, rows)
+        if told:
+            return told
     where = singular.diagnosis(engine)
     culprit = contacts[n[m.CULPRIT]].words if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
@@ -25,7 +31,6 @@ def text(engine: Engine) -> str:
     unsolvable = (
         f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
-    unsolvable += _other_integrator(engine)
     if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
     reasons = {
@@ -42,11 +47,14 @@ def text(engine: Engine) -> str:
         "times apart, a softer contact or more damping parts them",
         m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
         "step finds it",
-        m.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
-        f"({where}): give it another motion{_other_integrator(engine)}",
+        m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can go on in several ways "
+        f"({where}): let it pass the pose at speed, or stop elsewhere",
         m.LOST_CLOSURE: unsolvable,
     }
-    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}{_doubts(engine)}"
+    status = int(n[m.STATUS])
+    if status == m.NO_CONVERGENCE and not engine.method.traits.implicit:
+        status = m.LOST_CLOSURE  # it was the loops that could not be closed
+    return f"at t = {control[m.TIME]:.6g} s: {reasons[status]}{_doubts(engine)}"
 
 
 def _doubts(engine: Engine) -> str:
@@ -56,13 +64,6 @@ def _doubts(engine: Engine) -> str:
     from pipeline.dynamics.run.validity import doubts
 
     return "".join(f"; {sentence}" for sentence in doubts(engine))
-
-
-def _other_integrator(engine: Engine) -> str:
-    """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
-    if engine.method.traits.passes_singular:
-        return ""
-    return f"; or it moves on and {engine.model.scene.solver.integrator} does not get over the pose: try {DEFAULT}"
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:

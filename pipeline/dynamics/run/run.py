@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -23,9 +23,10 @@ from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import trajectory as stepping
+from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, prepare
 from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.observation import beside, observe_flat
+from pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
 from pipeline.dynamics.run.start import consistent_start, mends
 from pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
@@ -140,22 +141,38 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 
     Raises SolverError where one of them could not be evaluated.
     """
-    size, parts = engine.model.arrays.size, []
+    parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
         out = observe_flat(engine, trajectory.rows[part])
-        blurred = observation.by_name(out, size).status == m.SINGULAR
-        if engine.mobility.singular_start and part.start == 0:
-            blurred[0] = True  # rows of the closures that vanish there had no size before to be compared with
-        for k in np.flatnonzero(blurred):
-            limit = beside(engine, trajectory.rows[part][k])
+        for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
+            row, lost = trajectory.rows[part][k], observation.by_name(out, engine.model.arrays.size).status[k]
+            limit = beside(engine, row, motion, CLEAR)
+            if limit is None and lost:
+                limit = beside(engine, row, motion, NEARLY_CLEAR)
             if limit is not None:
                 out[k] = limit
         parts.append(out)
-    seen = observation.by_name(np.concatenate(parts), size)
+    seen = observation.by_name(np.concatenate(parts), engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
     if len(bad):
-        raise SolverError(
-            f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
-        )
+        at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
+        if seen.status[bad[0]] == m.SINGULAR:
+            lost = (
+                "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "
+                "the mechanism pass the pose at speed, or stop elsewhere"
+            )
+        raise SolverError(at + lost)
     return seen
+
+
+def _near_singular(
+    engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
+) -> Iterator[tuple[int, Collocation]]:
+    """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
+    for motion in motions:
+        engine.select_pieces(0.5 * (motion.start + motion.end))
+        begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
+        for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
+            if blurred(engine, rows[k]):
+                yield k, motion

@@ -88,28 +88,35 @@ def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
 
-    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds
-    give, so that no step width enters.
+    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds add
+    to those of the drives, so that no step width enters.
     """
     engine.select_pieces_after(engine.start)
-    contacts, stops, columns = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES), []
-    for k in range(engine.model.nv):
-        moved = y.copy()
-        moved[engine.model.speeds] = np.eye(engine.model.nv)[k]
-        engine.evaluate(project(engine, moved), engine.start)
+    contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
+
+    def offset_rates(speeds: np.ndarray) -> np.ndarray:
+        _moving(engine, y, speeds)
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
         offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
         offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
-        columns.append(offset.ravel())
-    return np.array(columns).T
+        return np.asarray(offset).ravel()
+
+    driven = offset_rates(np.zeros(engine.model.nv))
+    return np.array([offset_rates(unit) - driven for unit in np.eye(engine.model.nv)]).T
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
-    moving, moved, nq = y.copy(), y.copy(), engine.model.nq
-    moving[engine.model.speeds] = speeds
+    moved, nq = y.copy(), engine.model.nq
     # rates per unit time, for one unit: a displacement of 1e-8 m is linear
-    moved[:nq] += engine.evaluate(project(engine, moving), engine.start)[:nq]
+    moved[:nq] += _moving(engine, y, speeds)[:nq] - _moving(engine, y, np.zeros(len(speeds)))[:nq]
     return project(engine, moved)
+
+
+def _moving(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Rates of the start's state with other speeds, as nearly as drives and loops allow."""
+    moved = y.copy()
+    moved[engine.model.speeds] = speeds
+    return engine.evaluate(project(engine, moved), engine.start)

@@ -30,13 +30,9 @@ def consistent_start(engine: Engine) -> np.ndarray:
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
-
-    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        _look(engine, state)
-        return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
-
     # a singular pose has no rates to project on
-    y = initial.given_velocities(model, motion, y, 0.0 if engine.mobility.singular_start else initial.WRONG)
+    share = 0.0 if engine.mobility.singular_start else initial.WRONG
+    y = initial.given_velocities(model, start_motions(engine), y, share)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads or model.arrays.size(m.N_INTERNAL):
@@ -45,6 +41,16 @@ def consistent_start(engine: Engine) -> np.ndarray:
         initial.check_loads(model, engine.table(m.LOAD))
     _refuse_penetration(engine, y)
     return y
+
+
+def start_motions(engine: Engine) -> initial.Motions:
+    """What speeds at the start mean: motions of the links, and rates at which the loops open."""
+
+    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        _look(engine, state)
+        return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
+
+    return motion
 
 
 def mends(engine: Engine, y: np.ndarray) -> list[str]:

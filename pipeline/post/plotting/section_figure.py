@@ -21,7 +21,11 @@ def make(sections: xr.Dataset, verdict: xr.Dataset) -> dict[str, bytes]:
         _returns(returns, verdict)
         _power(power, verdict)
         _growth(growth, sections, verdict)
-        style.heading(figure, f"{verdict.attrs['scene']}: {verdict.attrs['verdict']}", verdict.attrs["reasons"])
+        style.heading(
+            figure,
+            f"A {verdict.attrs['verdict']} motion" if verdict.attrs["verdict"] != "undecided" else "Undecided",
+            verdict.attrs["reasons"],
+        )
         return style.files("sections", figure)
 
 

@@ -38,7 +38,7 @@ class Actors:
     rigid: tuple[Any, ...]
     balls: tuple[Any, ...]
     flexible: tuple[pv.PolyData, ...]
-    pins: tuple[Any, ...]
+    pins: tuple[Any, ...] = ()
 
 
 def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> np.ndarray:
