@@ -130,3 +130,26 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
         found["horizon"] = run["horizon"]
     kept = xr.Dataset(found)
     return kept.assign_coords(contact=run["contact"]) if "contact" in run.coords else kept
+
+
+def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
+    """What is kept of a series (`pipeline.core.scene.kept`); shape () or (components,).
+
+    time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
+    """
+    if reduction == "final":
+        return np.asarray(values[-1])
+    sizes = np.linalg.norm(values, axis=1)
+    if reduction == "largest":
+        return np.asarray(sizes.max())
+    span = time[-1] - time[0]
+    if reduction == "rms":
+        return np.asarray(np.sqrt(np.trapezoid(sizes**2, time) / span))
+    return np.asarray(np.trapezoid(values, time, axis=0) / span)
+
+
+def of_impacts(times: np.ndarray, reduction: str) -> float:
+    """Number of impacts, or time of the first or last one, nan where there is none. times: ascending [s]."""
+    if reduction == "count":
+        return float(len(times))
+    return float(times[0 if reduction == "first" else -1]) if len(times) else np.nan

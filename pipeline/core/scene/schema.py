@@ -148,6 +148,12 @@ class Scene(Part):
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
         return self
 
+    def check(self) -> None:
+        """ValueError where parts and settings that are right by themselves do not go together."""
+        self._rows_can_be_kept()
+        self._quantities_are_there()
+        self._stressed_bodies_are_flexible()
+
     def owners(self) -> dict[str, tuple[str, ...]]:
         """Names of the parts that may own a quantity, by what they are."""
         moving = tuple(name for name, body in self.body.items() if not isinstance(body, Ground))
