@@ -18,6 +18,7 @@ CLOSED_PIPE = 141
 COMMANDS = {
     "run": "bring scenes up to date",
     "why": "for each stage: fresh, or why it would run again",
+    "sweep": "many points of one scene: a dataset and a figure",
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
     "frequencies": "equilibrium in a pose, and natural frequencies there",

@@ -6,6 +6,7 @@ Series are compared at the regular output times that both runs have, never inter
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -13,6 +14,10 @@ import xarray as xr
 from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.scene.wanted import KINDS, Quantity
+
+if TYPE_CHECKING:
+    from pipeline.core.scene.output import Output
+    from pipeline.core.scene.schema import TimeSpan
 
 #: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
 #: only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure would take
@@ -153,3 +158,9 @@ def of_impacts(times: np.ndarray, reduction: str) -> float:
     if reduction == "count":
         return float(len(times))
     return float(times[0 if reduction == "first" else -1]) if len(times) else np.nan
+
+
+def regular_times(time: TimeSpan, output: Output) -> np.ndarray:
+    """The regular output times of a run, those of breaks and events left out, shape (n,) [s]."""
+    count = int(np.floor((time.end - time.start) / output.interval * (1 + 1e-12))) + 1
+    return np.asarray(time.start + output.interval * np.arange(count))

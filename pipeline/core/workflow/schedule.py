@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from pipeline.core.artifacts.store import Record, Store
 from pipeline.core.errors import FlexclearError, ResourceError
 from pipeline.core.progress import Progress
-from pipeline.core.workflow import cores
+from pipeline.core.workflow import cores, workers
 from pipeline.core.workflow.execute import execute, find, key_of
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
@@ -123,15 +123,13 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
 
 
 def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
-    """In worker processes; spawned, because compiled kernels and forks do not mix."""
+    """In worker processes."""
     # imported here, because a run that finds everything fresh must start quickly
     import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
 
-    context = multiprocessing.get_context("spawn")
-    with context.Manager() as server:
+    with multiprocessing.get_context("spawn").Manager() as server:
         reports = server.Queue()
-        pool = ProcessPoolExecutor(width, mp_context=context, initializer=_follow_parent)
+        pool = workers.pool(width)
         running: dict[Future[Record | Failure], _Running] = {}
         try:
             while plan.waiting or running:
@@ -139,7 +137,7 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
                 _collect(plan, running, monitor)
                 _relay(reports, monitor)
         except BaseException:
-            _kill(pool)
+            workers.kill(pool)
             raise
         pool.shutdown()
 
@@ -200,31 +198,6 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
 def _relay(reports: Any, monitor: Monitor) -> None:
     while not reports.empty():
         monitor.update(*reports.get())
-
-
-def _follow_parent() -> None:
-    """In a worker: Ctrl-C is left to the parent, which ends its workers; where it is gone, they end too."""
-    import os
-    import signal
-    import threading
-    import time
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def _kill(pool: ProcessPoolExecutor) -> None:
-    """End the workers at once; a compiled kernel does not listen to interrupts."""
-    for process in list((pool._processes or {}).values()):
-        process.kill()
-    pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from pipeline.core.artifacts.event_kinds import CLOSING
+from pipeline.core.artifacts.points import Point, Values
 from pipeline.core.errors import InputError, SolverError
 from pipeline.core.progress import silent
-from pipeline.core.quantities import IMPACT, of_impacts, reduced
+from pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from pipeline.core.scene.kept import OF_CONTACTS, Kept
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Ensemble, Scene
@@ -32,25 +33,6 @@ from pipeline.dynamics.run.trajectory import Trajectory
 LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
-
-Values = dict[str, np.ndarray]
-
-
-@dataclass(frozen=True)
-class Point:
-    """What is left of one point.
-
-    values, error: by the names of what is kept, in SI; with members their mean, and `deviation` their standard
-    deviation.  evaluations: of the right-hand side, all runs of the point together.
-    refused: why there are no values; else empty.
-    """
-
-    values: Values
-    error: Values
-    deviation: Values
-    evaluations: int
-    refused: str = ""
-
 
 @dataclass
 class Runner:
@@ -97,7 +79,8 @@ class Runner:
         start, model = consistent_start(engine), engine.model
         if not self.members:
             return [start]
-        jacobian, offsets = offset_jacobian(engine, start), ball_offsets(model, model.scene.ensemble or Ensemble(), self.members)
+        jacobian = offset_jacobian(engine, start)
+        offsets = ball_offsets(model, model.scene.ensemble or Ensemble(), self.members)
         return [perturbed(engine, start, jacobian, moved) for moved in offsets]
 
 
@@ -163,16 +146,9 @@ def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kep
     return of_impacts(closings["time"][closings["speed"] > IMPACT], one.reduction)
 
 
-def regular_times(scene: Scene) -> np.ndarray:
-    """The regular output times of a scene, those of breaks and events left out, shape (n,) [s]."""
-    start, interval = scene.time.start, scene.output.interval
-    count = int(np.floor((scene.time.end - start) / interval * (1 + 1e-12))) + 1
-    return np.asarray(start + interval * np.arange(count))
-
-
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
     """Rows at the regular output times; a break that takes the place of one is the same but for rounding."""
-    wanted = regular_times(engine.model.scene)
+    wanted = regular_times(engine.model.scene.time, engine.model.scene.output)
     after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
     nearer = np.where(np.abs(time[after - 1] - wanted) < np.abs(time[after] - wanted), after - 1, after)
     return np.asarray(nearer)
