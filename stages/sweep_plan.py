@@ -111,10 +111,8 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     except InputError as error:
         raise _placed(f"{where} [set]", error) from None
     made = design(sweep)
-    first = made.points()[0]
-    for axis in made.axes:
-        _check_values(base, axis, first, where)
-    base = edited(base, first)
+    _check_values(base, made, where)
+    base = edited(base, made.points()[0])
     kept = tuple(_kept(base, name, where) for name in sweep.keep)
     _check_kept(sweep, base, made, kept, where)
     return Plan(sweep, base, made, kept)
@@ -125,17 +123,32 @@ def _placed(place: str, error: InputError) -> InputError:
     return InputError(place, problem, remedy)
 
 
-def _check_values(base: Scene, axis: Axis, first: Mapping[str, Any], where: str) -> None:
-    values, numbers = list(axis.values), axis.coordinate
-    if len(values) > CHECKED and all(isinstance(number, float) for number in numbers):
-        ends = (min(numbers), max(numbers))  # type: ignore[type-var]
-        values = [values[numbers.index(end)] for end in ends]  # type: ignore[arg-type]
+def _check_values(base: Scene, made: Design, where: str) -> None:
+    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are looked at.
+
+    In a grid each value stands beside the first ones of the others: what some combinations mean for the mechanism is
+    found when they are run.
+    """
+    points = made.points()
     try:
-        edited(base, dict.fromkeys(axis.places, values[0]))
-        for value in values:
-            with_numbers(base, {**first, **dict.fromkeys(axis.places, value)})
+        edited(base, points[0])
     except InputError as error:
-        raise _placed(f"{where} [vary.{axis.name}]", error) from None
+        raise _placed(f"{where} [vary]", error) from None
+    for axis in made.axes:
+        for k in _looked_at(axis):
+            chosen = points[k] if not made.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
+            try:
+                with_numbers(base, chosen)
+            except InputError as error:
+                raise _placed(f"{where} [vary.{axis.name}]", error) from None
+
+
+def _looked_at(axis: Axis) -> Sequence[int]:
+    numbers = axis.coordinate
+    if len(numbers) <= CHECKED or isinstance(numbers[0], str):
+        return range(len(numbers))
+    by_size = sorted(range(len(numbers)), key=lambda k: numbers[k])
+    return by_size[0], by_size[-1]
 
 
 def _kept(base: Scene, name: str, where: str) -> Kept:
