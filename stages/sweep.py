@@ -126,7 +126,9 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
     ready = sweep_plan.prepare(plan, place)
     with ExitStack() as locks:
         for family in ready.families:
-            locks.enter_context(place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep")))
+            locks.enter_context(
+                place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep"))
+            )
         found = {key: point for family in ready.families for key, point in family.find(place.store, plan.kept).items()}
         wanted = {job.key: job for job in ready.jobs}
         desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found})

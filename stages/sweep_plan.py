@@ -133,7 +133,7 @@ def _check_values(base: Scene, made: Design, where: str) -> None:
     try:
         edited(base, points[0])
     except InputError as error:
-        raise _placed(f"{where} [vary]", error) from None
+        raise _placed(f"{where} [vary{_guilty(base, made)}]", error) from None
     for axis in made.axes:
         for k in _looked_at(axis):
             chosen = points[k] if not made.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
@@ -141,6 +141,16 @@ def _check_values(base: Scene, made: Design, where: str) -> None:
                 with_numbers(base, chosen)
             except InputError as error:
                 raise _placed(f"{where} [vary.{axis.name}]", error) from None
+
+
+def _guilty(base: Scene, made: Design) -> str:
+    """The parameter whose first value the scene does not take by itself, with a dot before it; or nothing."""
+    for axis in made.axes:
+        try:
+            edited(base, dict.fromkeys(axis.places, axis.values[0]))
+        except InputError:
+            return f".{axis.name}"
+    return ""
 
 
 def _looked_at(axis: Axis) -> Sequence[int]:

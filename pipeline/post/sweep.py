@@ -105,7 +105,7 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     mesh = ax.pcolormesh(x, y, sweep[name].values, shading="nearest", cmap="viridis")
     bar = figure.colorbar(mesh, ax=ax)
     bar.set_label(sweep[name].attrs["units"], color=SOFT)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
     ax.plot(x[refused[:, 1]], y[refused[:, 0]], "x", color=REFUSED, ms=4.0)
@@ -122,7 +122,7 @@ def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     )
     bar = figure.colorbar(points, ax=ax)
     bar.set_label(_axis(sweep, second), color=SOFT)
-    bar.outline.set_visible(False)  # type: ignore[operator]
+    bar.outline.set_visible(False)
     known = y[np.isfinite(y)]
     if len(known):
         ax.axhline(known.mean(), color=INK, lw=0.9)
@@ -145,4 +145,3 @@ def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
 def _axis(sweep: xr.Dataset, parameter: str) -> str:
     unit = _scale(sweep, parameter)[1]
     return f"{parameter} ({unit})" if unit else parameter
-

@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +47,7 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Keys of the points that are run."""
     keys: list[str] = []
     plain = sweep_engine.Engine.run
@@ -57,7 +57,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
         plain(engine, jobs, *rest)
 
     monkeypatch.setattr(sweep_engine.Engine, "run", watched)
-    yield keys
+    return keys
 
 
 def pendulum(folder: Path, count: int, name: str = "lengths") -> Path:
@@ -71,7 +71,9 @@ def flexclear(*arguments: str, cwd: Path, results: Path) -> subprocess.Popen[str
     """The command in a process of its own."""
     environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd)}
     command = [sys.executable, "-m", "stages", *arguments]
-    return subprocess.Popen(command, cwd=cwd, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    return subprocess.Popen(
+        command, cwd=cwd, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
 
 
 def test_a_pendulum_is_back_after_its_period_whatever_its_length(root: Path):
@@ -176,7 +178,6 @@ def test_bytes_are_the_same_whoever_runs_the_points(root: Path, tmp_path: Path):
         out, err = done.communicate(timeout=PATIENCE)
         assert done.returncode == 0, err
         assert "30 points, 0 refused" in out
-        assert " of 30 points" in err
         files.append(target.read_bytes())
     assert files[0] == files[1]
 
@@ -253,7 +254,7 @@ def test_a_sweep_of_refusals_only_is_no_success(tmp_path: Path, fresh: Path, cap
 
 
 def test_members_give_mean_and_deviation(root: Path):
-    """Neighbouring starts of a bouncing ball part with every impact, but the first one is the same to their distance."""
+    """Neighbouring starts of a bouncing ball part with every impact; the first one is the same to their distance."""
     path, keep = root / "scenes/checks/bounce.toml", ["contact.impact_times.first", "ball.velocity.final"]
     vary = {"joint.contact.normal.restitution": [0.7]}
     found = pipeline.sweep(path, vary, keep, members=4, workers=1).isel({"joint.contact.normal.restitution": 0})
@@ -267,15 +268,19 @@ def test_members_give_mean_and_deviation(root: Path):
 @pytest.mark.parametrize(
     "change, place, words",
     [
-        ({"vary": {"body.bop.com.0": [1.0]}}, "vary", "there is no 'body.bop'"),
-        ({"vary": {"body.bob.com.7": [1.0]}}, "vary", "there is no 'com.7'"),
+        ({"vary": {"body.bop.com.0": [1.0]}}, "vary.body.bop.com.0", "there is no 'body.bop'"),
+        ({"vary": {"body.bob.com.7": [1.0]}}, "vary.body.bob.com.7", "there is no 'body.bob.com.7'"),
         ({"vary": {"body.bob.mass": ["1 kg", "1 m"]}}, "vary.body.bob.mass", "length"),
         ({"vary": {"body.bob.mass": [1.0, -1.0]}}, "vary.body.bob.mass", "-1"),
         ({"vary": {"body.bob.mass": {"from": 1, "to": 2}}}, "sweep", "needs its count"),
         ({"vary": {"body.bob.mass": {"from": "1 kg", "to": 2, "count": 3}}}, "vary.body.bob.mass", "one unit"),
         ({"vary": {"body.bob.mass": {"from": -1, "to": 2, "count": 3, "spacing": "log"}}}, "mass", "ends of one sign"),
         ({"vary": {"a": [1.0, 2.0], "b": [1.0]}, "combine": "list"}, "sweep", "a 2, b 1"),
-        ({"vary": {"a": {"values": [1.0], "places": ["time.end"]}, "time.end": [2.0]}}, "sweep", "varied by 'a' already"),
+        (
+            {"vary": {"a": {"values": [1.0], "places": ["time.end"]}, "time.end": [2.0]}},
+            "sweep",
+            "varied by 'a' already",
+        ),
         ({"vary": {"time": [1.0]}}, "sweep", "another name"),
         ({"vary": {"time.end": [1.0, 2.0]}, "keep": ["bob.position.series"]}, "keep", "time.end is varied"),
         ({"keep": ["bob.speed.largest"]}, "keep", "velocity"),
@@ -398,7 +403,9 @@ print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] i
 
 def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
     path = root / "scenes/checks/clearance_slider_crank.toml"
-    done = subprocess.run([sys.executable, "-c", LOADED, str(path)], cwd=root, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, str(path)], cwd=root, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     known = Sources(root).closure(["stages.sweep_points", STORE, *modules(load_scene(path))]).keys()
     loaded = set(done.stdout.split())

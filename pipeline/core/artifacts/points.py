@@ -53,11 +53,11 @@ def unpacked(stored: xr.Dataset, kept: Sequence[Kept]) -> dict[str, Point]:
     found = {}
     for k, key in enumerate(arrays["key"]):
         refused = str(arrays["refused"][k])
-        shares = [
+        values, error, deviation = (
             {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, share)) in arrays}
             for share in SHARES
-        ]
-        found[str(key)] = Point(*shares, int(arrays["evaluations"][k]), refused)
+        )
+        found[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
     return found
 
 

@@ -91,10 +91,11 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
 
 
 @cache
-def _reader(family: str) -> TypeAdapter[Any]:
+def _reader(family: str) -> Any:
     """Reads a setting, or parts of a family by name, as `Scene` does."""
     info = Scene.model_fields[family]
-    return TypeAdapter(Annotated[info.annotation, *info.metadata] if info.metadata else info.annotation)
+    kind: Any = info.annotation
+    return TypeAdapter(Annotated[kind, *info.metadata] if info.metadata else kind)
 
 
 def scene_name(path: Path) -> str:

@@ -121,31 +121,30 @@ class Scene(Part):
     ensemble: Ensemble | None = None
     accuracy: Accuracy | None = None
 
-    @model_validator(mode="after")
-    def _rows_can_be_kept(self) -> Scene:
+    def _rows_can_be_kept(self) -> None:
         rows = (self.time.end - self.time.start) / self.output.interval
         if rows > MOST_ROWS:
             raise ValueError(
                 f"output.interval = {self.output.interval:g} s asks for {rows:.3g} rows, more than {MOST_ROWS:g}: "
                 "choose a longer one"
             )
-        return self
 
-    @model_validator(mode="after")
-    def _quantities_are_there(self) -> Scene:
+    def _quantities_are_there(self) -> None:
         for name in self.accuracy.quantities if self.accuracy else ():
             try:
                 parse(name, self.owners())
             except ValueError as error:
                 raise ValueError(f"accuracy.{name}: {error}") from None
-        return self
 
-    @model_validator(mode="after")
-    def _stressed_bodies_are_flexible(self) -> Scene:
+    def _stressed_bodies_are_flexible(self) -> None:
         for name in self.output.stress or ():
             if name not in self.flexible():
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Scene:
+        self.check()
         return self
 
     def check(self) -> None:

@@ -34,6 +34,7 @@ LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
 
+
 @dataclass
 class Runner:
     """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
