@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow bench atlas clean
+.PHONY: all help setup check test test-slow bench atlas chaos clean
 
 VENV := .venv
 READY := $(VENV)/.ready
@@ -34,6 +34,9 @@ test-slow: $(READY) ## The tests marked slow
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation runs growth exudyn
 
+chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (two hours; keeps every scene that is finished)
+	@$(RUN) -m stages sections sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb) --page docs/chaos.md
+
 atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour; goes on where it stopped)
 	@$(RUN) -m benchmarks stability
 
@@ -48,5 +51,5 @@ $(READY): pyproject.toml constraints.txt
 	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian, Ubuntu: apt-get install python3-venv)"; exit 1; }
 	@echo "setting up $(VENV) with $(PYTHON); takes some minutes the first time"
 	@test -x $(RUN) || "$(PYTHON)" -m venv $(VENV)
-	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev]'
+	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,render]'
 	@touch $@

@@ -2,8 +2,11 @@
 
 The same things that the command ``flexclear`` does, from Python::
 
-    scene = pipeline.load_scene("scenes/sps4/csj.toml", override={"joint.A1.clearance": "0.2 mm"})
-    run = pipeline.run(scene)
+    import flexclear as fc
+
+    scene = fc.load_scene("slider_crank.toml", override={"joint.pin.clearance": "0.2 mm"})
+    run = fc.run(scene)
+    both = fc.compare(scene, ideal=True)
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import os
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -22,19 +25,56 @@ if TYPE_CHECKING:
 # One thread in BLAS and OpenMP, before NumPy is loaded: the matrices are small, and sums whose
 # order depends on the number of cores would break the promise of equal bytes for equal inputs.
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
-    os.environ.setdefault(_variable, "1")
+    os.environ[_variable] = "1"  # also where somebody asked for more: that would change the bytes
 
-__all__ = ["cost", "equilibrium", "frequencies", "load_scene", "run", "sweep"]
+__all__ = [
+    "Scene",
+    "compare",
+    "cost",
+    "edited",
+    "equilibrium",
+    "frequencies",
+    "load_scene",
+    "open",
+    "render",
+    "report",
+    "run",
+    "sections",
+    "sweep",
+]
 
 
-def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
-    """The scene in a TOML file, with everything that it extends; `override` as dotted place -> value.
+def __getattr__(name: str) -> Any:
+    """`Scene`, imported when it is asked for, and the version."""
+    if name == "Scene":
+        return import_module("pipeline.core.scene.schema").Scene
+    if name == "__version__":
+        from pipeline.core.version import version
 
+        return version()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
+    """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
+
+    override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
     """
     from pipeline.core.scene.load import load_scene as load
+    from pipeline.core.scene.load import scene_of
 
-    return load(path, override)
+    return scene_of(source, override) if isinstance(source, Mapping) else load(source, override)
+
+
+def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
+    """A copy of a scene with dotted places changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
+
+    Raises InputError.
+    """
+    from pipeline.core.scene.load import edited as changed
+
+    return changed(scene, changes)
 
 
 def run(scene: Scene | str | Path) -> xr.Dataset:
@@ -81,6 +121,16 @@ def _plain(values: Any) -> Any:
     return values.tolist() if hasattr(values, "tolist") else values
 
 
+def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
+    """A motion that its laws repeat, looked at once in each period (schema SECTIONS), and the verdict on it.
+
+    The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
+    why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
+    """
+    found: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
+    return found
+
+
 def equilibrium(
     scene: Scene | str | Path,
     time: float | None = None,
@@ -113,6 +163,38 @@ def frequencies(
     return _linear(scene, time, drives, moving=moving, vibrations=True)
 
 
+def compare(
+    *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
+) -> xr.Dataset:
+    """Scenes beside each other, or beside their ideal twins: differences, the error of each run, events and costs.
+
+    ideal: compare each scene with itself without clearance and flexibility (True or "both"), without one of them, or
+    with each of these.  The first run is the reference; its variables are told in `pipeline.post.overview.comparison`.
+    Raises FlexclearError.
+    """
+    without = "both" if ideal is True else ideal or None
+    found = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
+    return found.dataset()
+
+
+def render(scene: Scene | str | Path) -> Path:
+    """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
+    return _stages("run").rendered(_loaded(scene))
+
+
+def report(scene: Scene | str | Path) -> Path:
+    """The page with everything about a scene, one file, brought up to date.  Raises FlexclearError."""
+    return _stages("own_report").make(_stages("run").graph(_loaded(scene)), _stages("run").workplace())
+
+
+def open(scene: Scene | str | Path) -> xr.DataTree:
+    """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
+
+    Nothing is run.  Raises InputError when there is nothing yet.
+    """
+    return _stages("run").results(scene)
+
+
 def _linear(
     scene: Scene | str | Path,
     time: float | None,
@@ -125,7 +207,8 @@ def _linear(
 
 
 def _loaded(scene: Scene | str | Path) -> Scene:
-    return load_scene(scene) if isinstance(scene, (str, Path)) else scene
+    """A scene, or the one in a file, or of a name below scenes/."""
+    return load_scene(_stages("run").find_scene(str(scene))) if isinstance(scene, (str, Path)) else scene
 
 
 def _stages(name: str) -> Any:

@@ -16,15 +16,22 @@ INTERRUPTED = 130
 CLOSED_PIPE = 141
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
+    "new": "a commented scene of one's own to start from",
+    "check": "every mistake of scenes and recipes at once; nothing is run",
     "run": "bring scenes up to date",
     "why": "for each stage: fresh, or why it would run again",
     "sweep": "many points of one scene: a dataset and a figure",
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
+    "compare": "scenes beside each other or their ideal twins: differences, errors, events, costs",
+    "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
     "frequencies": "equilibrium in a pose, and natural frequencies there",
-    "report": "all figures and tables of the paper, and results/report/index.html",
+    "report": "the page of scenes; without scenes, all figures and tables of the paper",
     "schema": "JSON schema of scene files",
     "cite": "sources of the methods and data that a scene uses",
+    "completion": "completion for bash and zsh",
+    "cache": "what is kept: size, check, explain, prune",
+    "doctor": "is all here that is needed, and does it compute",
 }
 
 
@@ -45,9 +52,21 @@ def main(arguments: list[str] | None = None) -> int:
         return CLOSED_PIPE
 
 
+class Version(argparse.Action):
+    """Prints the version, which is looked for when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and end."""
+        from pipeline.core.version import version
+
+        print(f"flexclear {version()}")
+        parser.exit()
+
+
 def parser(arguments: list[str]) -> argparse.ArgumentParser:
     """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
     top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for verb, text in COMMANDS.items():
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")

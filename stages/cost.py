@@ -34,7 +34,7 @@ FIGURES = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    run.scene_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
     parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
     parser.add_argument(
@@ -47,11 +47,14 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         run.check_target(options.page, "--page")
     peers = {} if options.peer is None else cost_peers.read(options.peer)
-    place, studies = run.workplace(), {}
-    for graph in run.graphs(options.scenes):
-        studies[graph.scene.name] = _, folder = bring(
-            graph.scene, place, peers.get(graph.scene.name, ()), options.integrators
-        )
+    place, studies = run.workplace(options), {}
+    for graph in run.graphs(options.scenes, options.set):
+        scene, others = graph.scene, peers.get(graph.scene.name, ())
+        if not options.integrators:
+            # the points of the scene's own method come first: a table within a minute, of which the whole study is more
+            _, folder = bring(scene, place, others, [scene.solver.integrator])
+            print((folder / PRINTED[0]).read_text(), f"so far {scene.solver.integrator} alone; going on\n", sep="\n")
+        studies[scene.name] = _, folder = bring(scene, place, others, options.integrators)
         print(*((folder / name).read_text() for name in PRINTED if (folder / name).is_file()), sep="\n")
         print(f"figures and data: {folder}\n")
     if options.page is not None:
@@ -148,8 +151,7 @@ def _kernels(designs: list[cost_design.Design]) -> dict[tuple[str, ...], Task]:
 
 
 def _bundles(design: cost_design.Design) -> dict[str, Task]:
-    graph = Graph(design.scene, shown=False, recipe=design.recipe)
-    return {f"bundle/{body}": task for body, task in graph.bundle.items()}
+    return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
 
 
 def _measured(

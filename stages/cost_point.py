@@ -1,4 +1,7 @@
-"""One point of a cost study: a run of an edited scene, what it took, and of its result what errors need."""
+"""One point of a cost study: a run of an edited scene, what it took, and of its result what errors need.
+
+The cost of a point is that of its integration: the record is of as many rows at every tolerance and step.
+"""
 
 from __future__ import annotations
 
@@ -14,20 +17,16 @@ if TYPE_CHECKING:
 
     from pipeline.core.scene.schema import Scene
 
-#: a run is timed so often, and the median counts, but no more once this much time has been spent on it: what a
-#: longer run takes is an average by itself
-REPEATS, LONG = 3, 1.5  # [1], [s]
-
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The kept part of the run with ``cpu_repeat(repeat)`` and the other costs as attributes.
+    """The kept part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes, the
+    median time of the recording among them.
 
     params: `simulate`, as of the simulate stage, and the `quantities` of the study.  inputs: bundles, and `kernels`,
     the artifact of `stages.kernels`.  A run that the solver refuses leaves an empty dataset whose attribute `refused`
     says why: that, too, is a result of the study.
     """
-    import time
-
+    import numpy as np
     import xarray as xr
 
     from pipeline import dynamics
@@ -35,34 +34,31 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from pipeline.core.errors import SolverError
     from pipeline.core.scene.wanted import parse
 
-    scene = rebuild(params["simulate"])
+    scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
     warm(scene, reduced, progress)
-    seconds: list[float] = []
     try:
-        while not seconds or (len(seconds) < REPEATS and sum(seconds) < LONG):
-            begun = time.process_time()
-            # reports would be part of what is measured
-            done = dynamics.simulate(scene, reduced, progress if not seconds else silent)
-            seconds.append(time.process_time() - begun)
+        cost = dynamics.cost(scene, reduced, progress)
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
+    done = cost.run
     chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     kept = quantities.keep(done, chosen)
-    kept["cpu_repeat"] = (("repeat",), seconds, {"units": "s", "long_name": "processor time of a warm run"})
+    told = {"units": "s", "long_name": "processor time of the integration of a warm run"}
+    kept["cpu_repeat"] = (("repeat",), list(cost.integration), told)
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
+    costs["recording_seconds"] = float(np.median(cost.recording))
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
     return {"nc": kept.assign_attrs(**costs, **_twin(done), **_contacts(scene))}
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The contacts' statistics of an ensemble, ``standard_error(quantity)`` of the means of the series it has, and its
-    ``cpu_seconds`` per member as an attribute; or `refused`.
+    ``cpu_seconds`` of the integration of one as an attribute; or `refused`.
 
     params: `simulate`, with the ensemble, and `quantities`.  inputs: as of `run`.
     """
-    import time
-
+    import numpy as np
     import xarray as xr
 
     from pipeline import dynamics
@@ -70,14 +66,13 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     from pipeline.core.errors import SolverError
     from pipeline.core.scene.wanted import parse
 
-    scene, reduced = rebuild(params["simulate"]), bundles(inputs)
+    scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)
-    begun = time.process_time()
     try:
         done = dynamics.ensemble(scene, reduced, progress)
+        seconds = float(np.median(dynamics.cost(scene, reduced, silent).integration))
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
-    seconds = (time.process_time() - begun) / done.sizes["member"]
     kept = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
     chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}

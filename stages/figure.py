@@ -22,15 +22,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``index.json``: for each name what it needs, and whether it renders shapes.
+    """``index.json``: for each name what it needs.
 
     An artifact of its own, because asking the modules themselves takes the import of matplotlib.
     """
     found = {}
     for name in params["names"]:
         figure = import_module(f"{FIGURES}.{name}")
-        found[name] = {
-            "needs": list(figure.NEEDS),
-            "gl": bool(getattr(figure, "USES_GL", False)),
-        }
+        found[name] = {"needs": list(figure.NEEDS)}
     return {"index.json": json.dumps(found, indent=1).encode()}

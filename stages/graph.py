@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -13,14 +13,17 @@ from pipeline.core.registry import suggestion
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s3_bundle, s4_linear, s4_simulate, s6_render
+from stages import s1_mesh, s2_modes, s3_bundle, s3_rigid, s4_linear, s4_sections, s4_simulate, s6_render, s7_overview
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
 #: artifacts as figures refer to them, ``<scene>:<artifact>[/<body>]``, and the stage that makes each
-ARTIFACTS = {name: name for name in STAGES} | {"run": "simulate", "tight": "tight", "fine-modes": "fine_modes"}
+ARTIFACTS = {name: name for name in (*STAGES, "sections", "verdict", "tight")}
+ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
 #: how much tighter the tolerance of `tight` is, and how many times more elements `fine-modes` has
 TIGHTER, FINER = 1e-2, 4
+#: the tightest tolerance that makes a difference: beyond, rounding does
+TIGHTEST = 1e-13
 
 
 @dataclass(frozen=True)
@@ -41,16 +44,19 @@ class Graph:
 
     @cached_property
     def mesh(self) -> dict[str, Task]:
-        """By flexible body."""
+        """By body with a recipe."""
+        for recipe in self.scene.recipes().values():
+            s1_mesh.check_size(Path(recipe), self.scene.limits, self.recipe)
         return {
             body: self._body_task(
                 "mesh",
                 body,
                 "stages.s1_mesh:run",
-                s1_mesh.params(Path(part.mesh), self.recipe),
-                modules=s1_mesh.modules(Path(part.mesh)),
+                s1_mesh.params(Path(recipe), self.recipe),
+                modules=s1_mesh.modules(Path(recipe)),
+                context={"folder": str(Path(recipe).parent.resolve())},
             )
-            for body, part in self.scene.flexible().items()
+            for body, recipe in self.scene.recipes().items()
         }
 
     @cached_property
@@ -87,6 +93,21 @@ class Graph:
         }
 
     @cached_property
+    def rigid(self) -> dict[str, Task]:
+        """By rigid body with a recipe."""
+        return {
+            body: self._body_task(
+                "rigid",
+                body,
+                "stages.s3_rigid:run",
+                {},
+                {"mesh": self.mesh[body]},
+                s1_mesh.modules(Path(part.mesh)),
+            )
+            for body, part in self.scene.meshed().items()
+        }
+
+    @cached_property
     def simulate(self) -> Task:
         """One run; shown as ``run.nc``."""
         return self._simulation("simulate", "stages.s4_simulate:run", "run.nc", ensemble=False)
@@ -99,6 +120,22 @@ class Graph:
         return self._simulation("ensemble", "stages.s4_simulate:run_ensemble", "ensemble.nc", ensemble=True)
 
     @cached_property
+    def sections(self) -> Task:
+        """The motion looked at once in each period of its laws; shown as ``sections.nc``."""
+        params, modules = s4_sections.params(self.scene), s4_simulate.modules(self.scene)
+        return self._scene_task(
+            "sections", "stages.s4_sections:run", params, self.bodies(), names={"nc": "sections.nc"}, modules=modules
+        )
+
+    @cached_property
+    def verdict(self) -> Task:
+        """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
+        inputs = {"sections": self.sections}
+        # the figure is headed by the name, which is a fact for once
+        params: dict[str, object] = {"scene": self.scene.name}
+        return self._scene_task("verdict", "stages.s5_verdict:run", params, inputs, names={"nc": "verdict.nc"})
+
+    @cached_property
     def post(self) -> Task:
         """What is derived from the run."""
         inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
@@ -107,8 +144,8 @@ class Graph:
     @cached_property
     def render(self) -> Task:
         """Pictures and film."""
-        inputs = {"run": self.simulate, **self._bundles()}
-        return self._scene_task("render", "stages.s6_render:run", {"gl": s6_render.gl_state()}, inputs)
+        inputs = {"run": self.simulate, **self.bodies()}
+        return self._scene_task("render", "stages.s6_render:run", s6_render.params(self.scene), inputs)
 
     def linear(
         self,
@@ -123,7 +160,7 @@ class Graph:
         name = "linear" if vibrations else "equilibrium"
         modules = s4_simulate.modules(self.scene)
         return self._scene_task(
-            name, "stages.s4_linear:run", params, self._bundles(), names={"nc": f"{name}.nc"}, modules=modules
+            name, "stages.s4_linear:run", params, self.bodies(), names={"nc": f"{name}.nc"}, modules=modules
         )
 
     def up_to(self, stage: str) -> list[Task]:
@@ -150,22 +187,39 @@ class Graph:
 
     @cached_property
     def tight(self) -> Task:
-        """The same run at a tighter tolerance, to tell the error of `simulate` by."""
-        change = {"solver.rtol": TIGHTER * self.scene.solver.rtol, "accuracy": None}
+        """The same run at a tighter tolerance, or of half the step where steps are fixed, to tell its error by."""
+        solver = self.scene.solver
+        finer = {"rtol": max(TIGHTER * solver.rtol, TIGHTEST)} if solver.step is None else {"step": 0.5 * solver.step}
+        change = {f"solver.{key}": value for key, value in finer.items()} | {"accuracy": None}
         return Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
+
+    @property
+    def has_tighter(self) -> bool:
+        """Whether there is a tighter tolerance that tells the error of a run."""
+        return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
+
+    @cached_property
+    def overview(self) -> Task:
+        """General figures of the run."""
+        inputs = {"run": self.simulate, "post": self.post}
+        task = self._scene_task("overview", "stages.s7_overview:run", s7_overview.params(self.scene), inputs)
+        return replace(task, part="figures", folder=self._folder("figures"))
 
     @cached_property
     def fine_modes(self) -> dict[str, Task]:
         """The modes on a finer mesh, to tell the error of `modes` by; by flexible body."""
         return Graph(self.scene, shown=False, recipe={**self.recipe, "elements": FINER}).modes
 
-    def _bundles(self) -> dict[str, Task]:
-        return {f"bundle/{body}": task for body, task in self.bundle.items()}
+    def bodies(self) -> dict[str, Task]:
+        """The tasks of bodies that runs need, as these call them: ``bundle/<body>``, ``rigid/<body>``."""
+        return {f"bundle/{body}": task for body, task in self.bundle.items()} | {
+            f"{s3_rigid.PREFIX}{body}": task for body, task in self.rigid.items()
+        }
 
     def _simulation(self, stage: str, run: str, name: str, *, ensemble: bool) -> Task:
         params = s4_simulate.params(self.scene, ensemble=ensemble)
         modules = s4_simulate.modules(self.scene)
-        return self._scene_task(stage, run, params, self._bundles(), names={"nc": name}, modules=modules)
+        return self._scene_task(stage, run, params, self.bodies(), names={"nc": name}, modules=modules)
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""
@@ -182,6 +236,7 @@ class Graph:
         return Task(
             stage=stage,
             scene=self.scene.name,
+            context={"name": self.scene.name, "limits": self.scene.limits.written()},
             run=run,
             params=params,
             folder=self._folder(),
@@ -198,11 +253,13 @@ class Graph:
         params: dict[str, object],
         inputs: dict[str, Task] | None = None,
         modules: tuple[str, ...] = (),
+        context: dict[str, str] | None = None,
     ) -> Task:
         return Task(
             stage=stage,
             scene=self.scene.name,
             part=body,
+            context=context or {},
             run=run,
             params=params,
             folder=self._folder(stage),

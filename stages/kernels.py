@@ -45,7 +45,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     import xarray as xr
 
     begun = _processor_time()
-    warm(s4_simulate.rebuild(params["simulate"]), s4_simulate.bundles(inputs), progress)
+    warm(s4_simulate.rebuild(params["simulate"], inputs), s4_simulate.bundles(inputs), progress)
     return {"nc": xr.Dataset(attrs={"compile_seconds": _processor_time() - begun})}
 
 

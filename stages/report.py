@@ -1,4 +1,7 @@
-"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them."""
+"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them.
+
+With scenes it is the report of these (`stages.own_report`).
+"""
 
 from __future__ import annotations
 
@@ -15,22 +18,33 @@ from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
 from pipeline.core.workflow.fingerprint import TREE
 from pipeline.core.workflow.task import Task
-from stages import kernels, s4_simulate, s6_render, timing
+from stages import kernels, run, s4_simulate, s6_render, timing
 from stages.figure import FIGURES
 from stages.graph import Graph
-from stages.run import Workplace, check, workplace
+from stages.run import Workplace, check
 
 #: the scene whose film and pictures the page shows: the paper's full model
 HEADLINE = "sps4/far_csj_cb"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """It takes nothing."""
+    """What the command takes."""
+    parser.add_argument(
+        "scenes", nargs="*", metavar="SCENE", help="the report of these scenes; without any, that of the paper"
+    )
+    run.common_arguments(parser)
 
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
-    print(make(workplace()))
+    place = run.workplace(options)
+    if not options.scenes:
+        print(make(place))
+        return
+    from stages import own_report
+
+    for graph in run.graphs(options.scenes, options.set):
+        print(run.near(own_report.make(graph, place)))
 
 
 @dataclass(frozen=True)
@@ -61,7 +75,7 @@ class Scenes:
             scene=family,
             run="stages.timing:run",
             params={g.scene.name: s4_simulate.params(g.scene) for g in graphs},
-            inputs={f"{g.scene.name}:bundle/{body}": task for g in graphs for body, task in g.bundle.items()}
+            inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
             | _paper_kernels(graphs),
             modules=tuple(sorted({name for g in graphs for name in s4_simulate.modules(g.scene)})),
             folder=f"runs/{family}",
@@ -74,9 +88,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
     found: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
-        scene = timing.paper_scene(graph.scene)
-        bundles = {f"bundle/{body}": task for body, task in graph.bundle.items()}
-        found.setdefault(kernels.shared(scene), kernels.task(scene, bundles))
+        for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
+            found.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 
@@ -94,7 +107,7 @@ def make(place: Workplace) -> Path:
     if s6_render.gl_state().endswith("none"):
         from pipeline.post.render import gl
 
-        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.REMEDY}")
+        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(shown)
     return place.store.root / "report" / "index.html"
 
@@ -151,7 +164,7 @@ def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
         scene="report",
         part=name,
         run="stages.figure:run",
-        params={"figure": name} | ({"gl": s6_render.gl_state()} if entry["gl"] else {}),
+        params={"figure": name},
         inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
         modules=(f"{FIGURES}.{name}",),
         folder="tables" if name.startswith("table") else "figures",

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipeline.core.artifacts.disk import disk_limits
 from pipeline.core.artifacts.paths import results_root
-from pipeline.core.artifacts.store import Store, disk_limits, write_dataset
-from pipeline.core.errors import FlexclearError, InputError, InputErrors
-from pipeline.core.scene.load import load_scene
+from pipeline.core.artifacts.store import Store, write_dataset
+from pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
+from pipeline.core.scene import lines
+from pipeline.core.scene.demand import check_run
+from pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
+from pipeline.core.scene.references import dangling
 from pipeline.core.workflow.fingerprint import TREE, Sources
-from pipeline.core.workflow.progress import Monitor
+from pipeline.core.workflow.progress import WARNING, Monitor
 from pipeline.core.workflow.schedule import Failure, Outcome, bring
 from pipeline.core.workflow.task import Task
+from stages import owner
 from stages.graph import STAGES, Graph
 
 if TYPE_CHECKING:
@@ -27,7 +35,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    scene_arguments(parser)
     parser.add_argument(
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
@@ -40,14 +48,55 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
     if options.out is not None:
         check_target(options.out)
-    wanted = graphs(options.scenes)
-    place = workplace()
+    wanted = graphs(options.scenes, options.set)
+    place = workplace(options)
+    for graph in wanted:
+        check_run(graph.scene, place.store.root)
+        taken = owner.claim(graph.scene, place.store)
+        if taken is not None:
+            place.monitor.say(taken)
     outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
         print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in wanted))))
     if options.out is not None:
         copy_run(wanted[0], place, options.out)
+    for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
+        told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+    conclude(wanted, place, outcome)
+
+
+def scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """What all commands take that bring scenes up to date."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    common_arguments(parser)
+
+
+def common_arguments(parser: argparse.ArgumentParser) -> None:
+    """Values to change, processes, and how much is said."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
+    )
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
+    said = parser.add_mutually_exclusive_group()
+    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
+    said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
+
+
+def told(folder: Path, files: Mapping[str, str]) -> None:
+    """One line on what was written where, of those files that are there."""
+    there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
+    if there:
+        print(f"{near(folder)}: {', '.join(there)}")
+
+
+def near(path: Path) -> str:
+    """A path as seen from the current folder, where it lies below it."""
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
 
 
 @dataclass(frozen=True)
@@ -57,10 +106,11 @@ class Workplace:
     store: Store
     sources: Sources
     monitor: Monitor = field(default_factory=Monitor)
+    jobs: int | None = None
 
     def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
-        """Bring tasks up to date over the cores there are."""
-        return bring(tasks, self.store, self.sources, self.monitor, jobs)
+        """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
+        return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
 
 
 class FailedTasksError(FlexclearError):
@@ -71,20 +121,30 @@ class FailedTasksError(FlexclearError):
         self.exit_code = failures[0].exit_code
 
 
-def workplace() -> Workplace:
-    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says."""
-    monitor = Monitor()
+class MissedAccuracyError(SolverError):
+    """Runs are not as accurate as their scenes ask; what there is is kept, and says so."""
+
+
+def workplace(options: argparse.Namespace | None = None) -> Workplace:
+    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says.
+
+    options: of a command, with `jobs` and how much is said.
+    """
+    monitor = Monitor(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    jobs = getattr(options, "jobs", None)
+    if jobs is not None and jobs < 1:
+        raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
     root = results_root()
-    return Workplace(Store(root, say=monitor.say), Sources(TREE, root / "cache" / "imports.json"), monitor)
+    return Workplace(Store(root, say=monitor.say), Sources(TREE, root / "cache" / "imports.json"), monitor, jobs)
 
 
 def find_scene(name: str) -> Path:
     """The file of a scene given by path or by name (``sps4/csj``). InputError names what is near."""
     path = Path(name)
-    if path.suffix == ".toml" or path.is_file():
+    if path.suffix == ".toml" or is_file(path):
         return path
     named = TREE / "scenes" / f"{name}.toml"
-    if named.is_file():
+    if is_file(named):
         return named
     raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
 
@@ -97,18 +157,48 @@ def _known(name: str) -> str:
 
 
 def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
-    """Dataset of the simulate stage, brought up to date; titled as the scene is.
+    """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
     An edited scene (`override`) is cached like any other but does not take the place of its file's
     results under results/runs.  Raises FlexclearError.
     """
+    require_names(scene)
     place = place or workplace()
     import_module("pipeline.core.artifacts.modal")  # gives the dataset its accessor
-    task = Graph(scene, shown=_as_in_its_file(scene)).simulate
+    task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
+
+
+def graph(scene: Scene) -> Graph:
+    """The tasks of a scene; an edited one does not take the place of its file's results under results/runs."""
+    require_names(scene)
+    return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
+
+
+def rendered(scene: Scene, place: Workplace | None = None) -> Path:
+    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
+    place, wanted = place or workplace(), Graph(scene)
+    require_names(scene)
+    check(place.bring([wanted.render], jobs=1))
+    return place.store.root / wanted.render.folder
+
+
+def results(scene: Scene | str | Path) -> xr.DataTree:
+    """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
+    import xarray as xr
+
+    import_module("pipeline.core.artifacts.modal")
+    name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
+    name = scene_name(Path(name)) if name.endswith(".toml") else name
+    folder = results_root() / "runs" / name
+    files = sorted(path for path in folder.rglob("*.nc") if len(path.relative_to(folder).parts) <= 2)
+    if not files:
+        raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
+    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.open_dataset(path) for path in files}
+    return xr.DataTree.from_dict(tree, name=folder.name)
 
 
 def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
@@ -150,11 +240,11 @@ def linear(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
     place = place or workplace()
-    graph = Graph(scene, shown=_as_in_its_file(scene))
+    graph = Graph(scene, shown=as_in_its_file(scene))
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
 def check(outcome: Outcome) -> None:
@@ -163,26 +253,105 @@ def check(outcome: Outcome) -> None:
         raise FailedTasksError(outcome.failures)
 
 
-def _as_in_its_file(scene: Scene) -> bool:
+def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome) -> None:
+    """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
+
+    Raises MissedAccuracyError, after that, for runs that are not as accurate as their scene asks.
+    """
+    missed = []
+    for graph in graphs:
+        record = outcome.records.get(id(graph.simulate))
+        if record is None:
+            continue
+        for sentence in filter(None, record.said.get("warnings", "").split("\n")):
+            place.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
+        verdict, wanted = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
+        if verdict != "met" and wanted is not None:
+            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is kept"
+            if wanted.allow_missed:
+                place.monitor.say(text)
+            else:
+                missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
+    if missed:
+        raise MissedAccuracyError("\n".join(missed))
+
+
+def as_in_its_file(scene: Scene) -> bool:
+    """Whether a scene is what its file says, so that its results take their place below results/runs."""
     return scene.path is not None and load_scene(scene.path) == scene
 
 
-def graphs(names: list[str]) -> list[Graph]:
-    """Graphs of the scenes, each once; the mistakes of all scenes are told together."""
-    found: dict[str, Graph] = {}
+def overrides(settings: Sequence[str]) -> dict[str, object]:
+    """``KEY=VALUE`` texts as edits of a scene; a value is what TOML reads, else text. InputError for other texts."""
+    found: dict[str, object] = {}
+    for text in settings:
+        key, sign, value = text.partition("=")
+        if not sign or not key.strip():
+            raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
+        try:
+            found[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            found[key.strip()] = value.strip()
+    return found
+
+
+def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
+    """The scene called `name` with `settings` changed; its own name then tells them, and so do its results."""
+    scene = load_scene(find_scene(name), overrides(settings))
+    if settings:
+        scene._name = f"{scene.name}," + ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings)
+    return scene
+
+
+def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
+    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are told together."""
+    found: dict[Path | str, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
         try:
-            graph = Graph(load_scene(find_scene(name)))
-            graph.up_to("post")
-            found[graph.scene.name] = graph
+            graph = Graph(loaded(name, settings))
+            require_names(graph.scene)
+            with in_file(graph.scene.path):
+                graph.up_to("post")
+            path = graph.scene.path
+            found[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputErrors as errors:
             wrong.extend(errors.errors)
         except InputError as error:
             wrong.append(error)
     if wrong:
-        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+        told = [lines.located(error) for error in wrong]
+        raise told[0] if len(told) == 1 else InputErrors(told)
+    owner.refuse_namesakes([graph.scene for graph in found.values()])
     return list(found.values())
+
+
+@contextmanager
+def in_file(path: Path | None) -> Iterator[None]:
+    """Errors whose place names no file are placed in this one."""
+    try:
+        yield
+    except InputError as error:
+        if path is None or not error.place.startswith("["):
+            raise
+        raise InputError(f"{path} {error.place}", error.problem, error.remedy) from None
+
+
+def require_names(scene: Scene) -> None:
+    """InputErrors for names in a scene that lead nowhere, before a mesh or a mode is computed for it."""
+    table = scene.model_dump(mode="python", exclude_none=True)
+    wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
+    if wrong:
+        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+
+
+def recipe_frames(mesh: str) -> list[str] | None:
+    """Names of the frames in a mesh recipe; None where it cannot be read, which is told elsewhere."""
+    try:
+        frames = read_toml(Path(mesh)).get("frames")
+    except InputError:
+        return None
+    return list(frames) if isinstance(frames, dict) else None
 
 
 def copy_run(graph: Graph, place: Workplace, target: Path) -> None:

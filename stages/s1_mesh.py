@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 from collections.abc import Mapping
 from importlib import import_module
@@ -11,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.core.errors import InputError
 from pipeline.core.registry import module_of
-from pipeline.core.scene.load import read_toml
+from pipeline.core.scene.limits import Limits, check_cells
+from pipeline.core.scene.load import is_file, read_toml
+from pipeline.core.workflow import opened
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,11 +21,11 @@ if TYPE_CHECKING:
 
 KINDS = "pipeline.structure.kinds"
 #: keys of a recipe's shape that name files
-FILES = ("file", "stiffness", "mass")
+FILES = ("file", "stiffness", "mass", "unknowns")
 
 
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The recipe's content; where it lies does not matter. Raises InputError when it cannot be read.
+    """The recipe's content; its name and folder do not matter. Raises InputError when it cannot be read.
 
     edits: values that take the place of the recipe's; of `elements` a factor.
     """
@@ -32,7 +33,16 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     changes = dict(edits or {})
     if "elements" in changes:
         changes["elements"] = changes["elements"] * table["elements"]
-    return {"recipe": table | changes} | _files(table, recipe.parent)
+    for path in _files(table, recipe.parent):
+        if not is_file(path):
+            raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
+    return {"recipe": table | changes}
+
+
+def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:
+    """ResourceError when the mesh would have more cells than it may; files are judged when they are read."""
+    table = params(recipe, edits)["recipe"]
+    check_cells(table.get("shape"), table.get("elements"), limits, recipe)
 
 
 def modules(recipe: Path) -> tuple[str, ...]:
@@ -47,27 +57,27 @@ def kind_of(recipe: Path) -> str:
     return str(kinds.get(str(shape.get("type")), "beam")) if isinstance(shape, Mapping) else "beam"
 
 
-def _files(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Where the files lie that a recipe names, and what is in them; nothing for a recipe without files."""
+def _files(table: Mapping[str, Any], folder: Path) -> list[Path]:
+    """The files that a recipe names; others that their formats need are not known before they are read."""
     shape = table.get("shape")
     named = shape if isinstance(shape, Mapping) else {}
-    found = {str(named[key]): folder / str(named[key]) for key in FILES if key in named}
-    missing = [path for path in found.values() if not path.is_file()]
-    if missing:
-        raise InputError(f"{folder} [shape]", f"there is no file {missing[0]}", "paths are relative to the recipe")
-    if not found:
-        return {}
-    digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in found.items()}
-    return {"folder": str(folder.resolve()), "sha256": digests}
+    return [folder / str(named[key]) for key in FILES if key in named]
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``."""
+    """The mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``.
+
+    params: besides the recipe its folder, which the files that it names are relative to.
+    """
     from pipeline.structure.kinds import kind
 
+    folder = Path(params.get("folder", "."))
+    for path in _files(params["recipe"], folder):
+        opened.note(path)  # some readers are not written in Python
+
     part = kind.of_recipe(params["recipe"])
-    result = part.build(params["recipe"], Path(params.get("folder", ".")))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "mesh.vtu"
+    result = part.build(params["recipe"], folder)
+    with tempfile.TemporaryDirectory() as made:
+        path = Path(made) / "mesh.vtu"
         part.write_vtu(result, path)
         return {"nc": result, "vtu": path.read_bytes()}

@@ -33,5 +33,5 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     pose = params["pose"]
     solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium
-    scene, bundles = s4_simulate.rebuild(params), s4_simulate.bundles(inputs)
+    scene, bundles = s4_simulate.rebuild(params, inputs), s4_simulate.bundles(inputs)
     return {"nc": solve(scene, bundles, progress, pose["time"], pose["drives"], pose["moving"])}

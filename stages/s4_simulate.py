@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from pipeline.core.artifacts.paths import results_root
+from pipeline.core.scene.demand import check_run
+from stages import s3_rigid
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -13,14 +16,28 @@ if TYPE_CHECKING:
     from pipeline.core.scene.schema import Scene
 
 
-def params(scene: Scene, *, ensemble: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles and the place of files on disk are not part of it,
-    nor is the ensemble of a single run, nor in an ensemble the accuracy of a single run."""
-    left_out = {"title", "description", "accuracy" if ensemble else "ensemble"}
+def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
+    """What the engine sees of a scene. Titles, views, limits, and places and names of files are not part of it,
+    nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
+    whether that may be missed."""
+    unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
+    left_out: dict[str, Any] = dict.fromkeys(unseen, True)
+    if not ensemble:
+        left_out["accuracy"] = {"allow_missed"}
+    if not sections:
+        left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
-    for body in scene.flexible():
-        table["body"][body]["mesh"] = Path(table["body"][body]["mesh"]).name
-    return {"name": scene.name, "scene": table}
+    for body in scene.recipes():
+        table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
+    return {"scene": without_file_names(table)}
+
+
+def without_file_names(node: Any) -> Any:
+    """The same, but for the names of files that laws were read from: their numbers are there."""
+    if isinstance(node, dict):
+        read = node.get("type") == "table" and "points" in node
+        return {k: "" if read and k == "file" else without_file_names(value) for k, value in node.items()}
+    return [without_file_names(item) for item in node] if isinstance(node, list) else node
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
@@ -37,7 +54,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
     from pipeline import dynamics
 
-    scene, reduced = rebuild(params), bundles(inputs)
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
+    check_run(scene, results_root())
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
         progress(None, text)
@@ -63,7 +81,9 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
     from pipeline import dynamics
 
-    return {"nc": dynamics.ensemble(rebuild(params), bundles(inputs), progress)}
+    scene = rebuild(params, inputs)
+    check_run(scene, results_root())
+    return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
 
 
 def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
@@ -71,10 +91,16 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
-def rebuild(params: Mapping[str, Any]) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name."""
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
+    """The scene again, from what `params` kept of it; its title is its name, where that is told.
+
+    inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
+    """
     from pipeline.core.scene.schema import Scene
 
-    scene = Scene.model_validate({**params["scene"], "title": params["name"]})
-    scene._name = params["name"]
+    table, name = params["scene"], str(params.get("name", "scene"))
+    body = s3_rigid.filled(table["body"], inputs or {})
+    told = {"body": body, "title": name, "limits": params.get("limits", {})}
+    scene = Scene.model_validate({**table, **told})
+    scene._name = name
     return scene

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from pipeline.core.progress import Progress
+    from pipeline.core.scene.schema import Scene
 
 
 def gl_state() -> str:
@@ -20,8 +21,16 @@ def gl_state() -> str:
     return gl.state()
 
 
+def params(scene: Scene) -> dict[str, Any]:
+    """GL libraries, what is watched, and from where, if the scene says so."""
+    asked = scene.view.direction if scene.view is not None else None
+    watched = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
+    return {"gl": gl_state(), "watched": watched} | ({} if asked is None else {"direction": list(asked)})
+
+
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Pictures by file name; inputs are ``run`` and ``bundle/<body>``."""
     from pipeline.post.render.pictures import pictures
 
-    return dict(pictures(inputs["run"], bundles(inputs), progress=progress))
+    view = {"watched": params["watched"], "direction": params.get("direction")}
+    return dict(pictures(inputs["run"], bundles(inputs), progress=progress, **view))

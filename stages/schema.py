@@ -1,17 +1,24 @@
-"""``flexclear schema``: JSON schema of scene files."""
+"""``flexclear schema``: JSON schemas of scene files and mesh recipes."""
 
 from __future__ import annotations
 
 import argparse
 import json
 
-from pipeline.core.scene.schema import Scene
+KINDS = ("scene", "recipe")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """It takes nothing."""
+    """What the command takes."""
+    parser.add_argument(
+        "kind", nargs="?", choices=KINDS, default="scene", metavar="KIND", help="scene (default) or recipe"
+    )
 
 
 def command(options: argparse.Namespace) -> None:
     """Print it."""
-    print(json.dumps(Scene.model_json_schema(), indent=2))
+    if options.kind == "scene":
+        from pipeline.core.scene.json_schema import scene_schema as schema
+    else:
+        from pipeline.structure.fe.json_schema import recipe_schema as schema
+    print(json.dumps(schema(), indent=2))

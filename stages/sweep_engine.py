@@ -1,4 +1,4 @@
-"""Who runs the points of a sweep: this process, the cores of this machine, or a Dask cluster; all give the same bytes."""
+"""Who runs the points of a sweep: this process, the cores of this machine, or a Dask cluster; with equal results."""
 
 from __future__ import annotations
 

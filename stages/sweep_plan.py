@@ -182,7 +182,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
             raise InputError(
                 f"{where} [keep]", f"'{one.quantity.owner}' leads a frame along a path and has no single force"
             )
-    if sweep.members and not base.contacts():
+    if sweep.members and not base.contacts() and not base.stop:
         raise InputError(
             f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
         )

@@ -11,14 +11,14 @@ from stages.graph import STAGES
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE")
+    run.scene_arguments(parser)
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    place = run.workplace()
-    for graph in run.graphs(options.scenes):
+    place = run.workplace(options)
+    for graph in run.graphs(options.scenes, options.set):
         print(graph.scene.name)
         for state in states(graph.up_to(options.to), place.store, place.sources):
             lines = list(state.why) or ["fresh"]

@@ -23,6 +23,5 @@ def root() -> Path:
 
 @pytest.fixture(scope="session", autouse=True)
 def _results_apart(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """No test reads or writes the results of the project itself; compiled kernels are shared."""
-    os.environ.setdefault("FLEXCLEAR_KERNELS", str(ROOT / "results" / "cache" / "kernels"))
+    """No test reads or writes the results of the project itself; compiled kernels are the user's."""
     os.environ["FLEXCLEAR_RESULTS"] = str(tmp_path_factory.mktemp("results"))

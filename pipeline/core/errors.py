@@ -2,6 +2,23 @@
 
 from __future__ import annotations
 
+#: bytes of each piece of an error that are shown, and of all errors of a file together
+LONGEST, TOGETHER = 1000, 3500
+
+
+def shown(text: str, longest: int = LONGEST) -> str:
+    """Text as it may stand on a terminal: control characters spelt out, the middle of what is long left out."""
+    if len(text) > longest:  # first, since what is left is looked at character by character
+        text = _short(text, longest)
+    text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
+    return _short(text, longest) if len(text.encode(errors="replace")) > longest else text
+
+
+def _short(text: str, longest: int) -> str:
+    whole, half = text.encode(errors="replace"), longest // 2
+    ends = (part.decode(errors="ignore") for part in (whole[:half], whole[-half:]))
+    return f" ... ({len(whole) - 2 * half} bytes left out) ... ".join(ends)
+
 
 class FlexclearError(Exception):
     """Base of all expected failures; `exit_code` is what the command returns."""
@@ -20,9 +37,10 @@ class InputError(FlexclearError):
     exit_code = 2
 
     def __init__(self, place: str, problem: str, remedy: str | None = None) -> None:
-        self.place, self.problem, self.remedy = place, problem, remedy
-        text = f"{place}: {problem}"
-        super().__init__(text if remedy is None else f"{text}\n  hint: {remedy}")
+        self.place, self.problem = shown(place), shown(problem)
+        self.remedy = None if remedy is None else shown(remedy)
+        text = f"{self.place}: {self.problem}"
+        super().__init__(text if remedy is None else f"{text}\n  hint: {self.remedy}")
 
 
 class InputErrors(InputError):  # noqa: N818 - several of them
@@ -30,7 +48,13 @@ class InputErrors(InputError):  # noqa: N818 - several of them
 
     def __init__(self, errors: list[InputError]) -> None:
         self.errors = errors
-        FlexclearError.__init__(self, "\n".join(str(error) for error in errors))
+        told: list[str] = []
+        for error in errors:
+            if told and sum(len(text.encode()) + 1 for text in (*told, str(error))) > TOGETHER:
+                told.append(f"... and {len(errors) - len(told)} more")
+                break
+            told.append(str(error))
+        FlexclearError.__init__(self, "\n".join(told))
 
 
 class SolverError(FlexclearError):

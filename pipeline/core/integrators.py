@@ -30,7 +30,6 @@ class Traits:
     estimates: it estimates its error, by which steps can be chosen; otherwise a scene must give their length.
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
     retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
-    passes_singular: a step can be laid over a singular pose of the closures; Newton's matrix may turn over in it.
     hands_over_to: implicit method that goes on where stability limits the steps that it chooses, and that is named as
         the remedy where steps are given; empty for methods that are stable themselves.
     tolerances, steps: at which `flexclear cost` runs it; steps in s.
@@ -43,7 +42,6 @@ class Traits:
     estimates: bool = True
     dissipative: bool = False
     retracts: bool = False
-    passes_singular: bool = True
     hands_over_to: str = ""
     tolerances: tuple[float, ...] = ()
     steps: tuple[float, ...] = ()
@@ -59,8 +57,8 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
             "adams", 4, multistep=True, estimates=False, hands_over_to=STIFF, steps=STEPS
         ),
         "generalized-alpha": Traits(
-            "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, passes_singular=False, steps=STEPS
+            "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),
-        "radau": Traits("radau", 5, implicit=True, passes_singular=False, tolerances=TO_1E_9),
+        "radau": Traits("radau", 5, implicit=True, tolerances=TO_1E_9),
     }
 )

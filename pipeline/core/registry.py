@@ -16,6 +16,8 @@ from pipeline.core.errors import InputError
 
 #: most names that a hint lists
 LISTED = 40
+#: longer names are compared with none
+LONGEST_NAME = 100
 
 
 def listed(package: str, name: str, *, where: str, table: str = "NAMES") -> tuple[str, str]:
@@ -58,7 +60,8 @@ def module_name(name: str) -> str:
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     """'did you mean ...?' for the nearest known name, or a list of those there are."""
-    near = difflib.get_close_matches(name, list(known), n=1)
+    # the comparison takes the product of both lengths
+    near = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
     if near:
         return f"did you mean '{near[0]}'?"
     names = sorted(known)

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import math
 import re
+import sys
 from collections.abc import Iterable
-from functools import cache
+from functools import lru_cache
+
+#: a number that is written with a comma
+_COMMA = re.compile(r"\s*[-+]?\d+,\d")
 
 Exponents = tuple[float, float, float, float]
 
@@ -88,6 +92,10 @@ UNITS: dict[str, tuple[float, str]] = {
     "N m/rad": (1.0, "torsional stiffness"),
     "N m/deg": (180.0 / math.pi, "torsional stiffness"),
     "N m s/rad": (1.0, "torsional damping"),
+    "m/rad": (1.0, "length per angle"),
+    "rad/m": (1.0, "angle per length"),
+    "N/rad": (1.0, "force per angle"),
+    "N s/rad": (1.0, "force per angular velocity"),
     "%": (1e-2, "number"),
 }
 
@@ -119,14 +127,24 @@ _EXPONENTS: dict[str, Exponents] = {
     "damping": (1, 0, -1, 0),
     "torsional stiffness": (1, 2, -2, -1),
     "torsional damping": (1, 2, -1, -1),
+    "stiffness per time": (1, 0, -3, 0),
+    "torsional stiffness per time": (1, 2, -3, -1),
+    "force per time": (1, 1, -3, 0),
+    "force per angle and time": (1, 1, -3, -1),
+    "length per angle": (0, 1, 0, -1),
+    "angle per length": (0, -1, 0, 1),
+    "force per angle": (1, 1, -2, -1),
+    "force per angular velocity": (1, 1, -1, -1),
 }
 _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d+(?:\.\d+)?))?")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
 
+#: characters of a quantity; more are none
+LONGEST = 200
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
 
 
-@cache
+@lru_cache(maxsize=4096)
 def unit(text: str) -> tuple[float, str] | None:
     """Factor to SI and dimension of a unit, or of a product of units such as ``"N mm/deg"``; None when it is none.
 
@@ -166,7 +184,7 @@ def coefficient(value: object, dimension: str, order: int) -> float:
 
     A bare number is in SI; text must have the unit of the value over seconds to that power.
     """
-    match = _QUANTITY.match(value) if isinstance(value, str) else None
+    match = _parts(value) if isinstance(value, str) else None
     if match is None or match[2] is None:
         return quantity(value, "number")
     kg, m, s, rad = _EXPONENTS[dimension]
@@ -213,19 +231,28 @@ def _read(value: object, dimension: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
     if isinstance(value, str):
-        match = _QUANTITY.match(value)
+        match = _parts(value)
         if match is None:
-            raise ValueError(f"'{value}' is not a number with a unit")
+            what = "a number" if dimension == "number" else f"a number with a unit, as '1 {_example(dimension)}'"
+            raise ValueError(f"'{value}' is not {what}")
+        if _COMMA.match(value):
+            raise ValueError(f"'{value}' has a decimal comma; numbers have a decimal point")
         number, written = float(match[1]), match[2]
         factor, found = (1.0, dimension) if written is None else _known_unit(written, dimension)
         if found != dimension:
             raise ValueError(f"'{value}' is {a(found)}, but {a(dimension)} belongs here, in {_known(dimension)}")
         result = number * factor
     else:
-        result = float(value)
+        result = float(value) if abs(value) <= sys.float_info.max else math.inf
     if not math.isfinite(result):
         raise ValueError(f"{value!r} is not a finite number")
     return result
+
+
+def _parts(text: str) -> re.Match[str] | None:
+    """Number and unit; white space at the ends is not left to the expression, which would try it in many ways."""
+    text = text.strip()
+    return _QUANTITY.fullmatch(text) if len(text) <= LONGEST else None
 
 
 def any_quantity(value: object) -> float | str:
@@ -234,7 +261,7 @@ def any_quantity(value: object) -> float | str:
     For places whose dimension another part of the scene decides; `quantity` reads the result.
     Raises ValueError as `quantity` does.
     """
-    match = _QUANTITY.match(value) if isinstance(value, str) else None
+    match = _parts(value) if isinstance(value, str) else None
     written = match[2] if match is not None else None
     if written is None or written == "%":
         return quantity(value, "number")

@@ -10,8 +10,9 @@ if TYPE_CHECKING:
 
     from pipeline.core.progress import Progress
     from pipeline.core.scene.schema import Scene
+    from pipeline.dynamics.record.cost import Cost
 
-__all__ = ["ensemble", "equilibrium", "frequencies", "simulate"]
+__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -26,7 +27,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
-        for sentence in warnings(done.engine.model, done.trajectory):
+        for sentence in warnings(done):
             progress(None, f"warning: {sentence}")
         return dataset(done)
 
@@ -37,9 +38,23 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     return deliver(scene, once, progress)
 
 
+def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:
+    """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
+    from pipeline.dynamics.record.cost import measure
+
+    return measure(scene, bundles, progress, checked=checked)
+
+
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from pipeline.dynamics.record.ensemble import ensemble as run
+
+    return run(scene, bundles, progress)
+
+
+def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """A scene whose laws repeat, looked at once in each period (schema SECTIONS)."""
+    from pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)
 

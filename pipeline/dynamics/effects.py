@@ -29,7 +29,8 @@ WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "pi
 class Parts:
     """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
 
-    surfaces, forms, frictions: of contacts.  harmonics: whether a law of time has some.
+    surfaces, forms, frictions: of contacts.  stops: whether joint coordinates have ends.
+    couplings: whether they follow each other.      harmonics: whether a law of time has some.
     """
 
     joints: tuple[str, ...]
@@ -37,6 +38,8 @@ class Parts:
     forms: tuple[str, ...] = ()
     frictions: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
+    stops: bool = False
+    couplings: bool = False
     closures: bool = False
     flexible: bool = False
     stiffening: bool = False
@@ -82,9 +85,11 @@ def most_parts(scene: Scene) -> Parts:
     return Parts(
         joints=tuple(sorted({"free", *ideal, *chained})),
         surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
-        forms=tuple(sorted(import_module(FORMS).NAMES)) if contacts else (),
+        forms=tuple(sorted(import_module(FORMS).NAMES)) if contacts or scene.stop else (),
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load.type for load in scene.forces().values()})),
+        stops=bool(scene.stop),
+        couplings=bool(scene.gear),
         closures=True,
         flexible=bool(scene.flexible()),
         stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
@@ -109,6 +114,8 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]")
         if contact.friction is not None:
             yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")
+    for name, stop in scene.stop.items():
+        yield Named(NORMAL_LAWS, stop.normal.law, f"[stop.{name}.normal]")
     for law in sorted(_laws(scene)):
         yield Named(LAWS, law, "law")
     for name, load in scene.load.items():

@@ -141,8 +141,8 @@ class Room:
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
-    MOST_MODES, N_LAWS, N_LOADS, N_TURNS, LOAD_SLOT,
-) = _places(25)
+    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES,
+) = _places(27)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 EVALUATE, PROJECT, RETRACT = ADDRESSES = _places(3)
@@ -158,22 +158,27 @@ PORTS = wiring("flex column shapes")  # column, shapes: first of them
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
 ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
-CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept")
+#: coupling: that this closure is, or -1
+CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept coupling")
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
-ENTRIES = wiring("slot column sign")  # slot: in the support
-KNOWN_ENTRIES = wiring("closure drive column sign")
+ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
+KNOWN_ENTRIES = wiring("closure drive column sign part")
+COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
 #: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
-CONTACTS = wiring("outer inner normal friction surfaces bristle")
+CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
-#: a: site, -1 where the world holds against it; turns: angle that it follows or -1; follows: whether it turns with its
-#: frame; how its coordinate is measured: turning or sliding, frame (side) and axis, entries of R_FG
-LOADS = wiring("a b law0 turns follows turning side axis sine_f sine_g cosine_f cosine_g")
+#: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame
+LOADS = wiring("a b law0 number0 gauge measured internal0 follows")
 LOAD_KINDS = wiring("load0 n_loads")
+#: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
+#: turns: place of the angle with its full turns among the internal states or -1
+GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
 GROUPS = wiring("group")  # error group of each state variable
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
@@ -184,11 +189,12 @@ FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), sti
 MOMENT_VALUES = numbers("value")
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
-#: radius: of the inner surface
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6")
+#: radius: of the inner surface; shape: what else its kind of surfaces has
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2")
+COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
-LOAD_NUMBERS = numbers("value:5")  # see `loads`
+LOAD_NUMBERS = numbers("value")  # see `loads`
 GRAVITY = numbers("acceleration:3")
 FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
 
@@ -205,10 +211,15 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _places(9)
-ROWS = work("moment:3 force:3")  # wrenches of the closure rows
+#: wrenches of the closure rows; then, of the couplings, those on their first joints
+ROWS = work("moment:3 force:3")
 #: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
 JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _places(6)
+#: per kept row its distance from those before it, at the end of the step, at its start, and the most that it has been,
+#: each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
+INDEPENDENCE, COLLOCATION = _places(2)
+COLLOCATION_ROWS = 13
 #: smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
@@ -218,7 +229,7 @@ LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
-TURN, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
+INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
 MAGNITUDE, CORRECTION, LATCHED = _places(3)
 #: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
 #: slip_rate: rate of the sliding speed, 0 where it is not known; event_row: of its last closing; mode0, latched0: mode
@@ -242,13 +253,15 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
 # of a closure before projection, error norm of the last accepted step, largest growth of the next (1 after a
 # rejection), length of fixed steps, the method's parameter, largest rate of a closure before projection, largest rate
 # of the equations that a step met;
-# then what `singular_step` keeps: independence of the closure rows at the end of the step and at its start, its start,
-# time of the next singular pose, whether the present step is laid over it, steps in a row that ended blindly near one;
+# then what `singular_step` keeps: independence of the closure rows at the end of the step, time of its start, time of
+# the next singular pose, how far before it the stepper stops, the most that this may be (0: it does not stop), length
+# of the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has
+# left of the most that it had, steps in a row that ended blindly near a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # length of the last first step with a contact closed, whether the next accepted step is the first of a segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_SIGMA, PAST_TIME, PASS_TIME, STRADDLING, BLIND_STEPS = range(13, 19)
-REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
+SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, SHARE, LEFT, BLIND_STEPS = range(13, 22)
+REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
@@ -262,7 +275,7 @@ REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(19, 24)
 # fmt: on
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
-NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER = range(8, 13)
+NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHEAD = range(8, 14)
 
 # The record ----------------------------------------------------------------------------------------------------------
 #: a row of the event table; speed: rate of penetration at a closing, minus it at an opening [m/s]

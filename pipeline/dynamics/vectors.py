@@ -85,6 +85,18 @@ def dot(a, b):
 
 
 @kernel
+def radial(p, v):
+    """Length of p, its rate when p changes at the rate v, direction of p, and the direction's rate."""
+    distance = np.sqrt(dot(p, p))
+    # no length has no direction; any will do for what ends there
+    known = distance > 0.0
+    direction = scale(1.0 / distance, p) if known else (0.0, 0.0, 1.0)
+    rate = dot(direction, v)
+    turning = scale(1.0 / distance, sub(v, scale(rate, direction))) if known else (0.0, 0.0, 0.0)
+    return distance, rate, direction, turning
+
+
+@kernel
 def cross(a, b):
     """A x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

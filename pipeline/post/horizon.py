@@ -48,6 +48,7 @@ def ensemble_statistics(ensemble: xr.Dataset) -> Variables:
         "impact_count": (per_contact, ensemble.impact_count.values.astype(float)),
         "peak_force": (per_contact, ensemble.peak_force.values),
         "contact_time_share": (per_contact, ensemble.contact_time_share.values),
+        "peak_acceleration": (("kept", "axis"), ensemble.peak_acceleration.values),
     }
     result: Variables = {"spread": (("ensemble_time",), spread(ensemble.velocity.values))}
     for name, (dims, values) in members.items():

@@ -11,9 +11,9 @@ from pipeline.core.quantities import IMPACT
 def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Variables ``impact_*`` of the post artifact; empty for a run without contacts.
 
-    Listed are the closings with an approach speed above IMPACT whose contact ended inside the
-    run; the separation speed is that of the next opening of the same contact.  `impact_count` also
-    counts a last one that has not ended.
+    Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
+    that of the next opening of the same contact.  Of one that the run's end cuts short, separation
+    speed and duration are NaN.
     """
     if "event_time" not in run or "contact" not in run.sizes:
         return {}
@@ -22,15 +22,14 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     closings, openings = of_kind(run, "closing"), of_kind(run, "opening")
     strong = np.flatnonzero(closings & (speed > IMPACT))
     opens = np.array([_next_opening(int(i), contact, openings) for i in strong], dtype=int)
-    kept, opens = strong[opens >= 0], opens[opens >= 0]
-    peak = run.event_peak_force.values[kept]
+    ended, begun = opens >= 0, run.event_time.values[strong]
     return {
-        "impact_time": (("impact",), run.event_time.values[kept]),
-        "impact_contact": (("impact",), contact[kept]),
-        "impact_approach_speed": (("impact",), speed[kept]),
-        "impact_separation_speed": (("impact",), speed[opens]),
-        "impact_peak_force": (("impact",), peak),
-        "impact_duration": (("impact",), run.event_time.values[opens] - run.event_time.values[kept]),
+        "impact_time": (("impact",), begun),
+        "impact_contact": (("impact",), contact[strong]),
+        "impact_approach_speed": (("impact",), speed[strong]),
+        "impact_separation_speed": (("impact",), np.where(ended, speed[opens], np.nan)),
+        "impact_peak_force": (("impact",), run.event_peak_force.values[strong]),
+        "impact_duration": (("impact",), np.where(ended, run.event_time.values[opens] - begun, np.nan)),
         "impact_count": (("contact",), np.bincount(contact[strong], minlength=run.sizes["contact"])),
     }
 

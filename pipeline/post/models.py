@@ -33,6 +33,7 @@ FAR_CSJ_CB = Model("sps4/far_csj_cb", "FAR-CSJ, Craig-Bampton modes (added)", "#
 
 FAR = (FAR_FREE, FAR_FIXED, FAR_CB)
 FAR_CSJ = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
+MODELS = (IDEAL, *FAR, CSJ, *FAR_CSJ)
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +65,19 @@ def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
         acceleration=1e3 * platform.acceleration.sel(axis="z").values,
         reaction=post.reaction.sel(joint=JOINT).values,
         ball=1e3 * run.frame_position.sel(frame=BALL_FRAME).values,
-        horizon=float(post.horizon),
+        horizon=believed_until(post),
         impacts=_impacts(post),
     )
+
+
+def believed_until(post: xr.Dataset) -> float:
+    """Time up to which the run is shown point by point [s]: where its ensemble parts, or else the run and its twin."""
+    return float(post.ensemble_horizon if "ensemble_horizon" in post else post.horizon)
 
 
 def _impacts(post: xr.Dataset) -> np.ndarray:
     if "impact_time" not in post:
         return np.empty((0, 2))
     own = post.impact_contact.values.astype(int) == list(post.contact.values).index(JOINT)
-    middle = post.impact_time.values + 0.5 * post.impact_duration.values
+    middle = post.impact_time.values + 0.5 * np.nan_to_num(post.impact_duration.values)
     return np.column_stack([middle, post.impact_peak_force.values])[own]

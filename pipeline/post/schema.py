@@ -17,6 +17,7 @@ _OF_MEMBERS = {
     "impact_count": (("contact",), "1"),
     "peak_force": (("contact",), "N"),
     "contact_time_share": (("contact",), "1"),
+    "peak_acceleration": (("kept", "axis"), "m s-2"),
 }
 
 
@@ -37,8 +38,12 @@ POST: Schema = {
     "reaction": _V(
         ("time", "joint"), "N", "magnitude of the joint force; of the contact force where the joint has clearance"
     ),
+    "peak_reaction": _V(("joint",), "N", "largest reaction, of outputs and events"),
+    "peak_acceleration": _V(
+        ("body", "axis"), "m s-2", "largest magnitude of each component of the acceleration, of outputs and events"
+    ),
     "eccentricity": _V(("time", "contact"), "m", "distance of ball and socket centres", optional=True),
-    "clearance": _V(("contact",), "m", "radial clearance", optional=True),
+    "clearance": _V(("contact",), "m", "radial clearance; of a plane without meaning", optional=True),
     "impact_time": _V(("impact",), "s", "time of a closing above the impact threshold", optional=True),
     "impact_contact": _V(("impact",), "1", "index of the contact", optional=True),
     "impact_approach_speed": _V(("impact",), "m s-1", "rate of penetration at the closing", optional=True),
@@ -50,7 +55,8 @@ POST: Schema = {
     "impact_count": _V(("contact",), "1", "closings above the impact threshold, ended or not", optional=True),
     "peak_force": _V(("contact",), "N", "largest normal contact force of the run", optional=True),
     "contact_time_share": _V(("contact",), "1", "share of the run spent in contact", optional=True),
-    "horizon": _V((), "s", "time up to which pointwise values mean something"),
+    "horizon": _V((), "s", "where the run and its twin part, as the run says; its end without a twin"),
+    "ensemble_horizon": _V((), "s", "where the members of the ensemble part", optional=True),
     "spread": _V(("ensemble_time",), "m s-1", "largest distance of a member's velocity from the mean", optional=True),
 }
 for _name, (_dims, _units) in _OF_MEMBERS.items():

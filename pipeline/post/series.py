@@ -11,7 +11,7 @@ from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.schema import conform
 from pipeline.core.quantities import IMPACT, PARTED
 from pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
-from pipeline.post.impacts import impacts
+from pipeline.post.impacts import impacts, of_kind
 from pipeline.post.rotations import angle_about_y
 from pipeline.post.schema import POST
 
@@ -19,24 +19,25 @@ from pipeline.post.schema import POST
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     """The post artifact of one run (schema POST): rotations, displacements, reactions, impacts, horizon.
 
-    run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one the horizon is
-    the run's own (its end where it has none) and there are no ensemble variables.  Nothing is
-    interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
+    run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one there are no ensemble
+    variables.  The horizon is the run's own (its end where it has none), the ensemble's is called so.
+    Nothing is interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
     """
     data: Variables = {**motion(run), **contacts(run), **impacts(run)}
     names, force = reactions(run)
     data["reaction"] = (("time", "joint"), force)
+    data["peak_reaction"] = (("joint",), force.max(axis=0, initial=0.0))
+    data["peak_acceleration"] = (("body", "axis"), np.abs(run.acceleration.values).max(axis=0, initial=0.0))
     end = float(run["horizon"] if "horizon" in run else run.time.values[-1])
     coords = {name: run[name].values for name in ("time", "body", "contact") if name in run.coords}
     coords["joint"] = np.array(names, dtype=str)
     if ensemble is not None:
         data |= ensemble_statistics(ensemble)
-        end = horizon(ensemble.time.values, ensemble.velocity.values)
+        data["ensemble_horizon"] = ((), np.array(horizon(ensemble.time.values, ensemble.velocity.values)))
         coords |= {"ensemble_time": ensemble.time.values, "kept": ensemble.body.values}
         coords["quantile"] = np.array(QUANTILES)
     data["horizon"] = ((), np.array(end))
     attributes = {
-        "scene": str(run.attrs.get("scene", "")),
         "impact_threshold": f"{IMPACT:g} m/s",
         "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {PARTED:g} of the largest",
     }
@@ -80,16 +81,23 @@ def contacts(run: xr.Dataset) -> Variables:
         return {}
     distance = np.linalg.norm(run.contact_offset.values, axis=-1)
     gap = run.contact_gap.values
-    closed = (gap < 0.0).astype(float)
-    time = run.time.values
-    share = np.trapezoid(closed, time, axis=0) / (time[-1] - time[0])
     return {
         "eccentricity": (("time", "contact"), distance),
         # gap = clearance - eccentricity at every time; the median is free of rounding at single times
         "clearance": (("contact",), np.median(gap + distance, axis=0)),
         "peak_force": (("contact",), _peak_force(run)),
-        "contact_time_share": (("contact",), share),
+        "contact_time_share": (("contact",), _time_share(run)),
     }
+
+
+def _time_share(run: xr.Dataset) -> np.ndarray:
+    """Share of the run that each contact is closed, from its located begins and ends."""
+    time, share = run.time.values, np.zeros(run.sizes["contact"])
+    closings = of_kind(run, "closing")
+    begun, lasted = run.event_time.values[closings], run.event_duration.values[closings]
+    lasted = np.where(np.isfinite(lasted), lasted, time[-1] - begun)
+    np.add.at(share, run.event_contact.values.astype(int)[closings], lasted)
+    return share / (time[-1] - time[0])
 
 
 def _peak_force(run: xr.Dataset) -> np.ndarray:

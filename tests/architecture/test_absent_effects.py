@@ -99,7 +99,9 @@ EFFECTS = {
     "normal law": ("import hysteretic", "pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "pipeline.dynamics.bodies.flexible"),
-    "closures": ("closures=closures", "pipeline.dynamics.equations.closures"),
+    "closures": ("closures=", "pipeline.dynamics.equations.closures"),
+    "couplings": ("closures=couplings", "pipeline.dynamics.equations.couplings"),
+    "stops": ("make_stops", "pipeline.dynamics.contact.stops"),
     "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
     "loads": ("make_loads", "pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),
@@ -119,12 +121,16 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
     "stiffened": (Parts(("fixed",), flexible=True, stiffening=True), {"flexible bodies", "stiffening"}),
     "springs": (Parts(("prismatic",), loads=SPRING), {"loads"}),
     "waves": (Parts(("prismatic",), harmonics=True), {"harmonics"}),
+    "geared": (Parts(("revolute",), closures=True, couplings=True), {"closures", "couplings"}),
+    "stopped": (Parts(("revolute",), forms=("hysteretic",), stops=True), {"stops", "normal law"}),
     "everything": (
         Parts(
             ("fixed", "spherical"),
             **RUBBING,
             loads=("joint-friction", *SPRING),
+            stops=True,
             closures=True,
+            couplings=True,
             flexible=True,
             stiffening=True,
             harmonics=True,
@@ -154,7 +160,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     if "contact" in present:
         wanted.add("pipeline.dynamics.joints.clearance_spherical")
     assert below(modules, ("pipeline.dynamics.joints",)) == wanted
-    if "contact" not in present:
+    if not {"contact", "stops"} & present:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
         assert below(modules, FLEXIBLE) == set()
@@ -198,7 +204,7 @@ NUMBERS: dict[str, object] = {
     "body.platform.inertia": ["2000 kg mm^2", "2000 kg mm^2", "3000 kg mm^2"],
     "body.ball_A1.com": [0.0, 0.0, 0.0],
     "body.platform.frames.A1.position": ["90 mm", "50 mm", 0.0],
-    "body.rod1.frames.bottom.position": [0.0, 0.0, "-60 mm"],
+    "body.rod1.frames.bottom.position": [0.0, 0.0, "-119 mm"],
     "body.platform.pose.position": [0.0, 0.0, "360 mm"],
     "drive.P1.law.change": ["30 mm", "-30 mm"],
     "drive.P2.law": {"type": "constant", "value": 0.0},

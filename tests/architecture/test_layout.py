@@ -17,6 +17,7 @@ from stages.__main__ import COMMANDS
 
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
+BESIDES |= {"CITATION.cff", "SECURITY.md", "flexclear"}
 #: longest module; what does not fit is two things
 LINES = 450
 
@@ -98,14 +99,16 @@ def test_every_dependency_is_pinned(root: Path):
         for line in (root / "constraints.txt").read_text().splitlines()
         if "==" in line
     }
-    wanted = [*project["dependencies"], *project["optional-dependencies"]["dev"]]
+    extras = project["optional-dependencies"]
+    wanted = [*project["dependencies"], *extras["dev"], *extras["render"]]
     assert {re.split(r"[<>=]", name)[0].lower() for name in wanted} <= pinned
 
 
 def test_every_library_that_is_imported_is_declared(root: Path):
     """An indirect dependency may vanish with the next version of what brought it."""
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
-    declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in project["dependencies"]}
+    wanted = [*project["dependencies"], *project["optional-dependencies"]["render"]]
+    declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in wanted}
     declared |= {"skfem", "vtkmodules", "pipeline", "stages"} | set(sys.stdlib_module_names)
     found = set()
     for path in sources(root):

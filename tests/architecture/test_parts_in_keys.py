@@ -108,3 +108,38 @@ def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
         if len(part.COORDINATES) > 1:
             assert name not in joints.WHOLE
             assert {coordinate.part for coordinate in part.COORDINATES} <= set(joints.CHAIN)
+
+
+#: what a scene says beside its joint -> parts of its code, and a module that must be in the key
+BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
+    "stop": (
+        {
+            "stop": {
+                "end": {"joint": "J", "upper": 1.0, "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1.0}}
+            }
+        },
+        Parts(("cylindrical",), forms=("hysteretic",), stops=True),
+        "pipeline.dynamics.contact.stops",
+    ),
+    "gear": (
+        {"gear": {"screw": {"first": "J.rotation", "second": "J.translation", "ratio": 0.1}}},
+        Parts(("cylindrical",), closures=True, couplings=True),
+        "pipeline.dynamics.equations.couplings",
+    ),
+}
+
+
+@pytest.mark.parametrize("family", BESIDE)
+def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_other(root: Path, family: str) -> None:
+    tables, parts, module = BESIDE[family]
+    if family == "stop":
+        tables["stop"]["end"]["coordinate"] = "rotation"
+    texts = sources(parts, Scheme("dop853")).values()
+    reached = {found for text in texts for found in functions.reached(text)}
+    scene = scene_with({"type": "cylindrical"}, **tables)
+    known = Sources(root).closure(["stages.s4_simulate", *modules(scene)]).keys()
+    assert module in reached
+    assert reached <= set(known)
+    assert module not in modules(scene_with({"type": "cylindrical"}))
+    if family == "stop":
+        assert "pipeline.dynamics.contact.normal.flores" in modules(scene)

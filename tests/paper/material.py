@@ -44,6 +44,7 @@ def everything() -> dict[str, xr.Dataset]:
         data[f"sps4/frequencies/{name}:modes/rod"] = synthetic.modes(frequency, KINDS)
         data[f"sps4/frequencies/{name}:fine-modes/rod"] = synthetic.modes(tuple(f - REFINING for f in frequency), KINDS)
         data[f"sps4/frequencies/{name}:bundle/rod"] = synthetic.bundle(7, frequency=np.array(frequency))
+    data["sps4/far_cb:mesh/rod1"] = synthetic.mesh()
     return data
 
 

@@ -70,6 +70,8 @@ def run(name: str = "sps4/ideal", *, clearance: bool = False, modes: int = 0, no
         "title": f"made-up {name}",
         "parameters": json.dumps(_parameters(clearance)),
         "evaluations": 1000,
+        "steps": 100,
+        "projections": 10,
     }
     attrs["assumptions"] = json.dumps({"joint.A1.normal.restitution": "assumed: not printed in the paper"})
     return conform(xr.Dataset(data, coords), RUN, **attrs)
@@ -109,6 +111,11 @@ def _bodies(time, z, tilt):
             owners.append(frame.partition(".")[0])
             places.append(at)
     arrays = (np.stack(position, axis=1), np.stack(quaternion, axis=1))
+    fixed = np.broadcast_to([0.0, 0.0, 0.07], (count, 3))
+    for frame, at in (("ground.Z", fixed), ("central_rod.Z", p_platform - [0.0, 0.0, 0.28])):
+        frames.append(frame)
+        owners.append(frame.partition(".")[0])
+        places.append(at)
     return bodies, *arrays, frames, owners, np.stack(places, axis=1)
 
 
@@ -150,6 +157,7 @@ def _contact(time: np.ndarray) -> dict:
         "contact_normal_force": (("time", "contact"), normal[:, None]),
         "contact_friction_power": (("time", "contact"), -0.02 * np.linalg.norm(tangent, axis=1)[:, None]),
         "contact_offset": (("time", "contact", "axis"), offset[:, None, :]),
+        "contact_delivered_restitution": (("contact",), np.array([0.913])),
         "event_time": (("event",), events),
         "event_contact": (("event",), np.zeros(2 * n)),
         "event_kind": (("event",), np.where(closing, "closing", "opening")),
@@ -167,6 +175,8 @@ def _parameters(clearance: bool) -> dict:
     body = {
         "platform": rigid(0.31, (1.040159e-3, 1.040159e-3, 2.080267e-3)),
         "ground": {"type": "ground", "frames": {}},
+        "central_rod": rigid(0.59, (2.837976e-3, 2.837976e-3, 2.9409e-5)),
+        "socket_A1": rigid(0.30, (9.8769e-5, 9.8769e-5, 1.274e-4)),
     }
     for k in range(1, 5):
         body[f"cylinder{k}"] = rigid(2.08, CYLINDER_INERTIA)
@@ -177,6 +187,9 @@ def _parameters(clearance: bool) -> dict:
     if clearance:
         friction = {"law": "modified-coulomb", "static": 0.15, "dynamic": 0.1, "v_static": 2e-4, "v_dynamic": 1e-2}
         joint["A1"] |= {"type": "clearance-spherical", "clearance": 5e-4, "ball_radius": 0.02, "friction": friction}
+        steel = {"youngs_modulus": 2.068e11, "poisson": 0.29}
+        joint["A1"] |= {"socket_material": steel, "ball_material": steel}
+        joint["A1"]["normal"] = {"law": "lankarani-nikravesh", "restitution": 0.9}
     return {"body": body, "joint": joint}
 
 
@@ -200,6 +213,8 @@ def ensemble(base: xr.Dataset, members: int = 4, growth: float = 60.0) -> xr.Dat
     data["contact_offset"] = (("member", "time", "contact", "axis"), np.repeat(offset[None], members, axis=0))
     for name, value in (("impact_count", 21.0), ("peak_force", 1800.0), ("contact_time_share", 0.02)):
         data[name] = (("member", "contact"), np.full((members, 1), value) + np.arange(members)[:, None])
+    peak = np.abs(data["acceleration"][1]).max(axis=1)
+    data["peak_acceleration"] = (("member", "body", "axis"), peak)
     return conform(xr.Dataset(data, {"time": time, "body": ["platform"], "contact": ["A1"]}), ENSEMBLE)
 
 
@@ -237,6 +252,19 @@ def bundle(count: int = 7, nodes: int = 13, frequency: np.ndarray | None = None)
     return conform(xr.Dataset(data, {"frame": ["bottom", "top"]}), BUNDLE)
 
 
+def mesh() -> xr.Dataset:
+    """What table 2 reads of a mesh: twelve elements of aluminium."""
+    cells = np.ones(12)
+    data = {
+        "density": (("cell",), 2740.0 * cells),
+        "youngs_modulus": (("cell",), 7.17e10 * cells),
+        "shear_modulus": (("cell",), 7.17e10 / 2.66 * cells),
+        "area": (("cell",), np.pi * 1e-4 * cells),
+        "abscissa": (("node",), np.linspace(0.0, 0.24, 13)),
+    }
+    return xr.Dataset(data)
+
+
 def modes(frequency: tuple[float, ...], kinds: tuple[str, ...]) -> xr.Dataset:
     """A made-up artifact of schema MODES with the given frequencies."""
     shape = np.zeros((13, 6, len(frequency)))
@@ -255,15 +283,20 @@ def modes(frequency: tuple[float, ...], kinds: tuple[str, ...]) -> xr.Dataset:
 
 
 def timing() -> xr.Dataset:
-    """Made-up times of the six models of table 10, three repeats each."""
+    """Made-up times of the six models of table 10: three repeats of each integration, and a record far longer."""
     scenes = ["sps4/ideal", "sps4/far_free", "sps4/far_fixed", "sps4/csj", "sps4/far_csj_free", "sps4/far_csj_fixed"]
     seconds = np.outer([0.004, 0.02, 0.02, 0.04, 0.3, 0.4], [1.0, 1.1, 0.9])
-    data = {
-        "equal_cpu_seconds": (("scene", "repeat"), seconds),
-        "equal_evaluations": (("scene",), np.array([1e3, 2e3, 2e3, 2e4, 5e4, 6e4])),
-        "equal_rtol": (("scene",), np.full(6, 1e-8)),
-        "step_cpu_seconds": (("scene", "repeat"), np.where(np.arange(6)[:, None] == 2, np.nan, 5.0 * seconds)),
-        "step_evaluations": (("scene",), np.full(6, 36e3)),
-    }
+    slow = np.where(np.arange(6)[:, None] == 2, np.nan, 5.0 * seconds)
+    data = {}
+    for way, times in (("equal", seconds), ("step", slow), ("tolerance", 2.0 * seconds), ("size", 3.0 * seconds)):
+        data |= {
+            f"{way}_integration_seconds": (("scene", f"{way}_repeat"), times),
+            f"{way}_recording_seconds": (("scene", f"{way}_recorded"), np.full((6, 1), 0.1)),
+            f"{way}_evaluations": (("scene",), np.array([1e3, 2e3, 2e3, 2e4, 5e4, 6e4])),
+            f"{way}_steps": (("scene",), np.array([20.0, 80.0, 21.0, 400.0, 4e3, 4e3])),
+            f"{way}_energy_error": (("scene",), np.full(6, 1e-4)),
+            f"{way}_rtol": (("scene",), np.full(6, 1e-8)),
+        }
     attributes = {"equal_error": 1e-6, "share": 0.05, "step": 1e-5, "refused": "sps4/far_fixed: unstable"}
+    attributes |= {"tolerance": 4e-6, "damped": "radau"}
     return xr.Dataset(data, {"scene": scenes}, attributes)

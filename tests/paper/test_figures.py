@@ -13,17 +13,11 @@ import pytest
 import pipeline
 from pipeline.core.registry import lookup
 from pipeline.post import figures
-from pipeline.post.figures import fig06, mode_shapes, sections
+from pipeline.post.figures import fig06, sections
 from tests.paper.material import everything
 
 TREE = Path(pipeline.__file__).parent.parent
-ARTIFACTS = {"run", "tight", "post", "ensemble", "modes", "fine-modes", "bundle", "timing"}
-
-
-@pytest.fixture(autouse=True)
-def _lines_only(monkeypatch):
-    """Shapes as lines: what is tested here must hold without GL libraries."""
-    monkeypatch.setattr(mode_shapes.gl, "works", lambda: False)
+ARTIFACTS = {"run", "mesh", "tight", "post", "ensemble", "modes", "fine-modes", "bundle", "timing"}
 
 
 def made(name):
@@ -33,15 +27,16 @@ def made(name):
 
 
 def test_all_figures_and_tables_of_the_paper_are_listed():
-    plots = {f"fig{n:02d}" for n in (3, 4, 6, 8, 9, 11, 12, 13, 14, 15, 16, 17)}
-    assert set(figures.NAMES) == plots | {f"table{n:02d}" for n in (4, 5, 7, 8, 9, 10)} | {"sections"}
+    # all but the paper's figures 2 and 7, a beam element and a leg, which figures 1 and 10 have
+    plots = {f"fig{n:02d}" for n in (1, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)}
+    assert set(figures.NAMES) == plots | {f"table{n:02d}" for n in range(1, 11)} | {"sections"}
 
 
 @pytest.mark.parametrize("name", figures.NAMES)
 def test_needs_are_literal_and_name_scenes_and_artifacts_that_exist(name):
     module = import_module(f"pipeline.post.figures.{name}")
     assigned = [node for node in ast.parse(Path(module.__file__).read_text()).body if isinstance(node, ast.Assign)]
-    literal = {node.targets[0].id: node.value for node in assigned}
+    literal = {node.targets[0].id: node.value for node in assigned if isinstance(node.targets[0], ast.Name)}
     assert ast.literal_eval(literal["NEEDS"]) == module.NEEDS
     for reference in module.NEEDS:
         scene, _, artifact = reference.partition(":")

@@ -89,7 +89,7 @@ def test_paper_page_lists_every_figure_with_its_command(content):
     for name in figures.NAMES:
         assert f"| {figures.title(name)} |" in text
         assert f"`{report.command(name)}`" in text
-    assert "| equal error: CPU time (ideal = 1) |" in text
+    assert "| equal error: integration (ideal = 1) |" in text
 
 
 def test_tables_of_the_paper_page_are_whole(content):

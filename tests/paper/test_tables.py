@@ -101,7 +101,7 @@ def test_table_8_compares_the_clearance_run_with_the_paper():
 
 def test_table_9_says_how_far_single_runs_count():
     data = everything()
-    horizon = 1e3 * float(data["sps4/far_csj_free:post"].horizon)
+    horizon = 1e3 * float(data["sps4/far_csj_free:post"].ensemble_horizon)
     heads = rows(table09, "table09")[0].keys()
     assert f"ours, free-free, to {horizon:.1f} ms" in heads
     assert 20.0 < horizon < 180.0  # the made-up ensemble parts inside the stroke
@@ -125,25 +125,40 @@ def test_table_9_spread_is_that_of_the_members():
 def test_table_10_divides_medians_by_the_ideal_one():
     found = {row["model"]: row for row in rows(table10, "table10")}
     # half of 44/3.6 - 36/4.4
-    assert found["sps4/csj"]["equal error: CPU time (ideal = 1)"] == "10.00 ± 2.02"
+    assert found["sps4/csj"]["equal error: integration (ideal = 1)"] == "10 ± 2"
     assert found["sps4/csj"]["CPU time, paper (ideal = 1)"] == "19.95"
-    assert found["sps4/csj"]["equal error: CPU time (s)"] == "0.040 ± 0.004"  # half the range of 0.036 to 0.044
+    assert found["sps4/csj"]["equal error: integration (ms)"] == "40 ± 4"  # half the range of 36 to 44
     assert found["sps4/far_csj_fixed"]["equal error: evaluations"] == "60000"
+
+
+def test_table_10_keeps_recording_out_of_its_ratios():
+    """Records that take any time change the column of recording and no other."""
+    data = dict(everything())
+    data["sps4:timing"] = data["sps4:timing"].assign(
+        equal_recording_seconds=data["sps4:timing"].equal_recording_seconds * 50
+    )
+    slow, plain = rows(table10, "table10", data), rows(table10, "table10")
+    assert {k for a, b in zip(slow, plain, strict=True) for k in a if a[k] != b[k]} == {"recording (ms)"}
 
 
 def test_table_10_takes_the_repeats_that_were_made():
     data = dict(everything())
     timing = data["sps4:timing"].copy(deep=True)
-    timing.equal_cpu_seconds[:, 2] = np.nan
+    timing.equal_integration_seconds[:, 2] = np.nan
     found = {row["model"]: row for row in rows(table10, "table10", data | {"sps4:timing": timing})}
-    assert found["sps4/csj"]["equal error: CPU time (s)"] == "0.042 ± 0.002"  # 0.040 and 0.044
-    assert found["sps4/ideal"]["equal error: CPU time (ideal = 1)"] == "1.00 ± 0.00"
+    assert found["sps4/csj"]["equal error: integration (ms)"] == "42 ± 2"  # 40 and 44
+    assert found["sps4/ideal"]["equal error: integration (ideal = 1)"] == "1 ± 0"
 
 
 def test_table_10_says_what_the_fixed_step_cannot_do():
     found = {row["model"]: row for row in rows(table10, "table10")}
-    assert found["sps4/far_fixed"]["paper's step: CPU time (s)"] == "–"
+    assert found["sps4/far_fixed"]["paper's step: integration (ms)"] == "–"
     assert "far_fixed: unstable" in table10.make(everything())["table10.md"].decode()
+
+
+def test_table_10_names_the_ratios_of_the_paper_that_its_tolerance_gives():
+    text = table10.make(everything())["table10.md"].decode()
+    assert "Within a factor of 1.5 of the paper's ratio: sps4/far_fixed, sps4/csj." in text  # 21/20 and 400/20
 
 
 def test_frequencies_carry_the_error_of_their_mesh():

@@ -40,6 +40,7 @@ def run(error: float, *, seconds=(0.2, 0.1, 0.3), evaluations=100, impacts=3, ho
         "evaluations": evaluations,
         "compile_seconds": 1.0,
         "peak_memory": 1e8,
+        "recording_seconds": 0.15,
         "clearance": 1e-3,
         "growth": 5.0,
     }

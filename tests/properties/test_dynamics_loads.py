@@ -14,6 +14,7 @@ from pipeline.dynamics import loads
 from tests.properties.mechanisms import GRAVITY, body, frame, joint, matrix, scene, simulate, turned
 
 WAVE = {"type": "harmonic", "amplitude": [2.0], "frequency": ["3 Hz"], "offset": 1.0}
+WAVE_OF_LENGTH = {**WAVE, "amplitude": [0.02], "offset": 0.1}
 #: every load but gravity, on a free body, on joints with one and several axes, and on the ground
 LOADS: dict[str, Any] = {
     "push": {"type": "point-force", "frame": "c.tip", "force": [3.0, WAVE, -1.0]},
@@ -25,11 +26,27 @@ LOADS: dict[str, Any] = {
         "stiffness": 60.0, "damping": 2.0, "free_length": 0.3,
     },
     "tie": {"type": "spring-damper", "between": ["b.end", "c.tip"], "stiffness": 20.0, "free_length": 0.1},
+    "mount": {
+        "type": "bushing", "between": ["a.far", "c.tip"],
+        "stiffness": [
+            [40.0, 5.0, 0.0, 1.0, 0.0, 0.0], [5.0, 60.0, -8.0, 0.0, 2.0, 0.0], [0.0, -8.0, 50.0, 0.0, 0.0, -1.5],
+            [1.0, 0.0, 0.0, 0.9, 0.2, 0.0], [0.0, 2.0, 0.0, 0.2, 1.1, 0.3], [0.0, 0.0, -1.5, 0.0, 0.3, 0.7],
+        ],
+        "damping": [0.3, 0.2, 0.4, 0.01, 0.02, 0.03],
+    },
     "motor": {"type": "joint-force", "joint": "U", "coordinate": "second", "force": WAVE},
     "coil": {
         "type": "joint-spring", "joint": "U", "coordinate": "first", "stiffness": 4.0, "damping": 0.1, "rest": 0.5,
     },
     "rail": {"type": "joint-spring", "joint": "Y", "coordinate": "translation", "stiffness": 90.0, "damping": 1.0},
+    "servo": {
+        "type": "pid", "joint": "U", "coordinate": "second", "measured": "U.first", "reference": 0.2,
+        "proportional": 0.3, "integral": 0.5, "derivative": 0.02, "limits": [-0.2, 0.1],
+    },
+    "digital": {
+        "type": "sampled-pid", "joint": "Y", "coordinate": "translation", "reference": WAVE_OF_LENGTH,
+        "proportional": 9.0, "integral": 5.0, "derivative": 0.1, "period": 0.02,
+    },
     "rub": {
         "type": "joint-friction", "joint": "Y", "coordinate": "rotation", "viscous": 0.02,
         "coulomb": {"static": 0.05, "dynamic": 0.04, "v_static": 0.5, "v_dynamic": 1.0},
@@ -162,7 +179,7 @@ def test_forces_and_loads_change_momentum_and_nothing_else_does() -> None:
     """Newton for the free body: what is recorded of loads and accelerations is one motion."""
     dataset = run()
     free = dataset.sel(body="c")
-    force = dataset.load_force.sel(load="push").values + dataset.load_force.sel(load="tie").values
+    force = sum(dataset.load_force.sel(load=name).values for name in ("push", "tie", "mount"))
     assert free.acceleration.values == pytest.approx(force + np.array([0.0, 0.0, -9.81]), abs=1e-10)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -9,8 +12,12 @@ from pipeline import dynamics
 from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.model.assembly import assembled
+from pipeline.dynamics.model.given_start import moved
+from pipeline.dynamics.model.mechanism import Mechanism, build
 from tests.analytic.mechanism_runs import TREE, bundles
-from tests.properties.mechanisms import simulate
+from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate
 from tests.properties.test_dynamics_cuts import two_loops
 
 
@@ -82,3 +89,126 @@ def test_velocity_and_spin_of_a_hinged_flexible_rod_agree_about_its_hinge() -> N
     assert rod.velocity.values[0] == pytest.approx(centre, rel=0, abs=1e-12)
     about_end = LINE * LENGTH * (LENGTH**2 / 3.0 + SECTION**2 / 4.0)
     assert float(rod.kinetic[0]) == pytest.approx(0.5 * about_end * omega @ omega, rel=1e-9)
+
+
+GROUND, CRANK, COUPLER, ROCKER = 0.5, 0.2, 0.4, 0.3
+
+
+def angles(crank: float) -> tuple[float, float, float]:
+    """Angles of crank, coupler and rocker of a four-bar: the pin between the latter two is where two circles meet."""
+    pin, pivot = CRANK * np.array([np.cos(crank), np.sin(crank)]), np.array([GROUND, 0.0])
+    across = pivot - pin
+    d = np.linalg.norm(across)
+    along = (COUPLER**2 - ROCKER**2 + d**2) / (2.0 * d)
+    e = across / d
+    tip = pin + along * e + np.sqrt(COUPLER**2 - along**2) * np.array([-e[1], e[0]])
+    return crank, float(np.arctan2(*(tip - pin)[::-1])), float(np.arctan2(*(tip - pivot)[::-1]))
+
+
+def driven(given: float, law: float, **crank: Any) -> dict[str, Any]:
+    """A four-bar whose poses are those of one crank angle, and whose drive starts at another, at 3 rad/s."""
+    a, b, c = angles(given)
+    pins = {"crank": (0.0, 0.0), "coupler": (CRANK * np.cos(a), CRANK * np.sin(a)), "rocker": (GROUND, 0.0)}
+    lengths = {"crank": (CRANK, a), "coupler": (COUPLER, b), "rocker": (ROCKER, c)}
+    bodies: dict[str, Any] = {"world": {"type": "ground", "frames": {"a": {}, "b": {"position": [GROUND, 0.0, 0.0]}}}}
+    for name, (length, angle) in lengths.items():
+        bodies[name] = {
+            "type": "rigid",
+            "mass": 1.0,
+            "inertia": [1e-3, 1e-3, 1e-3],
+            "pose": {"position": [*pins[name], 0.0], "rotation_vector": [0.0, 0.0, angle]},
+            "frames": {"near": {}, "far": {"position": [length, 0.0, 0.0]}},
+        }
+    bodies["crank"] |= crank
+    pairs = ("world.a", "crank.near"), ("crank.far", "coupler.near"), ("coupler.far", "rocker.far")
+    joints = {f"j{k}": joint("revolute", *pair) for k, pair in enumerate((*pairs, ("world.b", "rocker.near")))}
+    law_of = {"type": "polynomial", "coefficients": [law, 3.0]}
+    return scene(bodies, joints, end=1e-3, rtol=1e-8, drive={"motor": {"joint": "j0", "law": law_of}})
+
+
+def start_of(table: dict[str, Any]) -> Mechanism:
+    """The mechanism at its start; nothing is compiled for it."""
+    return assembled(build(Scene.model_validate(table), {}))
+
+
+def test_a_pose_that_contradicts_a_drive_is_refused_with_both_values() -> None:
+    with pytest.raises(InputError) as error:
+        start_of(driven(1.5, 0.9))
+    for words in (
+        "[drive.motor.law]",
+        "joint 'j0'",
+        "1.5 rad in the poses given",
+        "0.9 rad by the law",
+        "0.6 rad apart",
+    ):
+        assert words in str(error.value)
+
+
+def test_a_slide_that_contradicts_its_drive_is_refused_beyond_a_share_of_the_mechanism() -> None:
+    def slide(law: float) -> dict[str, Any]:
+        bodies = {"world": ground(a=(0.0, 0.0, 0.0)), "b": body((0.0, 0.0, 1.0), frames={"o": frame((0.0, 0.0, 0.0))})}
+        drive = {"d": {"joint": "j", "law": law}}
+        return scene(bodies, {"j": joint("prismatic", "world.a", "b.o")}, drive=drive)
+
+    near = start_of(slide(1.02))  # the mechanism's size is about half a metre
+    assert near.start_residual == pytest.approx(0.02, rel=1e-12)
+    with pytest.raises(InputError, match=r"\[drive.d.law\].*starts at 1 m in the poses given, and at 1.2 m"):
+        start_of(slide(1.2))
+
+
+def test_how_far_a_path_starts_from_its_frame_is_the_residual_of_the_start() -> None:
+    def led(x: float, turn: float) -> dict[str, Any]:
+        bodies = {"world": ground(a=(0.0, 0.0, 0.0)), "b": body((0.0, 0.0, 1.0), frames={"o": frame((0.2, 0.0, 0.0))})}
+        path = {"frame": "b.o", "position": {"x": x, "y": 0.0, "z": 1.0}, "rotation": {"x": 0.0, "y": 0.0, "z": turn}}
+        return scene(bodies, {}, drive={"p": path})
+
+    assert start_of(led(0.2, 0.0)).start_residual == pytest.approx(0.0, abs=1e-15)
+    assert start_of(led(0.201, 0.01)).start_residual == pytest.approx(0.01, rel=1e-9)
+    assert start_of(led(0.5, 0.0)).start_residual == pytest.approx(0.3, rel=1e-9)
+    assert start_of(led(0.2, 0.4)).start_residual == pytest.approx(0.4, rel=1e-9)
+
+
+def test_whole_turns_contradict_nothing_and_bodies_without_a_pose_go_where_the_drive_says() -> None:
+    assert start_of(driven(1.5, 1.5 + 4.0 * np.pi)).start_residual < 1e-14
+    free = driven(1.5, 1.5)
+    del free["body"]["crank"]["pose"]
+    free["joint"] = {"j0": free["joint"]["j0"]}
+    free["body"] = {name: free["body"][name] for name in ("world", "crank")}
+    (_, crank) = start_of(free).links
+    # rounding of a rotation
+    assert crank.start.R[:2, 0] == pytest.approx([np.cos(1.5), np.sin(1.5)], abs=1e-14)
+
+
+def test_what_assembly_moves_is_told_with_amounts() -> None:
+    mechanism = start_of(driven(1.5, 1.45))
+    (told,) = moved(mechanism, [link.start for link in mechanism.links])
+    before, after = angles(1.5), angles(1.45)
+    # three digits are printed
+    amounts = dict(zip(("crank", "coupler", "rocker"), np.abs(np.subtract(before, after)), strict=True))
+    for name, amount in amounts.items():
+        found = re.search(rf"{name} [^;]*turned by (\S+) rad", told)
+        assert found is not None
+        assert float(found[1]) == pytest.approx(amount, rel=5e-3)
+    shift = re.search(r"coupler moved by (\S+) m", told)
+    assert shift is not None
+    assert float(shift[1]) == pytest.approx(2.0 * CRANK * np.sin(0.025), rel=5e-3)
+    assert "crank moved" not in told
+    assert mechanism.start_residual == pytest.approx(0.05, rel=1e-9)
+    fitting = start_of(driven(1.5, 1.5))
+    assert moved(fitting, [link.start for link in fitting.links]) == []
+
+
+@pytest.mark.slow
+def test_a_mended_start_is_in_the_runs_warnings_and_velocities_follow_the_mend() -> None:
+    run = simulate(driven(1.5, 1.45))
+    assert run.attrs["closure_residual_of_given_start"] == pytest.approx(0.05, rel=1e-9)
+    assert "crank turned by 0.05 rad" in run.attrs["start_mended"]
+    assert run.attrs["start_mended"] in run.attrs["warnings"]
+    assert "start_mended" not in simulate(driven(1.5, 1.5, angular_velocity=[0.0, 0.0, 3.0])).attrs
+    rough = simulate(driven(1.5, 1.5, angular_velocity=[0.0, 0.0, 3.1]))
+    assert "velocities given for crank were mended" in rough.attrs["start_mended"]
+    assert "0.1 rad/s" in rough.attrs["start_mended"]
+    # rounding of the projection
+    assert rough.angular_velocity.sel(body="crank").values[0] == pytest.approx([0.0, 0.0, 3.0], abs=1e-12)
+    with pytest.raises(InputError, match=r"velocities given for crank \(they miss by 1 of"):
+        simulate(driven(1.5, 1.5, angular_velocity=[0.0, 0.0, 4.0]))

@@ -140,7 +140,7 @@ type = "prismatic"
 between = ["rail.slide", "block.slide"]
 [drive.far]
 joint = "rail"
-law = "0.31 m"
+law = "0.305 m"
 """
     )
     with pytest.raises(InputError) as error:

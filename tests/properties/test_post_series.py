@@ -111,7 +111,7 @@ def test_horizon_of_members_that_stay_together_is_the_end():
 
 def test_faster_growth_shortens_the_horizon():
     run = synthetic.run("sps4/csj", clearance=True)
-    ends = [float(derive(run, synthetic.ensemble(run, growth=g)).horizon) for g in (0.0, 40.0, 60.0, 90.0)]
+    ends = [float(derive(run, synthetic.ensemble(run, growth=g)).ensemble_horizon) for g in (0.0, 40.0, 60.0, 90.0)]
     assert ends == sorted(ends, reverse=True)
     assert len(set(ends)) == 4
 
@@ -180,11 +180,37 @@ def test_slow_closings_are_no_impacts():
     assert post.sizes["impact"] == synthetic.BURSTS.size - 1
 
 
-def test_an_impact_that_has_not_ended_is_counted_but_not_listed():
+def test_an_impact_that_has_not_ended_is_counted_and_listed_without_its_end():
     run = synthetic.run("sps4/csj", clearance=True).isel(event=slice(0, -1))
     post = derive(run)
-    assert int(post.impact_count[0]) == synthetic.BURSTS.size
-    assert post.sizes["impact"] == synthetic.BURSTS.size - 1
+    assert int(post.impact_count[0]) == synthetic.BURSTS.size == post.sizes["impact"]
+    for name in ("impact_duration", "impact_separation_speed"):
+        assert np.isnan(post[name].values).tolist() == [False] * (synthetic.BURSTS.size - 1) + [True]
+
+
+def test_run_and_post_mean_the_same_by_horizon():
+    run = synthetic.run("sps4/csj", clearance=True)
+    post = derive(run.assign(horizon=0.123), synthetic.ensemble(run))
+    assert float(post.horizon) == 0.123
+    assert float(post.ensemble_horizon) < 0.123  # the made-up members part earlier
+
+
+def test_time_in_contact_is_that_of_the_located_events():
+    """Whatever rows a run has: those inside contacts are denser than elsewhere."""
+    run = synthetic.run("sps4/csj", clearance=True)
+    expected = synthetic.BURSTS.size * synthetic.BURST_LENGTH / synthetic.END
+    for rows in (run, run.isel(time=slice(None, None, 7))):
+        ends = rows.time.values[-1] - rows.time.values[0]
+        assert float(derive(rows).contact_time_share[0]) == pytest.approx(expected * synthetic.END / ends, rel=1e-9)
+
+
+def test_extremes_are_those_of_all_rows():
+    run = synthetic.run("sps4/csj", clearance=True)
+    post = derive(run)
+    assert float(post.peak_acceleration.sel(body="platform", axis="z")) == float(
+        np.abs(run.acceleration.sel(body="platform", axis="z")).max()
+    )
+    assert float(post.peak_reaction.sel(joint="A1")) == float(post.reaction.sel(joint="A1").max())
 
 
 def test_sections_are_never_interpolated():

@@ -191,7 +191,7 @@ def test_what_a_run_depends_on_is_the_content_of_the_table_not_its_place(tmp_pat
     assert edited["scene"] != here["scene"]
     # a worker rebuilds the scene without the file
     (tmp_path / "moves" / "angle.csv").unlink()
-    assert s4_simulate.params(s4_simulate.rebuild(copy.deepcopy(edited))) == edited
+    assert s4_simulate.params(s4_simulate.rebuild(copy.deepcopy(edited), {})) == edited
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ SAID = {
         "v0 must be below v1",
         "v0 = 1 m/s, v1 = 0.5 m/s",
     ),
-    BEAM.replace("WORDS", "count = 0"): ("[body.f.modes.count]", "must be greater than or equal to 1 (got 0)"),
+    BEAM.replace("WORDS", "count = -1"): ("[body.f.modes.count]", "must be greater than or equal to 0 (got -1)"),
     BEAM.replace("WORDS", 'count = "al"'): ("[body.f.modes.count]", "expected a whole number or 'all' (got 'al')"),
     BEAM.replace("WORDS", "count = 1") + "damping = -1": ("[body.f.damping]", "must be greater than 0 (got -1)"),
     "[solver]\nrtol = 1": ("[solver.rtol]", "must be less than or equal to 0.01 (got 1)"),

@@ -11,12 +11,13 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.artifacts.store import Store
 from pipeline.core.workflow import cores, schedule
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import Task
-from pipeline.dynamics.compile import compiler_process, functions
+from pipeline.dynamics.compile import compiler_process, folder, functions
 from pipeline.dynamics.compile.files import bring, claimed, compiled, take
 from tests.stages.conftest import PATIENCE
 
@@ -170,7 +171,7 @@ def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, sce
             return Future()
 
     common = (Store(tmp_path), Sources(root), None)
-    schedule._submit(schedule._Plan(tasks), {}, Pool(), 4, common, Monitor())  # type: ignore[arg-type]
+    schedule._submit(schedule._Plan(tasks, tuple(tasks)), {}, Pool(), 4, common, Monitor())  # type: ignore[arg-type]
     assert heard == [idle] * len(scenes)
 
 
@@ -178,7 +179,7 @@ def test_code_that_cannot_be_kept_is_compiled_all_the_same(tmp_path: Path, monke
     (tmp_path / "file").touch()
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "file" / "kernels"))
     told: list[str] = []
-    path = functions._file(functions._folder(told.append), "test", SOURCE.format(k=3))
+    path = functions._file(folder.writable(kernel_root(), told.append), "test", SOURCE.format(k=3))
     assert "cannot be kept" in told[0]
     with claimed(path, wait=True):
         assert not take(path, nothing)

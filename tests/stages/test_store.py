@@ -12,7 +12,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.artifacts.store import Record, Store, publish, write_dataset
+from pipeline.core.artifacts import disk
+from pipeline.core.artifacts.disk import publish
+from pipeline.core.artifacts.store import Record, Store, write_dataset
 from pipeline.core.errors import ResourceError
 
 KEY = "k" * 32
@@ -196,12 +198,81 @@ def test_shown_files_follow_the_current_artifact(store: Store):
     assert not list(store.root.rglob("*.tmp"))
 
 
-def test_files_are_copied_where_links_are_not_possible(store: Store, monkeypatch: pytest.MonkeyPatch):
-    def refuse(source: Path, target: Path) -> None:
-        raise PermissionError(1, "links are not permitted here")
-
-    monkeypatch.setattr(os, "link", refuse)
+def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[str]):
+    """It is read-only; whoever edits it all the same damages nothing, and finds the edit again."""
     record = put(store)
-    for _ in range(2):
-        store.show(record, "runs/tiny", {}, "simulate")
-        assert (store.root / "runs" / "tiny" / "vtu").read_bytes() == b"mesh"
+    store.show(record, "runs/tiny", {"nc": "run.nc"}, "simulate")
+    shown, kept = store.root / "runs" / "tiny" / "run.nc", store.path("simulate", KEY, "nc")
+    assert not shown.samefile(kept)
+    assert shown.stat().st_mode & 0o777 == 0o444
+    before = shown.stat().st_ino
+    store.show(record, "runs/tiny", {"nc": "run.nc"}, "simulate")
+    assert shown.stat().st_ino == before  # what is there is not copied again
+    shown.chmod(0o644)
+    with shown.open("ab") as file:
+        file.write(b"edited")
+    assert store.find("simulate", KEY) == record
+    store.show(record, "runs/tiny", {"nc": "run.nc"}, "simulate")
+    assert shown.read_bytes() == kept.read_bytes()
+    assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
+    (told,) = said
+    assert "run.nc was edited; the edit is kept as run.edited.nc" in told
+
+
+def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):
+    store.show(put(store), "runs/tiny", {}, "simulate")
+    store.show(store.put("simulate", "l" * 32, {"nc": dataset(9)}, {}), "runs/tiny", {}, "simulate")
+    assert said == []
+    assert sorted(os.listdir(store.root / "runs" / "tiny")) == [".facts", "nc", "vtu"]
+
+
+@pytest.mark.parametrize("shown", [False, True])
+def test_a_flipped_bit_in_a_record_makes_the_artifact_absent(store: Store, shown: bool):
+    """Also one that leaves it readable: another fact, another digest. The same holds of the facts that are shown."""
+    record = put(store)
+    store.show(record, "runs/tiny", {}, "simulate")
+    path = store.root / "runs/tiny/.facts/simulate.json" if shown else store.path("simulate", KEY, "json")
+    path.chmod(0o644)
+    whole = path.read_bytes()
+    for place in range(0, len(whole), 7):
+        path.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
+        found = store.last("runs/tiny", "simulate") if shown else store.find("simulate", KEY)
+        assert found is None or found == record  # white space says nothing
+    path.write_bytes(whole)
+    assert store.last("runs/tiny", "simulate") == record
+
+
+def test_what_the_dead_left_is_swept_and_what_is_held_stays(store: Store):
+    put(store)
+    folder = store.path("simulate", KEY, "nc").parent
+    dead = subprocess.Popen([sys.executable, "-c", ""])
+    dead.wait()
+    names = {
+        f".a.{disk._host()}-{dead.pid}.0badcafe.tmp": False,
+        f".b.{disk._host()}-{os.getpid()}.0badcafe.tmp": True,
+        f".c.0badcafe-{dead.pid}.0badcafe.tmp": True,  # of another machine, and young
+        "d.lock": False,
+        "notes.tmp": True,  # none of ours
+    }
+    for name in names:
+        (folder / name).touch()
+    with store.lock("simulate", "e" * 32):
+        store.sweep()
+        assert {name: (folder / name).exists() for name in names} == names
+        assert (folder / f"{'e' * 32}.lock").exists()
+    assert not (folder / f"{'e' * 32}.lock").exists()
+    os.utime(folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp", (0.0, 0.0))
+    store.sweep()
+    assert not (folder / f".c.0badcafe-{dead.pid}.0badcafe.tmp").exists()
+
+
+def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The folder is forced to the disk after the file has got its name there."""
+    forced: list[str] = []
+    real = os.fsync
+    monkeypatch.setattr(
+        os, "fsync", lambda handle: (forced.append(os.readlink(f"/proc/self/fd/{handle}")), real(handle))
+    )
+    publish(tmp_path / "a.bin", b"content")
+    assert forced[0].endswith(".tmp")
+    assert forced[1:] == [str(tmp_path)]

@@ -7,11 +7,15 @@ import os
 import signal
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 import xarray as xr
 
+from pipeline.core.artifacts.disk import _host
 from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
+
+AddScene = Callable[[str, str], None]
 
 
 def test_what_is_fresh_is_not_run_again(project: Project):
@@ -145,13 +149,18 @@ def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     assert [path.name for path in project.results.rglob("*") if path.is_file() and path.stat().st_size] == []
 
 
-def test_a_scene_that_says_the_same_is_run_under_its_own_name(project: Project, add_scene: Callable[[str, str], None]):
-    """Two scenes may be equal in all but the name; each has its own artifacts, named as it is."""
+def test_a_scene_that_says_the_same_under_another_name_is_not_run_again(
+    project: Project, add_scene: Callable[[str, str], None]
+):
+    """The name of its file is no fact; both show the result, and only `run` from Python and `--out` name it."""
     add_scene("twin", SCENE + JOINT)
     for name in ("ideal", "twin"):
-        project.run("run", f"tiny/{name}", "--to", "simulate")
-        run = xr.load_dataset(project.results / "runs" / "tiny" / name / "run.nc", decode_times=False)
-        assert run.attrs["scene"] == f"tiny/{name}"
+        project.run("run", f"tiny/{name}", "--to", "simulate", "--out", str(project.folder / f"{name}.nc"))
+        named = xr.load_dataset(project.folder / f"{name}.nc", decode_times=False)
+        assert named.attrs["scene"] == f"tiny/{name}"
+    assert project.calls() == ["simulate tiny/ideal"]
+    shown = [project.results / "runs" / "tiny" / name / "run.nc" for name in ("ideal", "twin")]
+    assert shown[0].read_bytes() == shown[1].read_bytes()
 
 
 def test_the_ensemble_is_a_stage_of_its_own(project: Project, add_scene: Callable[[str, str], None]):
@@ -213,3 +222,121 @@ def _wait_for(condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < end
         time.sleep(0.02)
+
+
+def test_two_files_of_one_name_are_told_apart_or_refused(project: Project):
+    """Below the current folder they are called by their paths; elsewhere one must not take the other's place."""
+    for name in ("a", "b"):
+        (project.folder / name).mkdir()
+        (project.folder / name / "x.toml").write_text(SCENE + JOINT + f"\n# {name}\n")
+    assert project.run("run", "a/x.toml", "b/x.toml", "--to", "simulate").returncode == 0
+    assert all((project.results / "runs" / name / "x" / "run.nc").is_file() for name in ("a", "b"))
+    away = project.folder.parent / "away"
+    away.mkdir()
+    paths = [str((project.folder / name / "x.toml").rename(away / f"{name}.toml")) for name in ("a", "b")]
+    (away / "c").mkdir()
+    twin = away / "c" / "a.toml"
+    twin.write_text(SCENE + JOINT)
+    done = project.run("run", paths[0], str(twin))
+    assert done.returncode == 2
+    assert "is called 'a', as" in done.stderr
+    assert "take each other's place" in done.stderr
+    project.run("run", paths[0], "--to", "simulate")
+    done = project.run("run", str(twin), "--to", "simulate")
+    assert done.returncode == 0
+    assert f"runs/a showed {paths[0]}, and from now on shows {twin}" in done.stderr
+
+
+def test_a_run_that_failed_or_was_killed_does_not_leave_the_last_one_looking_current(
+    project: Project, add_scene: Callable[[str, str], None]
+):
+    folder = project.results / "runs" / "tiny" / "ideal"
+    project.run("run", "tiny/ideal")
+    assert not (folder / "OUTDATED.txt").exists()
+    engine = "pipeline/dynamics/__init__.py"
+    project.edit(engine, 'if "fails" in scene.name', 'if "ideal" in scene.name')
+    assert project.run("run", "tiny/ideal").returncode == 3
+    told = (folder / "OUTDATED.txt").read_text()
+    assert "of an earlier state" in told
+    assert "simulate: tiny/ideal simulate: at t = 0.1 s joint A1: no step is small enough" in told
+    assert "post: tiny/ideal simulate: at t = 0.1 s" in told
+    assert "what is shown is of an earlier state: tiny/ideal simulate: at t" in project.run("why", "tiny/ideal").stdout
+    project.edit(engine, 'if "ideal" in scene.name', 'if "other" in scene.name')
+    process = project.start("run", "tiny/ideal", HELD_BY=str(project.hold))
+    project.calls()
+    _wait_for(lambda: (project.folder / "calls").exists())
+    process.kill()
+    process.communicate(timeout=PATIENCE)
+    assert "making it again was begun and not finished" in (folder / "OUTDATED.txt").read_text()
+    assert project.run("run", "tiny/ideal").returncode == 0
+    assert not (folder / "OUTDATED.txt").exists()
+    assert project.run("why", "tiny/ideal").stdout.count("fresh") == 2
+
+
+def test_workers_and_what_they_left_are_gone_after_their_parent_was_killed(project: Project):
+    """Whatever it was killed by; temporary files and locks go with the next command."""
+    process = project.start("run", "tiny/ideal", "tiny/contact", HELD_BY=str(project.hold))
+    _wait_for(lambda: len((project.folder / "calls").read_text().splitlines() if _started(project) else []) == 2)
+    family = _descendants(process.pid)
+    assert len(family) >= 3  # two workers and the manager of their reports
+    locks = list(project.results.rglob("*.lock"))
+    assert locks
+    process.kill()
+    process.communicate(timeout=PATIENCE)
+    _wait_for(lambda: not any(_alive(pid) for pid in family))
+    left = project.results / "cache" / "simulate" / locks[0].name.replace(".lock", ".json")
+    stem = f".{left.stem}.{_host()}-{process.pid}.0badcafe.tmp"
+    (left.parent / stem).write_bytes(b"half a record")
+    assert project.run("why", "tiny/ideal").returncode == 0
+    assert project.run("run", "tiny/ideal").returncode == 0
+    assert not list(project.results.rglob("*.lock"))
+    assert not list(project.results.rglob("*.tmp"))
+
+
+def _started(project: Project) -> bool:
+    return (project.folder / "calls").exists()
+
+
+def _descendants(pid: int) -> list[int]:
+    """Processes that it started, and those that these started."""
+    found = []
+    for task in Path(f"/proc/{pid}/task").iterdir():
+        for child in map(int, (task / "children").read_text().split()):
+            found += [child, *_descendants(child)]
+    return found
+
+
+def _alive(pid: int) -> bool:
+    """A zombie has ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(project: Project, add_scene: AddScene):
+    add_scene("doubtful", SCENE + JOINT)
+    told = ["tiny/doubtful: warning: the rod bends too far", "tiny/doubtful: warning: the contact is too deep"]
+    for _ in range(2):  # the second time nothing runs
+        done = project.run("run", "tiny/doubtful")
+        assert done.returncode == 0
+        assert done.stderr.splitlines()[-2:] == [f"flexclear: {sentence}" for sentence in told]
+
+
+def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(project: Project, add_scene: AddScene):
+    wanted = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
+    add_scene("wanted", wanted)
+    for _ in range(2):
+        done = project.run("run", "tiny/wanted")
+        assert done.returncode == 3
+        assert "tiny/wanted [accuracy]: missed: ball.position is good to 2e-06, 2 times what is wanted" in done.stderr
+        assert "allow_missed = true" in done.stderr
+        assert "Traceback" not in done.stderr
+    kept = xr.load_dataset(project.results / "runs" / "tiny" / "wanted" / "run.nc", decode_times=False)
+    assert "2 times what is wanted" in kept.attrs["accuracy_verdict"]
+    project.calls()
+    add_scene("wanted", wanted + "allow_missed = true\n")
+    done = project.run("run", "tiny/wanted")
+    assert done.returncode == 0
+    assert "missed: ball.position" in done.stderr
+    assert project.calls() == []  # whether it may be missed changes nothing of the run

@@ -22,6 +22,15 @@ SOLID: Schema = {
     "tie_frame": _V(("tie",), "1", "index of the frame that it is tied to"),
 }
 
+#: beside stage 3: what a rigid body made from a mesh needs
+RIGID: Schema = {
+    "mass": _V((), "kg", "mass"),
+    "com": _V(("axis",), "m", "centre of mass in the mesh frame"),
+    "inertia": _V(("axis", "axis2"), "kg m2", "inertia about the centre of mass, axes of the mesh frame"),
+    "frame_position": _V(("frame", "axis"), "m", "origin of the named frame in the mesh frame"),
+    "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, frame to mesh frame"),
+}
+
 #: stage 1 of a body that another code has assembled: matrices by their entries, and what the unknowns are
 MATRICES: Schema = {
     "unknown_node": _V(("unknown",), "1", "number of the node"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from pipeline.core.version import version
+
 CHECKOUT = Path(__file__).resolve().parents[3]
 
 
@@ -18,8 +20,17 @@ def results_root() -> Path:
 
 
 def kernel_root() -> Path:
-    """The folder of compiled kernels: FLEXCLEAR_KERNELS, or ``cache/kernels`` of the results.
+    """The folder of compiled kernels: FLEXCLEAR_KERNELS, or one per user and version in the user's cache folder.
 
-    Their names say all that they depend on, so that several result folders may share one.
+    Not below the results, which people send to each other: to load a kernel is to run code. The names of kernels say
+    all that they depend on, so that every project of a user may share one folder.
     """
-    return Path(os.environ.get("FLEXCLEAR_KERNELS") or results_root() / "cache" / "kernels").resolve()
+    named = os.environ.get("FLEXCLEAR_KERNELS")
+    return Path(named).resolve() if named else kernel_home() / version().replace(" ", "_") / "kernels"
+
+
+def kernel_home() -> Path:
+    """The user's cache folder of this program, with a folder for each version that has been used."""
+    from platformdirs import user_cache_path  # here, since few commands ask for it
+
+    return user_cache_path("flexclear", appauthor=False)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, SOLID, STRESS
+from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from pipeline.core.scene.output import VARIABLES
 from pipeline.core.variable import Schema, Variable
@@ -21,6 +21,7 @@ __all__ = [
     "MATRICES",
     "MESH",
     "MODES",
+    "RIGID",
     "RUN",
     "SOLID",
     "STRESS",
@@ -74,8 +75,21 @@ RUN: Schema = {
     "load_length": _V(
         ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
     ),
+    "bushing_displacement": _V(
+        ("time", "bushing", "axis"), "m", "second frame's origin in the first one's axes", optional=True
+    ),
+    "bushing_rotation": _V(
+        ("time", "bushing", "axis"), "rad", "rotation vector from the first frame to the second", optional=True
+    ),
     "load_power": _V(
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
+    ),
+    "controller_force": _V(
+        ("time", "controller"), "N or N m", "force of the controller along the coordinate it pushes", optional=True
+    ),
+    "controller_integral": _V(("time", "controller"), "N or N m", "integral part of that force", optional=True),
+    "gear_force": _V(
+        ("time", "gear"), "N or N m", "force of the gear along its second coordinate, on its second body", optional=True
     ),
     "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
     "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
@@ -164,7 +178,39 @@ ENSEMBLE: Schema = {
     ),
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
     "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
+    "peak_acceleration": _V(
+        ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
+    ),
     "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
+}
+
+_OF_SECTION = {
+    name: _V(("section", *ENSEMBLE[name].dims[2:]), ENSEMBLE[name].units, ENSEMBLE[name].long_name)
+    for name in ("position", "quaternion", "velocity", "angular_velocity", "acceleration")
+}
+#: sections of a periodic motion: the state once in each period, and the impacts of all kept periods
+SECTIONS: Schema = _OF_SECTION | {
+    "orbit_position": _V(("waypoint", "body", "axis"), "m", "centre of mass at waypoints of the last period"),
+    "orbit_quaternion": _V(("waypoint", "body", "quat"), "1", "unit quaternion at waypoints of the last period"),
+    "orbit_velocity": _V(("waypoint", "body", "axis"), "m s-1", "velocity at waypoints of the last period"),
+    "orbit_contact_offset": _V(
+        ("waypoint", "contact", "axis"), "m", "ball centre relative to the socket centre there", optional=True
+    ),
+    "contact_offset": _V(
+        ("section", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True
+    ),
+    "growth": _V(("followed",), "1", "logarithm of how a neighbour's distance grew in the period"),
+    "impact_section": _V(("impact",), "1", "index of the period in which the impact began", optional=True),
+    "impact_contact": _V(("impact",), "1", "index of the contact", optional=True),
+    "impact_phase": _V(("impact",), "s", "time of the closing since the period began", optional=True),
+    "impact_approach_speed": _V(("impact",), "m s-1", "rate of penetration at the closing", optional=True),
+    "impact_peak_force": _V(("impact",), "N", "largest normal force of the contact that it begins", optional=True),
+    "impact_duration": _V(("impact",), "s", "duration of that contact", optional=True),
+    "impact_position": _V(("impact", "body", "axis"), "m", "centre of mass at the closing, world axes", optional=True),
+    "impact_quaternion": _V(("impact", "body", "quat"), "1", "unit quaternion at the closing", optional=True),
+    "impact_velocity": _V(
+        ("impact", "body", "axis"), "m s-1", "velocity of the centre of mass at the closing", optional=True
+    ),
 }
 
 _STILL = """position quaternion frame_position joint_force joint_moment joint_position modal_coordinate
@@ -208,7 +254,7 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         variable, values = schema[name], dataset[name]
         if values.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
-        may_be_open = name.startswith("event_")  # an event that the run's end cuts short has no duration
+        may_be_open = name.startswith(("event_", "impact_"))  # what the run's end cuts short has no duration
         if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         result[name].attrs = {"units": variable.units, "long_name": variable.long_name}

@@ -10,15 +10,26 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
-import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from pipeline.core.artifacts.disk import (
+    checked,
+    copy,
+    disk_limits,
+    is_copy,
+    locked,
+    publish,
+    read_checked,
+    settle,
+    sha256,
+    sweep,
+    temporary,
+)
 from pipeline.core.errors import ResourceError
 
 if TYPE_CHECKING:
@@ -28,23 +39,30 @@ if TYPE_CHECKING:
 
 #: the file of an artifact that other stages read
 MAIN = "nc"
-#: what a full or limited disk answers
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+#: attributes of the main file that a command tells, without opening the file
+TOLD = ("warnings", "accuracy_verdict")
+#: lies beside what is shown and is not of the scene as it is now
+OUTDATED = "OUTDATED.txt"
+OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key."""
+    """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
+
+    said: those of the main file's attributes that a command tells its user (`TOLD`).
+    """
 
     stage: str
     key: str
     files: Mapping[str, str]
     facts: Mapping[str, str]
+    said: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
         """Content of the artifact in one digest: that of its main file, else of all its files."""
-        return self.files.get(MAIN) or _sha256(json.dumps(self.files, sort_keys=True).encode())
+        return self.files.get(MAIN) or sha256(json.dumps(self.files, sort_keys=True).encode())
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +91,7 @@ class Store:
         for name, digest in record.files.items():
             path = self.path(record.stage, record.key, name)
             try:
-                found = _sha256(path.read_bytes())
+                found = sha256(path.read_bytes())
             except OSError:
                 return f"{self._shown(path)} is missing"
             if found != digest:
@@ -92,9 +110,9 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
-            record = Record(stage, key, digests, dict(facts))
-            text = json.dumps(asdict(record), indent=1, sort_keys=True, ensure_ascii=False)
-            publish(self.path(stage, key, "json"), text.encode() + b"\n")
+            said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
+            record = Record(stage, key, digests, dict(facts), said)
+            publish(self.path(stage, key, "json"), checked(asdict(record)))
         return record
 
     def load(self, record: Record) -> xr.Dataset:
@@ -103,28 +121,80 @@ class Store:
 
         path = self.path(record.stage, record.key, MAIN)
         content = path.read_bytes()
-        if _sha256(content) != record.files[MAIN]:
+        if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
         return xr.load_dataset(content, engine="netcdf4", decode_times=False)
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
-        """Make the current artifact visible: links in `folder`, and its facts in ``folder/.facts``.
+        """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
 
-        An empty `folder` shows nothing.
+        An empty `folder` shows nothing.  A shown file that somebody has edited is kept under another name, and told.
         """
         if not folder:
             return
         shown = {name: self.root / folder / names.get(name, name) for name in record.files}
-        shown["json"] = self.root / folder / ".facts" / f"{label.replace(' ', '.')}.json"
+        shown["json"] = self._facts(folder, label)
         with disk_limits(self.root / folder):
             for name, target in shown.items():
-                link(self.path(record.stage, record.key, name), target)
+                source = self.path(record.stage, record.key, name)
+                if not is_copy(source, target):
+                    self._keep_edited(target, name, folder, label)
+                    copy(source, target)
+            self._facts(folder, label, "failed").unlink(missing_ok=True)
+            self._tell_outdated(folder)
+
+    def _keep_edited(self, target: Path, name: str, folder: str, label: str) -> None:
+        """Move a shown file out of the way that is neither of the artifact shown last nor of any other."""
+        last = self.last(folder, label)
+        if last is None or name not in last.files or not target.is_file() or target.is_symlink():
+            return
+        if sha256(target.read_bytes()) != last.files[name]:
+            aside = target.with_name(f"{target.stem}.edited{target.suffix}")
+            os.replace(target, aside)
+            self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
+
+    def outdated(self, folder: str, label: str, why: str) -> None:
+        """Note beside what is shown that it is of an earlier state, and why; `show` takes the note away."""
+        if not folder:
+            return
+        with disk_limits(self.root / folder):
+            self._facts(folder, label).parent.mkdir(parents=True, exist_ok=True)
+            publish(self._facts(folder, label, "failed"), checked({"label": label, "why": why}))
+            self._tell_outdated(folder)
+
+    def why_outdated(self, folder: str, label: str) -> str | None:
+        """What `outdated` has noted, if it has."""
+        table = read_checked(self._facts(folder, label, "failed")) if folder else None
+        return None if table is None else str(table["why"])
+
+    def _tell_outdated(self, folder: str) -> None:
+        path = self.root / folder / OUTDATED
+        notes = [read_checked(found) for found in sorted((path.parent / ".facts").glob("*.failed"))]
+        lines = [f"{note['label']}: {note['why']}\n" for note in notes if note is not None]
+        if lines:
+            publish(path, (OUTDATED_TEXT + "".join(lines)).encode())
+        else:
+            path.unlink(missing_ok=True)
+
+    def _facts(self, folder: str, label: str, suffix: str = "json") -> Path:
+        return self.root / folder / ".facts" / f"{label.replace(' ', '.')}.{suffix}"
 
     def last(self, folder: str, label: str) -> Record | None:
         """The artifact that was shown last, whatever its key; its files are not checked."""
         if not folder:
             return None
-        return read_record(self.root / folder / ".facts" / f"{label.replace(' ', '.')}.json")
+        return read_record(self._facts(folder, label))
+
+    def names(self, stage: str, plain: str) -> tuple[str, ...]:
+        """Files that the tasks of one plain key have opened so far; none where none was made yet."""
+        table = read_checked(self.path(stage, plain, "names"))
+        return tuple(table["names"]) if table is not None else ()
+
+    def keep_names(self, stage: str, plain: str, names: Sequence[str]) -> None:
+        """Remember them."""
+        path = self.path(stage, plain, "names")
+        with disk_limits(path.parent):
+            publish(path, checked({"names": list(names)}))
 
     @contextlib.contextmanager
     def lock(self, stage: str, key: str, waiting: Callable[[], None] = lambda: None) -> Iterator[None]:
@@ -134,38 +204,35 @@ class Store:
         process that dies.
         """
         path = self.path(stage, key, "lock")
-        with disk_limits(path.parent):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            handle = path.open("ab")
-        with handle:
-            if not _try_lock(handle.fileno()):
-                waiting()
-                fcntl.flock(handle, fcntl.LOCK_EX)
+        with contextlib.ExitStack() as stack:
+            with disk_limits(path.parent):
+                path.parent.mkdir(parents=True, exist_ok=True)
+                stack.enter_context(locked(path, waiting=waiting))
             for left in path.parent.glob(f".{key}.*.tmp"):
                 left.unlink(missing_ok=True)
             yield
+
+    def sweep(self) -> None:
+        """Remove what killed processes left anywhere."""
+        sweep(self.root)
 
     def _shown(self, path: Path) -> str:
         return str(path.relative_to(self.root.parent))
 
 
 def read_record(path: Path) -> Record | None:
-    """The record in a file; None when there is none or it cannot be understood."""
+    """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
     try:
-        table = json.loads(path.read_bytes())
-        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]))
-    except (OSError, ValueError, KeyError, TypeError):
+        table = read_checked(path) or {}
+        said = dict(table.get("said", {}))
+        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]), said)
+    except (ValueError, KeyError, TypeError):
         return None
 
 
-def publish(path: Path, content: bytes) -> str:
-    """Write a file so that it is either there in full or not at all; returns its sha256."""
-    with _temporary(path) as temporary:
-        temporary.write_bytes(content)
-        if temporary.read_bytes() != content:
-            raise OSError(errno.EIO, "what was written does not read back", str(path))
-        _settle(temporary, path)
-    return _sha256(content)
+def _attributes(product: Product) -> Mapping[str, object]:
+    """Attributes of the main file; none where it is no dataset."""
+    return getattr(product.get(MAIN), "attrs", {})
 
 
 def write_dataset(path: Path, dataset: xr.Dataset) -> str:
@@ -174,83 +241,20 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> str:
     Equal datasets give equal bytes: fixed compression, no times or names of this machine. Numeric
     arrays are compressed and carry fletcher32 sums, so that other programs notice damage too.
     """
+    import netCDF4  # noqa: F401 - what `engine` names: its version is a fact of every key
     import xarray as xr
 
     packed = {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}
     encoding = {str(n): packed for n, v in dataset.variables.items() if v.ndim and v.size and v.dtype.kind in "fiu"}
-    with _temporary(path) as temporary:
+    with temporary(path) as made:
         try:
-            dataset.to_netcdf(temporary, engine="netcdf4", encoding=encoding)
+            dataset.to_netcdf(made, engine="netcdf4", encoding=encoding)
         except (OSError, RuntimeError) as error:
             # the HDF5 library has no or a wrong name for a full disk; plain bytes get the true reason
-            temporary.write_bytes(bytes(dataset.nbytes + 2**20))
+            made.write_bytes(bytes(dataset.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
-        content = temporary.read_bytes()
+        content = made.read_bytes()
         if not xr.load_dataset(content, engine="netcdf4", decode_times=False).equals(dataset):
             raise OSError(errno.EIO, "what was written does not read back", str(path))
-        _settle(temporary, path)
-    return _sha256(content)
-
-
-def link(source: Path, target: Path) -> None:
-    """Let `target` show `source`: a hard link, or a copy where links are not possible. Atomic."""
-    try:
-        if target.samefile(source):
-            return
-    except OSError:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    with _temporary(target) as temporary:
-        try:
-            os.link(source, temporary)
-        except OSError as error:
-            if error.errno in FULL:
-                raise
-            content = source.read_bytes()
-            if target.is_file() and target.read_bytes() == content:
-                return
-            temporary.write_bytes(content)
-        os.replace(temporary, target)
-
-
-@contextlib.contextmanager
-def _temporary(path: Path) -> Iterator[Path]:
-    """A name beside `path` that no other process uses; gone afterwards, however it ends."""
-    stem = path.name.partition(".")[0]
-    temporary = path.with_name(f".{stem}.{os.getpid()}.{os.urandom(4).hex()}.tmp")
-    try:
-        yield temporary
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _settle(temporary: Path, path: Path) -> None:
-    """Force the bytes to the disk, then give the file its name."""
-    with temporary.open("rb") as file:
-        os.fsync(file.fileno())
-    os.replace(temporary, path)
-
-
-@contextlib.contextmanager
-def disk_limits(folder: Path) -> Iterator[None]:
-    """OSError on the way to disk, as a limit of the machine, in words."""
-    try:
-        yield
-    except OSError as error:
-        why = "the disk is full or a file size limit was reached" if error.errno in FULL else str(error.strerror)
-        raise ResourceError(f"cannot write below {folder}: {why}; nothing half-written was left") from None
-
-
-def _try_lock(descriptor: int) -> bool:
-    """False when another process holds it. A file system without locks counts as free: unique
-    temporary names and atomic replacement keep results right, work may then be done twice."""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def _sha256(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()
+        settle(made, path)
+    return sha256(content)

@@ -128,8 +128,8 @@ def _not_above(dynamic: float, static: float) -> None:
         )
 
 
-class _Clearance(Part):
-    """What all clearance joints have.
+class _Contact(Part):
+    """What all contacts between surfaces have.
 
     floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
     for grazing and resting contact.  initial_approach_speed: impact rate of a contact that the
@@ -137,11 +137,21 @@ class _Clearance(Part):
     """
 
     between: tuple[FrameName, FrameName]
-    clearance: Annotated[Length, Positive]
     normal: NormalLaw
     friction: Friction | None = None
     floor: Annotated[Speed, Positive] = 1e-6
     initial_approach_speed: Annotated[Speed, Positive] | None = None
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """What else the kernels of its surfaces take."""
+        return 0.0, 0.0
+
+
+class _Clearance(_Contact):
+    """What all clearance joints have; clearance: radial."""
+
+    clearance: Annotated[Length, Positive]
 
 
 class ClearanceSpherical(_Clearance):
@@ -196,9 +206,79 @@ class ClearanceRevolute(_Clearance):
         return self.journal_material, self.pin_material
 
 
+class ClearanceSlot(_Clearance):
+    """Pin in a straight slot with round ends; between = [slot frame, pin frame].
+
+    The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
+    clearance: half the slot's width less the pin's radius.  travel: of the pin's centre in the middle of the slot, from
+    where the one end's half circle has its centre to the other's.  length: of the bearing, along the axis.
+    """
+
+    type: Literal["clearance-slot"]
+    travel: Annotated[Length, Positive]
+    pin_radius: Annotated[Length, Positive]
+    length: Annotated[Length, Positive]
+    slot_material: Material | None = None
+    pin_material: Material | None = None
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> ClearanceSlot:
+        _require_materials(self.normal, self.materials, "slot_material and pin_material")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return self.pin_radius
+
+    @property
+    def shape(self) -> tuple[float, float]:
+        """Half the length of the straight part [m]."""
+        return 0.5 * self.travel, 0.0
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Of the outer and the inner surface."""
+        return self.slot_material, self.pin_material
+
+
+class BallOnPlane(_Contact):
+    """Ball above a plane without end; between = [plane frame, ball frame].
+
+    The plane is that of x and y of its frame; the ball is on the side of z.
+    """
+
+    type: Literal["ball-on-plane"]
+    ball_radius: Annotated[Length, Positive]
+    plane_material: Material | None = None
+    ball_material: Material | None = None
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> BallOnPlane:
+        _require_materials(self.normal, self.materials, "plane_material and ball_material")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return self.ball_radius
+
+    @property
+    def clearance(self) -> float:
+        """Way that counts as far [m]: there is no other wall."""
+        return self.ball_radius
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Of the outer and the inner surface."""
+        return self.plane_material, self.ball_material
+
+
 def _require_materials(law: NormalLaw, materials: tuple[Material | None, Material | None], names: str) -> None:
     if law.stiffness is None and None in materials:
         raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
 
 
-Clearance = ClearanceSpherical | ClearanceRevolute
+Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
+#: all of them
+CONTACTS: tuple[Any, ...] = get_args(Clearance)

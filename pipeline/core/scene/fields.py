@@ -134,12 +134,16 @@ Inertia = Annotated[
 
 #: names of bodies and frames: letters of any script, digits, underscores and hyphens
 _NAME = r"\w[\w-]*"
+#: files are called by them
+LONGEST_NAME = 100
 
 
 def part_name(name: str) -> str:
     """A part's name that may stand in places such as ``body.FRAME`` and in names of files; ValueError otherwise."""
-    if not re.fullmatch(_NAME, name):
-        raise ValueError(f"'{name}' is no name: it is made of letters, digits, _ and -")
+    if len(name) > LONGEST_NAME or not re.fullmatch(_NAME, name):
+        raise ValueError(f"'{name}' is no name: it is made of up to {LONGEST_NAME} letters, digits, _ and -")
+    if name == "source":
+        raise ValueError("'source' is no name for a part: it says where values come from")
     return name
 
 

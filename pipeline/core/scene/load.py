@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import re
+import stat
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache, lru_cache
@@ -11,16 +13,20 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.core.errors import InputError
+from pipeline.core.errors import InputError, shown
 from pipeline.core.registry import suggestion
+from pipeline.core.scene.fields import LONGEST_NAME
+from pipeline.core.scene.limits import check_parts
 from pipeline.core.scene.mistakes import input_errors
 from pipeline.core.scene.not_toml import not_toml
 from pipeline.core.scene.schema import Scene
 
-FAMILIES = ("body", "joint", "drive", "load")
-SETTINGS = ("time", "solver", "output", "ensemble", "accuracy")
+FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
+SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
 #: bytes that no scene or recipe needs
-LARGEST = 16 << 20
+LARGEST = 4 << 20
+#: a key of more parts than a scene has levels; the reader of TOML takes their number squared
+DEEP = re.compile(r"(?<![\w-])(?:[\w-]{1,100}\s{0,9}\.\s{0,9}){50}")
 EDITS = ("extends", "replace", "set", "remove")
 
 
@@ -31,15 +37,39 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     must be there.  Raises InputError (all mistakes at once).
     """
     path = Path(path)
+    name = scene_name(path)
     table = compose(path)
     for place, value in (override or {}).items():
         _put(table, place, value, f"override of {path}")
+    check_parts(table, path, FAMILIES)
     try:
         scene = Scene.model_validate(table)
     except ValidationError as error:
         raise input_errors(path, error, Scene) from None
-    scene._name = scene_name(path)
+    scene._name = name
     scene._path = path
+    return scene
+
+
+def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
+    """The scene in a table with the keys of a scene file; files in it are relative to the current folder.
+
+    override and errors as of `load_scene`.  Its name is its title's.
+    """
+    place = Path("scene")
+    found = copy.deepcopy(dict(table))
+    _require_tables(found, place)
+    if any(key in found for key in EDITS):
+        raise InputError("scene", "edits another scene, which only files do", "use edited(scene, changes)")
+    _absolute_files(found, Path.cwd() / place)
+    for key, value in (override or {}).items():
+        _put(found, key, value, "override of scene")
+    check_parts(found, Path("scene"), FAMILIES)
+    try:
+        scene = Scene.model_validate(found)
+    except ValidationError as error:
+        raise input_errors("scene", error, Scene) from None
+    scene._name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     return scene
 
 
@@ -83,8 +113,7 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
             read = _reader(family).validate_python({name: table} if name else table)
             whole = {**getattr(result, family), **read} if name else read
             result = result.model_copy(update={family: whole})
-            if not name:
-                result.check()
+            result.check()
         except (ValidationError, InputError, ValueError):
             return edited(scene, override)  # which tells what is wrong, with its place
     return result
@@ -99,17 +128,38 @@ def _reader(family: str) -> Any:
 
 
 def scene_name(path: Path) -> str:
-    """Path below the last folder called ``scenes``, without suffix; else the file's stem."""
-    parts = path.resolve().with_suffix("").parts
-    if "scenes" in parts:
-        last = len(parts) - 1 - parts[::-1].index("scenes")
-        return "/".join(parts[last + 1 :])
-    return parts[-1]
+    """Path without suffix below the last folder called ``scenes``; else below the current folder; else the stem.
+
+    Raises InputError where that cannot be the name of a folder.
+    """
+    whole = _resolved(path).with_suffix("")
+    if not whole.name.strip(".") or not whole.name.isprintable():
+        raise InputError(shown(str(path)), "is no name for a scene: results go into a folder of that name", "rename it")
+    if "scenes" in whole.parts[:-1]:
+        last = len(whole.parts) - 1 - whole.parts[::-1].index("scenes")
+        return "/".join(whole.parts[last + 1 :])
+    here = Path.cwd()
+    return whole.relative_to(here).as_posix() if whole.is_relative_to(here) else whole.name
+
+
+def _resolved(path: Path) -> Path:
+    try:
+        return path.resolve()
+    except (OSError, RuntimeError, ValueError) as error:  # it loops, is too long, or holds a NUL
+        raise InputError(str(path), f"is no path: {error}", "name a TOML file") from None
+
+
+def is_file(path: Path) -> bool:
+    """Whether an ordinary file is there; what can be no path is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     """The plain table of a scene file after `extends`, `replace`, `set` and `remove`."""
-    path = path.resolve()
+    path = _resolved(path)
     if path in above:
         chain = " -> ".join(p.name for p in (*above, path))
         raise InputError(str(path), f"extends itself: {chain}", "break the circle")
@@ -156,9 +206,15 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a table; InputError when it cannot be read or parsed."""
     try:
-        if path.stat().st_size > LARGEST:
+        status = path.stat()
+        if not stat.S_ISREG(status.st_mode):
+            raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")
+        if status.st_size > LARGEST:
             raise InputError(str(path), f"is larger than {LARGEST >> 20} MB", "name a TOML file")
-        return copy.deepcopy(_parsed(path.read_text(encoding="utf-8-sig")))
+        text = path.read_text(encoding="utf-8-sig")
+        if DEEP.search(text):
+            raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
+        return copy.deepcopy(_parsed(text))
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -169,6 +225,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise not_toml(path, path.read_text(encoding="utf-8-sig"), str(error)) from None
     except RecursionError:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
+    except ValueError as error:  # a NUL in the path, a number of more digits than Python reads
+        raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
 
 
 @lru_cache(maxsize=64)
@@ -283,7 +341,7 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
     """Recipes and tables are looked for beside the scene, then in each folder above it."""
 
     def found(name: str) -> str:
-        return str(next((p for p in (folder / name for folder in path.parents) if p.is_file()), path.parent / name))
+        return str(next((p for p in (folder / name for folder in path.parents) if is_file(p)), path.parent / name))
 
     for body in table.get("body", {}).values():
         mesh = body.get("mesh") if isinstance(body, dict) else None

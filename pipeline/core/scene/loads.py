@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness
+from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
 from pipeline.core.scene.laws import Bare, Value
+from pipeline.core.scene.matrices import NOTHING, BushingDamping, BushingStiffness
 
 Components = tuple[Bare, Bare, Bare]
 
@@ -106,8 +107,75 @@ class JointFriction(Part):
     coulomb: Coulomb | None = None
 
 
+class Bushing(Part):
+    """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second one.
+
+    The displacements are those of the second frame in the first one's axes: x, y, z of its origin and the rotation
+    vector.  stiffness, damping: six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy.
+    """
+
+    type: Literal["bushing"]
+    between: tuple[FrameName, FrameName]
+    stiffness: BushingStiffness = NOTHING
+    damping: BushingDamping = NOTHING
+
+    @model_validator(mode="after")
+    def _acts(self) -> Bushing:
+        if self.stiffness == NOTHING and self.damping == NOTHING:
+            raise ValueError("a bushing needs a stiffness, a damping, or both; it has neither")
+        return self
+
+
+class _Controller(Part):
+    """What controllers have. They push `joint` along its coordinate by a law of the error = reference - measured.
+
+    measured: the coordinate that is measured, ``A`` or ``A.rotation``; default: the one that is pushed.
+    reference: a law of time of the measured coordinate.
+    proportional, integral, derivative: gains [force, or torque, per unit of the measured coordinate;
+    1/s of it; s of it].
+    limits: least and largest force.  tracking_time: how fast the integral follows a limited output [s]; default
+    proportional/integral.
+    """
+
+    joint: str
+    coordinate: str | None = None
+    measured: str | None = None
+    reference: Bare
+    proportional: Value = 0.0
+    integral: Value = 0.0
+    derivative: Value = 0.0
+    limits: tuple[Value, Value] | None = None
+    tracking_time: Annotated[Time, Field(gt=0.0)] | None = None
+
+
+class Pid(_Controller):
+    """Continuous PID: proportional e + integral of (integral e + (force - asked)/tracking_time) + derivative de/dt."""
+
+    type: Literal["pid"]
+
+
+class SampledPid(_Controller):
+    """PID that looks every `period`, from the start of the run on, and holds its output in between (zero-order hold).
+
+    At sample k: proportional e_k + I_k + derivative (e_k - e_(k-1))/period, no derivative at the first;
+    I_(k+1) = I_k + period (integral e_k + (force - asked)/tracking_time).
+    """
+
+    type: Literal["sampled-pid"]
+    period: Annotated[Time, Field(gt=0.0)]
+
+
 Load = Annotated[
-    Gravity | PointForce | PointTorque | SpringDamper | JointForce | JointSpring | JointFriction,
+    Gravity
+    | PointForce
+    | PointTorque
+    | SpringDamper
+    | JointForce
+    | JointSpring
+    | JointFriction
+    | Bushing
+    | Pid
+    | SampledPid,
     Field(discriminator="type"),
 ]
 #: all of them

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import UnionType
@@ -12,6 +13,8 @@ from pydantic import BaseModel, ValidationError
 from pipeline.core.errors import InputError, InputErrors
 from pipeline.core.registry import suggestion
 
+#: findings that a value is no whole number
+WHOLE = ("int_type", "int_parsing", "int_from_float")
 #: kinds of findings -> what was expected
 EXPECTED = {
     **dict.fromkeys(("tuple_type", "list_type"), "expected a list [...]"),
@@ -20,29 +23,27 @@ EXPECTED = {
     "missing": "is missing",
     "extra_forbidden": "unknown key",
     "union_tag_not_found": "is missing",
-    **dict.fromkeys(("int_type", "int_parsing", "int_from_float"), "expected a whole number"),
+    **dict.fromkeys(WHOLE, "expected a whole number"),
 }
 #: findings that a value is of another kind than one alternative of several: another alternative may fit better
-OTHER_KIND: tuple[str, ...] = (
-    "literal_error",
-    "model_type",
-    "dict_type",
-    "tuple_type",
-    "list_type",
-    "string_type",
-    "float_type",
+OTHER_KIND = (
+    *("literal_error", "model_type", "dict_type", "tuple_type", "list_type", "string_type", "float_type"),
+    *WHOLE,
 )
-OTHER_KIND += ("int_type", "int_parsing", "int_from_float")
 #: keys by which a part says which of several it is
 CHOOSING = ("type", "law")
 #: bounds of numbers, whose messages hold the bound
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
+
+#: a message of a whole scene that opens with the place that it is about
+_NAMED = re.compile(r"([a-z_]+(?:\.[a-z_]+)+): ")
 
 #: how pydantic calls, in a place, the alternative of a number or text that a validator reads
 VALIDATORS = ("function-", "constrained-", "literal[")
 
 #: models that are chosen otherwise than by their type -> how pydantic calls them in a place
 TAGS = {
+    "MeshedRigidBody": ("meshed",),
     "JointDrive": ("joint-drive",),
     "PathDrive": ("path-drive",),
     "PlainIntegrator": ("<plain>",),
@@ -78,7 +79,12 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     keys, known, types = _place(model, error["loc"])
     message, remedy = EXPECTED.get(kind) or _reworded(error), None
     if kind == "extra_forbidden":
-        remedy = suggestion(str(keys[-1]), [key for key in known if key != keys[-1]])
+        near = [key for key in known if key != keys[-1]]
+        if len(keys) == 1 and isinstance(value, dict):
+            near = [key for key in near if key not in ("title", "description", "source")]  # no tables
+        remedy = suggestion(str(keys[-1]), near)
+    elif not keys and kind == "value_error" and (named := _NAMED.match(message)):
+        keys, message = [named[1]], message[named.end() :]
     elif kind == "union_tag_not_found":
         keys, remedy = [*keys, _choosing(context)], f"one of: {', '.join(types)}"
     elif kind == "union_tag_invalid":

@@ -8,7 +8,11 @@ from pathlib import Path
 from pipeline.core.errors import InputError
 from pipeline.core.units import unit
 
+#: characters of a line that is worth mending
+LONGEST = 300
 _LINE = re.compile(r"\(at line (\d+)")
+_PLACE = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
+_OTHER = "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
 #: text in quotation marks, or a comment, both left alone; or a number and what stands after it like a unit
 _PARTS = re.compile(
     r"""("[^"]*"|'[^']*'|\#.*)"""
@@ -22,14 +26,54 @@ def not_toml(path: Path, text: str, message: str) -> InputError:
     found, lines = _LINE.search(message), text.splitlines()
     number = int(found[1]) if found else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
-    quoted = _quoted(line)
+    place = f"{path}, line {number}" if number else str(path)
+    problem, hint = _guessed(line) or _said(message, line)
+    return InputError(place, f"is not TOML: {problem}", hint)
+
+
+def _guessed(line: str) -> tuple[str, str] | None:
+    """What is probably wrong with a line, and what to write instead; None where nothing usual is."""
+    bare = line.strip()
+    value = re.match(r"([\w.\"'-]+)\s*=\s*(.*)$", bare)
+    if bare.startswith(("//", ";", "/*")):
+        return f"a comment begins with #: {bare}", f"write # {bare.lstrip('/;* ')}"
+    if len(re.findall(r"(?<!\\)\"", bare.partition(" #")[0])) % 2:
+        return f"a quotation mark is missing: {bare}", 'text and quantities with units stand between two marks: "1 mm"'
+    quoted = _quoted(line) if len(line) <= LONGEST else line
     if quoted != line:
-        rule = f"a quantity with a unit needs quotation marks: {line.strip()}"
-        return InputError(f"{path}, line {number}", f"is not TOML: {rule}", f"write {quoted.strip()}")
-    hint = None
-    if "at the end of a table declaration" in message or "after a key" in message:
-        hint = "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
-    return InputError(str(path), f"is not TOML: {message}", hint)
+        return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"
+    if value and re.fullmatch(r"[-+]?\d+,\d+", value[2]):
+        return f"a decimal comma is none of TOML's: {bare}", f"write {value[1]} = {value[2].replace(',', '.')}"
+    if value and re.fullmatch(r"[A-Za-z][\w -]*", value[2]) and value[2] not in ("true", "false", "inf", "nan"):
+        return f"text needs quotation marks: {bare}", f'write {value[1]} = "{value[2]}"'
+    if value and not value[2].partition("#")[0]:
+        return f"a value is missing: {bare}", "write one, or take the line away"
+    colon = re.match(r"([\w.-]+)\s*:\s*(.+)$", bare)
+    if colon:
+        return f"key and value are joined by =: {bare}", f"write {colon[1]} = {colon[2]}"
+    return None
+
+
+def _said(message: str, line: str) -> tuple[str, str | None]:
+    """The reader's own message without its place, and a hint where it needs one."""
+    text = _PLACE.sub("", message)
+    twice = re.match(r"Cannot declare \((.*?),?\) twice", text)
+    if twice:
+        name = ".".join(re.findall(r"'([^']*)'", twice[1]))
+        return f"the table [{name}] is there twice", "give it another name, or join both"
+    if text == "Cannot overwrite a value":
+        return f"a key is given twice: {line.strip()}", "take one of the two away"
+    if "key part" in text and line.strip().endswith("{"):
+        return f"{text}: {line.strip()}", "a table in { } stands on one line; longer ones have a [heading] of their own"
+    if "Unclosed" in text or "Expected ']'" in text:
+        hint = _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
+        return f"{text}: {line.strip()}", hint
+    return text, _OTHER if "after a key" in text or "table declaration" in text else None
+
+
+def _odd_name(line: str) -> bool:
+    """Whether the name of a table has characters that TOML takes in quotation marks only."""
+    return bool(re.match(r"\s*\[[^\]\"']*[^\]\"'\x00-\x7f]", line))
 
 
 def _quoted(line: str) -> str:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSpherical
+from pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -62,7 +62,8 @@ Frequency = Annotated[
 class Modes(Part):
     """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many.
 
-    count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis.
+    count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete
+    basis; 0 makes a rigid body with the recipe's mass and inertia.
     up_to: highest frequency of the normal modes that are kept, e.g. "5000 Hz".
     compliance: least share of the static compliance between the interfaces, in each of the six directions.
     mass: least share of the body's mass that moves with the basis, in each direction.
@@ -72,7 +73,7 @@ class Modes(Part):
     """
 
     reference: str
-    count: Annotated[int, Field(ge=1)] | Literal["all"] | None = None
+    count: Annotated[int, Field(ge=0)] | Literal["all"] | None = None
     up_to: Annotated[Frequency, Positive] | None = None
     compliance: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
     mass: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
@@ -128,7 +129,49 @@ class FlexibleBody(Part):
     angular_velocity: AngularVelocity | None = None
 
 
-Body = Annotated[Ground | RigidBody | FlexibleBody, Field(discriminator="type")]
+class MeshedRigidBody(Part):
+    """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
+
+    ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
+    """
+
+    type: Literal["rigid"]
+    mesh: str
+    pose: Pose | None = None
+    velocity: Velocity | None = None
+    angular_velocity: AngularVelocity | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_modes(cls, table: Any) -> Any:
+        if not isinstance(table, dict) or table.get("type") != "flexible":
+            return table
+        rest = {key: value for key, value in table.items() if key not in ("modes", "damping", "stiffening")}
+        if isinstance(rest.get("source"), dict):
+            rest["source"] = {key: text for key, text in rest["source"].items() if key in rest}
+        return {**rest, "type": "rigid"}
+
+
+def _which(body: Any) -> str | None:
+    """Which model a body is of: its type, but of a body with a recipe and no modes that of such bodies."""
+    if isinstance(body, MeshedRigidBody):
+        return "meshed"
+    if not isinstance(body, dict):
+        return getattr(body, "type", None)
+    modes = body.get("modes")
+    none = isinstance(modes, dict) and modes.get("count") == 0 and not isinstance(modes.get("count"), bool)
+    if (body.get("type") == "rigid" and "mesh" in body) or (body.get("type") == "flexible" and none):
+        return "meshed"
+    return body.get("type")
+
+
+Body = Annotated[
+    Annotated[Ground, Tag("ground")]
+    | Annotated[RigidBody, Tag("rigid")]
+    | Annotated[FlexibleBody, Tag("flexible")]
+    | Annotated[MeshedRigidBody, Tag("meshed")],
+    Discriminator(_which),
+]
 
 
 class IdealJoint(Part):
@@ -144,4 +187,6 @@ class IdealJoint(Part):
 
 #: types of ideal joints
 IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
-Joint = Annotated[IdealJoint | ClearanceSpherical | ClearanceRevolute, Field(discriminator="type")]
+Joint = Annotated[
+    IdealJoint | ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane, Field(discriminator="type")
+]

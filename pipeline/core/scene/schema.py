@@ -7,24 +7,33 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
+from pipeline.core.scene.clearance import CONTACTS, Clearance
 from pipeline.core.scene.drives import Drive
-from pipeline.core.scene.fields import Length, Number, Part, PartName, Time
-from pipeline.core.scene.loads import Gravity, Load
+from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from pipeline.core.scene.gears import Gear
+from pipeline.core.scene.limits import Limits
+from pipeline.core.scene.loads import Gravity, Load, SampledPid
 from pipeline.core.scene.output import Output
 from pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
     Ground,
     Joint,
+    MeshedRigidBody,
     RigidBody,
 )
 from pipeline.core.scene.solver import PlainIntegrator, Solver
+from pipeline.core.scene.start import Start
+from pipeline.core.scene.stops import Stop
 from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from pipeline.core.units import quantity
 
+#: types of joints with one freedom: driving it tells the whole relative motion
+SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
 MOST_ROWS = 1e7
+#: samples of a controller; at each of them a step ends
+MOST_SAMPLES = 1e6
 
 
 class TimeSpan(Part):
@@ -52,6 +61,23 @@ class Ensemble(Part):
     bodies: tuple[str, ...] | None = None
 
 
+class Sections(Part):
+    """A motion that its laws repeat, looked at once in each period: see ``flexclear sections``.
+
+    period: of the laws of drives and loads, from the run's start on; without it the run is one period.
+    phase: when in the period the motion is looked at [s].  transient: periods that are not kept, before the `periods`
+    that are.  exponent_periods: how many of these are followed by a neighbour too, which tells the rate at which
+    motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
+    """
+
+    period: Annotated[Time, Field(gt=0.0)] | None = None
+    phase: Annotated[Time, Field(ge=0.0)] = 0.0
+    transient: Annotated[int, Field(ge=0, le=1_000_000)] = 100
+    periods: Annotated[int, Field(ge=20, le=1_000_000)] = 500
+    exponent_periods: Annotated[int, Field(ge=20, le=1_000_000)] = 200
+    bodies: tuple[str, ...] | None = None
+
+
 class Wanted(Part):
     """A wanted accuracy: absolute in SI, or relative to the quantity's own size."""
 
@@ -64,17 +90,40 @@ class Accuracy(Part):
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
+    allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
     """
 
     quantities: dict[str, Wanted] = Field(default_factory=dict)
+    allow_missed: bool = False
 
     @model_validator(mode="before")
     @classmethod
     def _flat(cls, table: Any) -> Any:
-        if not isinstance(table, dict) or set(table) <= {"quantities", "source"}:
+        plain = {"allow_missed", "source"}
+        if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
-        found = {name: _wanted(name, value) for name, value in _leaves(table, "")}
-        return {"quantities": found} | ({"source": table["source"]} if "source" in table else {})
+        wanted = {name: value for name, value in table.items() if name not in plain}
+        found = {name: _wanted(name, value) for name, value in _leaves(wanted, "")}
+        return {"quantities": found} | {name: table[name] for name in plain & set(table)}
+
+
+class View(Part):
+    """What is looked at; no effect on the motion.
+
+    watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.peak_force``;
+    default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
+    direction: from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar
+    mechanism its normal, else from above and in front.
+    """
+
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    direction: Direction | None = None
+
+    @model_validator(mode="after")
+    def _points(self) -> View:
+        if self.direction is not None and not any(self.direction):
+            raise ValueError("a direction of length zero points nowhere")
+        return self
 
 
 def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
@@ -115,11 +164,17 @@ class Scene(Part):
     joint: dict[PartName, Joint] = Field(default_factory=dict)
     drive: dict[PartName, Drive] = Field(default_factory=dict)
     load: dict[PartName, Load] = Field(default_factory=dict)
+    stop: dict[PartName, Stop] = Field(default_factory=dict)
+    gear: dict[PartName, Gear] = Field(default_factory=dict)
     time: TimeSpan
+    start: Start | None = None
     solver: Solver = PlainIntegrator()
     output: Output = Output()
     ensemble: Ensemble | None = None
+    sections: Sections | None = None
     accuracy: Accuracy | None = None
+    limits: Limits = Limits()
+    view: View | None = None
 
     def _rows_can_be_kept(self) -> None:
         rows = (self.time.end - self.time.start) / self.output.interval
@@ -129,12 +184,25 @@ class Scene(Part):
                 "choose a longer one"
             )
 
+    def _samples_can_be_made(self) -> None:
+        for name, load in self.load.items():
+            if not isinstance(load, SampledPid):
+                continue
+            samples = (self.time.end - self.time.start) / load.period
+            if samples > MOST_SAMPLES:
+                raise ValueError(
+                    f"load.{name}.period = {load.period:g} s asks for {samples:.3g} samples, more than "
+                    f"{MOST_SAMPLES:g}: choose a longer one, or a continuous 'pid'"
+                )
+
     def _quantities_are_there(self) -> None:
-        for name in self.accuracy.quantities if self.accuracy else ():
+        named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
+        named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
+        for place, name in named:
             try:
                 parse(name, self.owners())
             except ValueError as error:
-                raise ValueError(f"accuracy.{name}: {error}") from None
+                raise ValueError(f"{place}{name}: {error}") from None
 
     def _stressed_bodies_are_flexible(self) -> None:
         for name in self.output.stress or ():
@@ -150,6 +218,7 @@ class Scene(Part):
     def check(self) -> None:
         """ValueError where parts and settings that are right by themselves do not go together."""
         self._rows_can_be_kept()
+        self._samples_can_be_made()
         self._quantities_are_there()
         self._stressed_bodies_are_flexible()
 
@@ -160,7 +229,7 @@ class Scene(Part):
             "body": moving,
             "joint": tuple(self.joint),
             "drive": tuple(self.drive),
-            "contact": tuple(self.contacts()),
+            "contact": tuple([*self.contacts(), *self.stop_ends()]),
         }
 
     def wanted(self) -> list[Quantity]:
@@ -174,7 +243,29 @@ class Scene(Part):
             if joint.type != "fixed"
         }
         hosts = self._hosts()
-        return usual({n: [hosts[b] for b in pair] for n, pair in joints.items()}, tuple(self.contacts()))
+        known = self._prescribed()
+        pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
+        free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
+        return usual(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
+
+    def _prescribed(self) -> set[str]:
+        """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
+        driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
+        told = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
+        known = {name for name, body in self.body.items() if isinstance(body, Ground)}
+        found = set(known)
+        for _ in told:
+            for joint in told:
+                pair = {frame.partition(".")[0] for frame in joint.between}
+                if pair & found:
+                    found |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
+        return found - known
+
+    def watched(self) -> list[Quantity]:
+        """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
+        if self.view is not None and self.view.watch is not None:
+            return [parse(name, self.owners()) for name in self.view.watch]
+        return self.wanted()
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""
@@ -200,6 +291,24 @@ class Scene(Part):
         """The file it was read from."""
         return self._path
 
+    def __repr__(self) -> str:
+        """In one line: a whole scene is some pages."""
+        return f"<Scene {self.name}: {self.summary()}; {self.time.start:g} to {self.time.end:g} s>"
+
+    __str__ = __repr__
+
+    def summary(self) -> str:
+        """Which parts there are, in words."""
+        counts = {
+            ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
+            ("flexible body", "flexible bodies"): len(self.flexible()),
+            ("joint", "joints"): len(self.joint) - len(self.contacts()),
+            ("joint with clearance", "joints with clearance"): len(self.contacts()),
+            ("drive", "drives"): len(self.drive),
+            ("load", "loads"): len(self.load),
+        }
+        return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
+
     def rigid(self) -> dict[str, RigidBody]:
         """Rigid bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, RigidBody)}
@@ -208,9 +317,22 @@ class Scene(Part):
         """Flexible bodies by name."""
         return {n: b for n, b in self.body.items() if isinstance(b, FlexibleBody)}
 
+    def meshed(self) -> dict[str, MeshedRigidBody]:
+        """Rigid bodies whose mass, inertia and frames are those of a mesh recipe, by name."""
+        return {n: b for n, b in self.body.items() if isinstance(b, MeshedRigidBody)}
+
+    def recipes(self) -> dict[str, str]:
+        """Mesh recipe of each body that has one, by name: flexible bodies first."""
+        flexible = {name: body.mesh for name, body in self.flexible().items()}
+        return flexible | {name: body.mesh for name, body in self.meshed().items()}
+
     def contacts(self) -> dict[str, Clearance]:
-        """Clearance joints by name."""
-        return {n: j for n, j in self.joint.items() if isinstance(j, (ClearanceSpherical, ClearanceRevolute))}
+        """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
+
+    def stop_ends(self) -> list[str]:
+        """Names of all ends of stops, as records have them."""
+        return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""

@@ -8,6 +8,7 @@ from importlib import import_module
 
 from pipeline.core.artifacts.store import Record, Store
 from pipeline.core.progress import Progress
+from pipeline.core.workflow import opened
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.task import Task, facts, in_order, key, reasons
 
@@ -21,14 +22,17 @@ class State:
     why: tuple[str, ...]
 
 
-def key_of(task: Task, inputs: Mapping[str, Record], sources: Sources) -> str:
-    """Key of the artifact that a task makes from these inputs."""
-    return key(_facts(task, inputs, sources))
+def key_of(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> str:
+    """Key of the artifact that a task makes from these inputs and from the files that it opens, as they are now.
+
+    Which files these are is known since it was made for the first time; before, there is nothing under any key.
+    """
+    return key(_with_files(task, _facts(task, inputs, sources), store))
 
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
     """The fresh artifact of a task whose inputs are fresh, now also shown in its folder; or None."""
-    record = store.find(task.stage, key_of(task, inputs, sources))
+    record = store.find(task.stage, key_of(task, inputs, store, sources))
     if record is not None:
         store.show(record, task.folder, task.names, task.label)
     return record
@@ -36,16 +40,19 @@ def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Source
 
 def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress) -> Record:
     """The artifact of a task whose inputs are fresh, run if need be (once, over all processes)."""
-    task_facts = _facts(task, inputs, sources)
-    name = key(task_facts)
-    with store.lock(task.stage, name, lambda: progress(None, "waiting for another process that makes the same")):
-        record = Store(store.root).find(task.stage, name)  # whoever asked for the task has told its faults
+    known = _facts(task, inputs, sources)
+    plain = key(known)
+    with store.lock(task.stage, plain, lambda: progress(None, "waiting for another process that makes the same")):
+        # whoever asked for the task has told its faults
+        record = Store(store.root).find(task.stage, key(_with_files(task, known, store)))
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
             data = {name: store.load(above) for name, above in inputs.items()}
-            product = run(task.params, data, progress)
-            record = store.put(task.stage, name, product, task_facts)
+            with opened.watched(task.base, outside=(store.root,)) as read:
+                product = run({**task.params, **task.context}, data, progress)
+            known |= _noted(task, plain, read, store)
+            record = store.put(task.stage, key(known), product, known)
     store.show(record, task.folder, task.names, task.label)
     return record
 
@@ -62,7 +69,7 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
-    now = _facts(task, fresh, sources)
+    now = _with_files(task, _facts(task, fresh, sources), store)
     last = store.last(task.folder, task.label)
     if last is None and stale:
         return State(task, None, ("never run",))
@@ -75,8 +82,25 @@ def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store
     if not why and last is not None:
         # nothing changed, so the artifact itself must be broken; `find` has said so if it is corrupt
         why = [store.fault(last) or "its record in the cache is missing"]
+    failure = store.why_outdated(task.folder, task.label)
+    if failure is not None:
+        why.append(f"what is shown is of an earlier state: {failure.splitlines()[0]}")
     return State(task, None, tuple(why))
 
 
 def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[str, str]:
     return facts(task, {name: record.digest for name, record in inputs.items()}, sources)
+
+
+def _with_files(task: Task, known: Mapping[str, str], store: Store) -> dict[str, str]:
+    """Facts with those of the files that the task has ever opened when all else was as it is."""
+    names = store.names(task.stage, key(known))
+    return {**known, **opened.facts(opened.digests(names, task.base))}
+
+
+def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dict[str, str]:
+    """Facts of the files that were opened now, and of others that once were; their names are kept for the next time."""
+    names = set(store.names(task.stage, plain))
+    if not names >= read.keys():
+        store.keep_names(task.stage, plain, sorted(names | read.keys()))
+    return opened.facts(opened.digests(names - read.keys(), task.base) | dict(read))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import ast
 import contextlib
 import hashlib
-import json
 import re
 import sys
 from collections.abc import Iterable
@@ -19,11 +18,11 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from pipeline.core.artifacts.store import publish
+from pipeline.core.artifacts.disk import checked, publish, read_checked
 
 OWN = ("pipeline", "stages", "benchmarks")
 #: distributions whose name differs from that of their import package
-DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg"}
+DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
 
 
 #: folder that holds the packages; sources are read below it
@@ -66,7 +65,7 @@ class Sources:
             self.closures[wanted] = self._reach(wanted)
             if self.memo is not None and self.imports != known:
                 with contextlib.suppress(OSError):
-                    publish(self.memo, json.dumps(self.imports, sort_keys=True).encode())
+                    publish(self.memo, checked(self.imports))
         return self.closures[wanted]
 
     def module(self, name: str) -> Module | None:
@@ -102,10 +101,9 @@ class Sources:
         return Module(digest, frozenset(own_names), frozenset(library_names))
 
     def _remember(self) -> None:
-        """Read the memo, once; one that cannot be understood is as good as none."""
+        """Read the memo, once; one that is damaged is as good as none."""
         if self.memo is not None and not self.imports:
-            with contextlib.suppress(OSError, ValueError):
-                self.imports.update(json.loads(self.memo.read_bytes()))
+            self.imports.update(read_checked(self.memo) or {})
 
 
 def source_file(root: Path, name: str) -> Path | None:
@@ -158,13 +156,37 @@ def _is_type_checking(test: ast.expr) -> bool:
     return name == "TYPE_CHECKING"
 
 
+def library_versions(packages: frozenset[str]) -> dict[str, str]:
+    """Versions of the libraries that hold these import packages, and of all that those require in turn."""
+    found = {name: library_version(name) for name in packages}
+    waiting = sorted(packages)
+    while waiting:
+        for name in _required(waiting.pop()):
+            if name not in found and library_version(name) != "absent":
+                found[name] = library_version(name)
+                waiting.append(name)
+    return dict(sorted(found.items()))
+
+
 @cache
 def library_version(package: str) -> str:
     """Version of the distribution that holds an import package; 'absent' when it is not installed."""
-    try:
-        metadata = distribution(DISTRIBUTIONS.get(package, package)).read_text("METADATA") or ""
-    except PackageNotFoundError:
-        return "absent"
+    metadata = _metadata(package)
     # `importlib.metadata.version` parses the whole description as an e-mail, 5 ms for each library
-    found = re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
-    return found[1].strip() if found else "unknown"
+    found = metadata and re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
+    return "absent" if metadata is None else found[1].strip() if found else "unknown"
+
+
+@cache
+def _required(package: str) -> tuple[str, ...]:
+    """Distributions that a library requires whatever is asked of it; some only on other machines."""
+    lines = re.findall(r"^Requires-Dist: ([\w.-]+)(.*)$", _metadata(package) or "", re.MULTILINE)
+    return tuple(name for name, condition in lines if "extra" not in condition)
+
+
+@cache
+def _metadata(package: str) -> str | None:
+    try:
+        return distribution(DISTRIBUTIONS.get(package, package)).read_text("METADATA") or ""
+    except PackageNotFoundError:
+        return None

@@ -32,7 +32,10 @@ class Job:
 
 @dataclass
 class Monitor:
-    """Shows running tasks: on a terminal as one line that is rewritten, else as sparse lines."""
+    """Shows running tasks: on a terminal as one line that is rewritten, else as sparse lines.
+
+    quiet: nothing but warnings.  verbose: a line for everything that tasks say, on a terminal, too.
+    """
 
     out: TextIO = field(default_factory=lambda: sys.stderr)
     clock: Callable[[], float] = time.monotonic
@@ -40,6 +43,13 @@ class Monitor:
     total: int = 0
     done: int = 0
     drawn: float = 0.0
+    quiet: bool = False
+    verbose: bool = False
+
+    @property
+    def rewrites(self) -> bool:
+        """Whether one line is rewritten, as on a terminal."""
+        return self.out.isatty() and not self.verbose
 
     def start(self, total: int) -> None:
         """`total` tasks are to be run."""
@@ -62,13 +72,13 @@ class Monitor:
         if job is None:
             return
         news = fraction is None and text != job.text
-        if text.startswith(WARNING) and self.out.isatty():
+        if text.startswith(WARNING) and (self.rewrites or self.quiet):
             self.say(f"{job.name}: {text}")  # stays, where the line of progress is rewritten
         # what has no share (compiling, waiting) says nothing about the pace of the rest
         if fraction is None or job.since is None:
             job.since = None if fraction is None else (self.clock(), fraction)
         job.fraction, job.text = fraction, text
-        if self.out.isatty() or news or self.clock() - job.said >= SPARSE:
+        if self.rewrites or self.verbose or news or self.clock() - job.said >= SPARSE:
             job.said = self.clock()
             self._show(f"{self._count()} {self._line(job)}")
 
@@ -77,19 +87,19 @@ class Monitor:
         job = self.jobs.pop(name)
         self.done += 1
         seconds = self.clock() - job.begun
-        if not self.out.isatty() and (failed or seconds >= 1.0):
+        if not self.rewrites and (failed or seconds >= 1.0):
             self._show(f"{self._count()} {name} {'failed' if failed else 'done'} after {duration(seconds)}")
-        elif self.out.isatty():
+        elif self.rewrites:
             self._show("")
 
     def end(self) -> None:
         """All tasks have ended; clears the line."""
-        if self.out.isatty():
+        if self.rewrites and not self.quiet:
             self._write("\r\033[K")
 
     def say(self, text: str) -> None:
         """One line that stays."""
-        self._write(("\r\033[K" if self.out.isatty() else "") + f"flexclear: {text}\n")
+        self._write(("\r\033[K" if self.rewrites and not self.quiet else "") + f"flexclear: {text}\n")
 
     def _count(self) -> str:
         return f"[{self.done}/{self.total}]"
@@ -105,7 +115,9 @@ class Monitor:
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _show(self, text: str) -> None:
-        if not self.out.isatty():
+        if self.quiet:
+            return
+        if not self.rewrites:
             self._write(f"flexclear: {text}\n")
         elif self.clock() - self.drawn >= REDRAW or not text:
             self.drawn = self.clock()

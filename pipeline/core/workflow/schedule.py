@@ -3,6 +3,7 @@ their inputs are there."""
 
 from __future__ import annotations
 
+import os
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from pipeline.core.errors import FlexclearError, ResourceError
 from pipeline.core.progress import Progress
 from pipeline.core.workflow import cores, workers
 from pipeline.core.workflow.execute import execute, find, key_of
+from pipeline.core.workflow.family import follow
 from pipeline.core.workflow.fingerprint import Sources
 from pipeline.core.workflow.progress import Monitor
 from pipeline.core.workflow.task import Task, in_order
@@ -22,6 +24,8 @@ from pipeline.core.workflow.task import Task, in_order
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
+#: noted beside what is shown until it has been brought up to date
+UNFINISHED = "making it again was begun and not finished"
 #: how often the progress of workers is looked at [s]
 TICK = 0.2
 
@@ -57,6 +61,7 @@ class _Plan:
     """Book-keeping of one call: what is done, what failed, what still waits."""
 
     waiting: list[Task]
+    tasks: tuple[Task, ...]
     done: dict[int, Record] = field(default_factory=dict)
     failed: dict[int, Failure] = field(default_factory=dict)
 
@@ -81,9 +86,13 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
     jobs: processes at most; default: the cores this process may use.  KeyboardInterrupt ends the
     workers and passes through.
     """
-    plan = _Plan(in_order(tasks))
+    store.sweep()
+    plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
     _settle_fresh(plan, store, sources)
     if plan.waiting:
+        for task in plan.waiting:
+            if store.last(task.folder, task.label) is not None:
+                store.outdated(task.folder, task.label, UNFINISHED)
         monitor.start(len(plan.waiting))
         width = min(jobs or cores.cores(), _width(plan.waiting))
         if width == 1:
@@ -91,6 +100,9 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
         else:
             _together(plan, store, sources, monitor, width)
         monitor.end()
+        for task in plan.tasks:
+            if id(task) in plan.failed:
+                store.outdated(task.folder, task.label, plan.failed[id(task)].message)
     failures = {id(f): f for f in plan.failed.values()}
     return Outcome(plan.done, tuple(failures.values()))
 
@@ -126,8 +138,12 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
     """In worker processes."""
     # imported here, because a run that finds everything fresh must start quickly
     import multiprocessing
+    from multiprocessing.managers import SyncManager
 
-    with multiprocessing.get_context("spawn").Manager() as server:
+    context = multiprocessing.get_context("spawn")
+    server = SyncManager(ctx=context)
+    server.start(follow, (os.getpid(),))
+    with server:
         reports = server.Queue()
         pool = workers.pool(width)
         running: dict[Future[Record | Failure], _Running] = {}
@@ -162,7 +178,7 @@ def _submit(
         if len(running) >= width or alone or (task.exclusive and running):
             return
         inputs = plan.inputs(task)
-        key = key_of(task, inputs, sources)
+        key = key_of(task, inputs, store, sources)
         if any(other.key == key for other in running.values()):
             continue
         plan.waiting.remove(task)

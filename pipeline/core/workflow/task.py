@@ -6,9 +6,10 @@ import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
-from pipeline.core.workflow.fingerprint import Sources, library_version
+from pipeline.core.workflow.fingerprint import TREE, Sources, library_versions
 
 #: libraries that every artifact passes through on its way to disk
 STORE = "pipeline.core.artifacts.store"
@@ -23,7 +24,8 @@ class Task:
     stage: name of the stage and of its folder in the cache.
     part: the body (or figure) it is about; empty when the stage has one artifact per scene.
     run: ``"module:function"``, called as ``run(params, inputs, progress)``; see `execute`.
-    params: all that the function may know, as JSON; nothing else may change its result.
+    params: all that its result may depend on, as JSON, beside `inputs` and the files that it opens.
+    context: what the function is told as well, and its result must not show: where files lie, names for messages.
     inputs: tasks whose artifact ``nc`` it is given, by name.
     modules: modules that it reaches by a name in `params`, beside those it imports.
     folder: where its files are shown, below the results folder; empty: nowhere.
@@ -41,6 +43,12 @@ class Task:
     modules: tuple[str, ...] = ()
     names: Mapping[str, str] = field(default_factory=dict)
     exclusive: bool = False
+    context: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def base(self) -> Path:
+        """What the files that it opens are told relative to."""
+        return Path(self.context.get("folder", TREE))
 
     @property
     def label(self) -> str:
@@ -63,8 +71,9 @@ def in_order(tasks: list[Task]) -> list[Task]:
 
 
 def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
-    """Everything that decides the artifact, in words: kind and name -> value.
+    """Everything that decides the artifact and is known before it is made, in words: kind and name -> value.
 
+    The files that it opens come on top, see `execute`.
     digests: digest of each input that is known; leave one out to compare the rest.
     """
     result = {f"parameter {name}": value for name, value in flatten(task.params)}
@@ -72,8 +81,8 @@ def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str,
     module = task.run.partition(":")[0]
     closure = sources.closure((module, STORE, *task.modules))
     result |= {f"module {name}": module.digest for name, module in closure.items()}
-    libraries = sorted(set().union(*(module.libraries for module in closure.values())))
-    result |= {f"library {name}": library_version(name) for name in libraries}
+    libraries = frozenset().union(*(module.libraries for module in closure.values()))
+    result |= {f"library {name}": version for name, version in library_versions(libraries).items()}
     return dict(sorted({**result, "function": task.run}.items()))
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
 from typing import TYPE_CHECKING
+
+from pipeline.core.workflow.family import follow
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
@@ -18,25 +21,8 @@ def pool(width: int) -> ProcessPoolExecutor:
     import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(width, mp_context=multiprocessing.get_context("spawn"), initializer=follow_parent)
-
-
-def follow_parent() -> None:
-    """In a worker: Ctrl-C is left to the parent, which ends its workers; where it is gone, they end too."""
-    import os
-    import signal
-    import threading
-    import time
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
+    context = multiprocessing.get_context("spawn")
+    return ProcessPoolExecutor(width, mp_context=context, initializer=follow, initargs=(os.getpid(),))
 
 
 def kill(workers: ProcessPoolExecutor) -> None:

@@ -9,25 +9,25 @@ share those which are alike.
 from __future__ import annotations
 
 import hashlib
-import os
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from types import ModuleType
 
 import llvmlite
 import numba
 import numpy as np
 
+from pipeline.core.artifacts.disk import disk_limits, publish
 from pipeline.core.artifacts.paths import kernel_root
 from pipeline.core.workflow.fingerprint import TREE, Sources, imported
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile.compiler_process import second_process
 from pipeline.dynamics.compile.files import bring, compiled
+from pipeline.dynamics.compile.folder import prune, writable
 from pipeline.dynamics.compile.sources import sources
 from pipeline.dynamics.effects import Parts, Scheme
 
@@ -95,14 +95,22 @@ class Entry:
 
 def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     """The compiled functions for these parts; `tell` hears of what has to be compiled."""
-    folder, began = _folder(tell), time.monotonic()
-    files = {name: _file(folder, name, source) for name, source in sources(parts, scheme).items()}
+    folder, began = writable(kernel_root(), tell), time.monotonic()
+    with disk_limits(folder):
+        return Entry(_modules(folder, sources(parts, scheme), tell, began))
+
+
+def _modules(folder: Path, texts: dict[str, str], tell: Callable[[str], None], began: float) -> dict[str, ModuleType]:
+    """The module of each source by its name, fetched from the folder or compiled into it."""
+    files = {name: _file(folder, name, source) for name, source in texts.items()}
     names = {path: name for name, path in files.items() if path.stem not in sys.modules}
     ours_first = sorted(names, key=lambda path: names[path] != OURS)
     ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
     with second_process(ours_last):
         bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
-    return Entry({name: sys.modules[path.stem] for name, path in files.items()})
+    if ours_last:
+        prune(folder)
+    return {name: sys.modules[path.stem] for name, path in files.items()}
 
 
 def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
@@ -111,31 +119,15 @@ def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
     tell(f"compiling for this kind of mechanism (once; later runs fetch it from disk): {what}{so_far}")
 
 
-def _folder(tell: Callable[[str], None]) -> Path:
-    """The folder of compiled kernels; where it cannot be written, one that lasts as long as this process."""
-    folder = kernel_root()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        problem = "" if os.access(folder, os.W_OK) else "not writable"
-    except OSError as error:
-        problem = error.strerror or str(error)
-    if problem:
-        tell(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
-        return Path(_temporary().name)
-    return folder
-
-
-@cache
-def _temporary() -> TemporaryDirectory[str]:
-    return TemporaryDirectory(prefix="flexclear_kernels_")
-
-
 def _file(folder: Path, name: str, source: str) -> Path:
+    """The generated file, there with exactly this text."""
     path = folder / f"flexclear_{name}_{digest(source)}.py"
-    if not path.exists():
-        temporary = path.with_suffix(f".{os.getpid()}.tmp")
-        temporary.write_text(source)
-        os.replace(temporary, path)
+    try:
+        same = path.read_bytes() == source.encode()
+    except OSError:
+        same = False
+    if not same:
+        publish(path, source.encode())
     return path
 
 

@@ -67,7 +67,7 @@ def _reached(source: str) -> frozenset[str]:
 def _evaluate(parts: Parts) -> str:
     given, imports = _forces(parts)
     if parts.closures:
-        given["closures"] = _import(imports, f"{DYNAMICS}.equations", "closures")
+        given["closures"] = _closures(imports, parts)
     if parts.harmonics:
         given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
@@ -77,7 +77,7 @@ def _evaluate(parts: Parts) -> str:
 def _project(parts: Parts) -> str:
     given, imports = _joints(parts)
     given = {"evaluate": "calls.evaluate", **given}
-    given["closures"] = _import(imports, f"{DYNAMICS}.equations", "closures")
+    given["closures"] = _closures(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
     return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
 
@@ -91,6 +91,8 @@ def _retract(parts: Parts) -> str:
 def _observe(parts: Parts) -> str:
     given, imports = _forces(parts)
     given = {"evaluate": "calls.evaluate", "project": _projection(imports, parts), **given}
+    if parts.couplings:
+        given["couplings"] = _closures(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
     return _file(f"what is recorded of {', '.join(parts.joints)}", imports, "observation", maker, given, OBSERVE)
 
@@ -105,12 +107,15 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),
         "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
-    if parts.surfaces and scheme.located:
+    touching = parts.surfaces or parts.stops
+    if touching and scheme.located:
         located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
         regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
         given["events"] = f"{located}({regimes})"
-    elif parts.surfaces:
+    elif touching:
         given["events"] = _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    if parts.closures:
+        given["poses"] = _import(imports, f"{INTEGRATORS}.singular_step", "OVER_POSES")
     _import(imports, DYNAMICS, "memory as m")
     maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
     return _file(f"steps of {scheme}", imports, "steps", maker, given, ADVANCE)
@@ -133,10 +138,18 @@ def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
         forms, frictions = _family(imports, FORMS, parts.forms), _family(imports, FRICTION_LAWS, parts.frictions)
         maker = _import(imports, f"{DYNAMICS}.contact.forces", "make_contacts")
         given["contacts"] = f"{maker}(surfaces={surfaces}, forms={forms}, frictions={frictions})"
+    if parts.stops:
+        forms = _family(imports, FORMS, parts.forms)
+        given["stops"] = f"{_import(imports, f'{DYNAMICS}.contact.stops', 'make_stops')}({forms})"
     if parts.loads:
         kinds = _family(imports, LOADS, parts.loads)
         given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}({kinds})"
     return given, imports
+
+
+def _closures(imports: Imports, parts: Parts) -> str:
+    """The module of the closures: with couplings, or of joints alone."""
+    return _import(imports, f"{DYNAMICS}.equations", "couplings" if parts.couplings else "closures")
 
 
 def _projection(imports: Imports, parts: Parts) -> str:

@@ -8,4 +8,6 @@ KIND = "clearance joint"
 NAMES = {
     "clearance-spherical": "surfaces:BallInSocket",
     "clearance-revolute": "surfaces:PinInJournal",
+    "clearance-slot": "surfaces:PinInSlot",
+    "ball-on-plane": "surfaces:BallOnPlane",
 }

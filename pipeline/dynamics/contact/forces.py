@@ -1,10 +1,11 @@
 """Forces of the contacts: geometry of two nested surfaces, laws by their kinds.
 
 gap = c - |p_OI|, with p_OI from the centre of the outer surface (socket, journal) to that of the
-inner one (ball, pin), where the surfaces part; depth d = -gap; d' = n . (velocity of the inner
-centre as seen from the outer body), n along p_OI. Both forces act at one point Q on the line of
-centres, on the inner surface (Wang & Wang 2019, eq. 23); the sliding velocity is that of the
-material points there, so that rolling is no sliding. Acting at one point keeps angular momentum.
+inner one (ball, pin), where the surfaces part (a slot and a plane measure the gap otherwise, see
+`joints`); depth d = -gap; d' = n . (velocity of the inner centre as seen from the outer body), n
+along p_OI. Both forces act at one point Q on the line of centres, on the inner surface (Wang & Wang
+2019, eq. 23); the sliding velocity is that of the material points there, so that rolling is no
+sliding. Acting at one point keeps angular momentum.
 """
 
 from __future__ import annotations
@@ -104,13 +105,37 @@ def rubbing(traction: Callable) -> Callable:
     return rub
 
 
+def make_normal_force(forms: tuple[Any, ...]) -> Callable:
+    """The kernel normal_force(h, f, w, c) -> normal force of a closed contact [N], from its gap and rate, booked.
+
+    forms: of normal forces, with `force` and `stored`.
+    """
+    normal, stored = choose(tuple(form.force for form in forms)), choose(tuple(form.stored for form in forms))
+
+    @kernel
+    def normal_force(h, f, w, c):
+        o, numbers = m.TOUCH.row(h, c), m.CONTACT_NUMBERS.row(h, c)
+        depth, rate = max(0.0, -w[o + m.TOUCH.gap]), w[o + m.TOUCH.rate]
+        law, kind = _law(f, numbers + m.CONTACT_NUMBERS.normal_law), m.CONTACTS.normal(h, c)
+        impact_rate = max(w[h[m.LATCHED] + c], f[numbers + m.CONTACT_NUMBERS.floor])
+        elastic, damping = normal(kind, depth, rate, impact_rate, law)
+        f_n = max(0.0, elastic + damping)
+        w[o + m.TOUCH.normal_force], w[o + m.TOUCH.stored] = f_n, stored(kind, depth, law)
+        w[o + m.TOUCH.damping_power] = damping * rate
+        slots = contact_slots(h, c)
+        w[slots + m.CONTACT_LEDGER.damping], w[slots + m.CONTACT_LEDGER.impulse] = damping * rate, f_n
+        return f_n
+
+    return normal_force
+
+
 def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: tuple[Any, ...]) -> Callable:
     """The kernel contacts(h, f, w, n) that applies all contacts, given the modules of their kinds.
 
     surfaces: with `separation`.  forms: of normal forces, with `force` and `stored`.  frictions: laws with `traction`.
     """
     separation = choose(tuple(kind.separation for kind in surfaces))
-    normal, stored = choose(tuple(form.force for form in forms)), choose(tuple(form.stored for form in forms))
+    normal_force = make_normal_force(forms)
     rub = rubbing(choose(tuple(law.traction for law in frictions))) if frictions else frictionless()
 
     @kernel
@@ -126,34 +151,19 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
             sub(at(w, inner + m.FRAME.velocity), at(w, outer + m.FRAME.velocity)),
             cross(at(w, outer + m.FRAME.omega), p_OI),
         )
-        kind = m.CONTACTS.surfaces(h, c)
-        p, v = separation(kind, w, outer, p_OI), separation(kind, w, outer, v_OI)
-        distance = np.sqrt(dot(p, p))
-        # concentric surfaces have no normal; any does, since there is no force
-        known = distance > 0.0
-        axis = scale(1.0 / distance, p) if known else (0.0, 0.0, 1.0)
-        rate = dot(axis, v)
-        turning = scale(1.0 / distance, sub(v, scale(rate, axis))) if known else (0.0, 0.0, 0.0)
-        w[o + m.TOUCH.gap] = f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.clearance] - distance
-        w[o + m.TOUCH.rate] = rate
+        kind, numbers = m.CONTACTS.surfaces(h, c), m.CONTACT_NUMBERS.row(h, c)
+        gap, rate, axis, turning, offset = separation(kind, f, w, outer, numbers, p_OI, v_OI)
+        w[o + m.TOUCH.gap], w[o + m.TOUCH.rate] = gap, rate
         for k in range(m.TOUCH.normal_force, m.TOUCH.offset):
             w[o + k] = 0.0
-        put(w, o + m.TOUCH.offset, turn_back(at9(w, outer + m.FRAME.axes), p_OI))
+        put(w, o + m.TOUCH.offset, turn_back(at9(w, outer + m.FRAME.axes), offset))
         return axis, turning
 
     @kernel
     def forces(h, f, w, n, c, axis, turning):
         """Forces of a closed contact, on both bodies, and their powers."""
         o, numbers = m.TOUCH.row(h, c), m.CONTACT_NUMBERS.row(h, c)
-        depth, rate = max(0.0, -w[o + m.TOUCH.gap]), w[o + m.TOUCH.rate]
-        law, kind = _law(f, numbers + m.CONTACT_NUMBERS.normal_law), m.CONTACTS.normal(h, c)
-        impact_rate = max(w[h[m.LATCHED] + c], f[numbers + m.CONTACT_NUMBERS.floor])
-        elastic, damping = normal(kind, depth, rate, impact_rate, law)
-        f_n = max(0.0, elastic + damping)
-        w[o + m.TOUCH.normal_force], w[o + m.TOUCH.stored] = f_n, stored(kind, depth, law)
-        w[o + m.TOUCH.damping_power] = damping * rate
-        slots = contact_slots(h, c)
-        w[slots + m.CONTACT_LEDGER.damping], w[slots + m.CONTACT_LEDGER.impulse] = damping * rate, f_n
+        f_n = normal_force(h, f, w, c)
         outer, inner = m.CONTACTS.outer(h, c), m.CONTACTS.inner(h, c)
         p_WQ = add(
             at(w, m.SITE_FRAMES.row(h, inner) + m.FRAME.origin), scale(f[numbers + m.CONTACT_NUMBERS.radius], axis)
@@ -166,7 +176,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
 
     @kernel
     def contacts(h, f, w, n):
-        for c in range(h[m.N_CONTACTS]):
+        for c in range(h[m.N_SURFACES]):
             axis, turning = measure(h, f, w, c)
             if n[n[m.MODE] + c] == 1:
                 forces(h, f, w, n, c, axis, turning)

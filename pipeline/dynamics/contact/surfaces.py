@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSpherical
+from pipeline.core.scene.clearance import BallOnPlane as OnPlane
+from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 
 
 def compliance(joint: Clearance) -> float:
@@ -27,6 +28,11 @@ def sphere_stiffness(joint: Clearance) -> float:
     Source: Wang & Wang (2019), eq. (26).
     """
     return 4.0 / (3.0 * math.pi * compliance(joint)) * math.sqrt(relative_radius(joint))
+
+
+def plane_stiffness(joint: Clearance) -> float:
+    r"""The same [N/m^1.5] of a sphere on a plane: :math:`K = \frac{4}{3\pi(\sigma_i+\sigma_j)}\sqrt{R}`."""
+    return 4.0 / (3.0 * math.pi * compliance(joint)) * math.sqrt(joint.radius)
 
 
 def relative_radius(joint: Clearance) -> float:
@@ -88,3 +94,56 @@ class PinInJournal:
         if None in joint.materials:
             return math.sqrt(relative_radius(joint) * depth)
         return math.sqrt(4.0 * force * relative_radius(joint) * compliance(joint) / joint.length)
+
+
+class PinInSlot:
+    r"""Pin between the walls of a slot, which are planes; its round ends are given the stiffness of the walls.
+
+    Exponent 1.5: K [N/m^1.5] of a sphere on a plane, as is usual for revolute joints (see `PinInJournal`).
+    Exponent 1: :math:`K = \tfrac{\pi}{4}E^*L` [N/m] of a cylinder on a plane.
+    """
+
+    @staticmethod
+    def stiffness(joint: ClearanceSlot, exponent: float) -> float:
+        """K [N/m^exponent], given or as above; ValueError where nothing is published."""
+        if joint.normal.stiffness is not None:
+            return joint.normal.stiffness
+        if exponent == 1.0:
+            return joint.length / (4.0 * compliance(joint))
+        if exponent == 1.5:
+            return plane_stiffness(joint)
+        raise ValueError(
+            f"radii and materials give the stiffness of the exponents 1 and 1.5, not of {exponent:g}; "
+            f"give normal.stiffness [N/m^{exponent:g}]"
+        )
+
+    @staticmethod
+    def contact_size(joint: ClearanceSlot, depth: float, force: float) -> float:
+        r"""Half-width of the contact [m] under a force [N]: :math:`\sqrt{4FR/(\pi E^*L)}` (Hertz).
+
+        Without materials: sqrt(R d), the width that a parabolic gap would leave.
+        """
+        if None in joint.materials:
+            return math.sqrt(joint.radius * depth)
+        return math.sqrt(4.0 * force * joint.radius * compliance(joint) / joint.length)
+
+
+class BallOnPlane:
+    """Ball on a plane."""
+
+    @staticmethod
+    def stiffness(joint: OnPlane, exponent: float) -> float:
+        """K [N/m^exponent], given or of Hertz; ValueError where nothing is published."""
+        if joint.normal.stiffness is not None:
+            return joint.normal.stiffness
+        if exponent != 1.5:
+            raise ValueError(
+                f"radius and materials give the stiffness of the exponent 1.5, not of {exponent:g}; "
+                f"give normal.stiffness [N/m^{exponent:g}]"
+            )
+        return plane_stiffness(joint)
+
+    @staticmethod
+    def contact_size(joint: OnPlane, depth: float, force: float) -> float:
+        """Radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
+        return math.sqrt(joint.radius * depth)

@@ -6,31 +6,70 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
+from pipeline.core.errors import SolverError
 from pipeline.core.registry import lookup
-from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics.contact.law import Resolved
 
 #: above this share of the inner radius a contact is no longer small and Hertz's theory ends
 SMALL = 0.3
+#: above this share of the inner radius a penetration is no local indentation any more, whatever the law
+SHALLOW = 0.1
 
 
-def warnings(name: str, joint: Clearance, law: Resolved, depth: float, force: float) -> list[str]:
+def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -> list[str]:
     """Sentences about a contact that was used outside the range of its law; empty when it was not.
 
-    depth, force: largest penetration [m] and normal force [N] of the run.
+    name: in words.  depth, force: largest penetration [m] and normal force [N] of the run.
     """
-    found = [] if law.warning is None else [f"joint {name}: {law.warning}"]
-    surfaces = lookup("pipeline.dynamics.contact", joint.type, where=f"[joint.{name}]")
+    found = [] if law.warning is None else [f"{name}: {law.warning}"]
+    if not joint.radius:
+        return found  # the end of a coordinate has no surfaces
+    surfaces = lookup("pipeline.dynamics.contact", joint.type, where=name)
     size = surfaces.contact_size(joint, depth, force)
     if joint.normal.stiffness is None and size > SMALL * joint.radius:
         found.append(
-            f"joint {name}: the contact grows to a radius of {size:.3g} m, {size / joint.radius:.2g} of the inner "
+            f"{name}: the contact grows to a radius of {size:.3g} m, {size / joint.radius:.2g} of the inner "
             f"surface's; its stiffness from radii and materials (Hertz) holds below {SMALL:g}"
+        )
+    if depth > SHALLOW * joint.radius:
+        found.append(
+            f"{name}: the surfaces are up to {depth:.3g} m deep in each other, {depth / joint.radius:.2g} of the "
+            f"inner surface's radius; contact laws hold below {SHALLOW:g}: a stiffer contact, a slower impact or "
+            "smaller loads keep it there"
         )
     return found
 
 
-def laws(contacts: Sequence[tuple[str, Clearance, Any, Any]], resolved: Sequence[Resolved]) -> str:
+def deepest(events: np.ndarray, touch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Largest penetration [m] and normal force [N] of every contact, of its events and of the observed rows.
+
+    events: named fields of EVENT, (events,).  touch: named fields of TOUCH, (rows, contacts).
+    """
+    depths = np.fmax.reduce(-touch["gap"], axis=0, initial=0.0)
+    forces = np.fmax.reduce(touch["normal_force"], axis=0, initial=0.0)
+    for c in range(touch.shape[1]):
+        mine = events[events["contact"] == c]
+        depths[c] = np.fmax.reduce(mine["peak_depth"], initial=depths[c])
+        forces[c] = np.fmax.reduce(mine["peak_force"], initial=forces[c])
+    return depths, forces
+
+
+def refuse_deep(name: str, joint: Any, depth: float) -> None:
+    """SolverError when the inner surface's centre has gone through the outer surface: depth [m] above its radius.
+
+    name: in words.
+    """
+    if depth > joint.radius > 0.0:
+        raise SolverError(
+            f"{name}: the surfaces went {depth:.3g} m deep into each other, more than the inner surface's radius "
+            f"({joint.radius:.3g} m), so that its centre left through the outer surface; there is no contact law for "
+            "that: choose a stiffer contact, a slower impact or smaller loads"
+        )
+
+
+def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resolved]) -> str:
     """What every contact was made with, as JSON for the dataset's attributes."""
     found = {
         name: {

@@ -110,11 +110,9 @@ def couple(h, w, p):
 
 
 @kernel
-def prepare(h, w, n):
-    """Rows, Jacobians and the factor of J M^-1 J^T; needs the factor of M."""
+def complete(h, w, n):
+    """The factor of J M^-1 J^T, of Jacobians that are there; needs the factor of M."""
     for c in range(h[m.N_CLOSURES]):
-        rows(h, w, c)
-        jacobian(h, w, c)
         spread(h, w, c)
     for k in range(h[m.SCHUR], h[m.SCHUR] + h[m.SCHUR_SIZE]):
         w[k] = 0.0
@@ -170,11 +168,8 @@ def solve(h, w):
 
 
 @kernel
-def close(h, w, n):
+def finish(h, w):
     """Multipliers, and FORCE (holding L^-1 f) completed by them: L^-T then gives the accelerations."""
-    prepare(h, w, n)
-    if n[m.EVALUATION] != m.OK:
-        return
     gather_rows(h, w, h[m.GAMMA])
     for c in range(h[m.N_CLOSURES]):
         count, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
@@ -185,6 +180,17 @@ def close(h, w, n):
                 w[first + r] -= w[S + count * a + r] * force
     solve(h, w)
     add_spread(h, w, h[m.FORCE], 1.0)
+
+
+@kernel
+def close(h, f, w, n):
+    """Rows, Jacobians and multipliers of all closures; see `finish`."""
+    for c in range(h[m.N_CLOSURES]):
+        rows(h, w, c)
+        jacobian(h, w, c)
+    complete(h, w, n)
+    if n[m.EVALUATION] == m.OK:
+        finish(h, w)
 
 
 @kernel
@@ -202,7 +208,7 @@ def known_forces(h, w):
 def correction(h, w, residual, step):
     """The least correction of the coordinates, in the metric of M, that undoes a residual.
 
-    step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `prepare`.
+    step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `complete`.
     """
     gather_rows(h, w, residual)
     solve(h, w)

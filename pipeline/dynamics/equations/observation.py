@@ -94,6 +94,11 @@ def no_energy(h, f, w):
 
 
 @kernel
+def no_couplings(h, w):
+    """No closure acts on four links."""
+
+
+@kernel
 def _copy(w, first, count, out, column):
     for k in range(count):
         out[column + k] = w[first + k]
@@ -107,14 +112,18 @@ def make_observation(
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
+    stops: Callable | None = None,
+    couplings: Any = None,
 ) -> Callable:
     """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
 
-    evaluate, project: as the stepper calls them; the other arguments are those of `make_right_hand_side`.
+    evaluate, project: as the stepper calls them; couplings: the module of that name; the other arguments are those of
+    `make_right_hand_side`.
     """
     kinematics = make_kinematics(joints, flexible)
-    forces = make_forces(flexible, contacts, loads)
+    forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
+    couple = no_couplings if couplings is None else couplings.take_off_first_joints
     flexible_energy = no_energy if flexible is None else flexible.energies
 
     @kernel
@@ -129,6 +138,7 @@ def make_observation(
                 out[column + 6 * c + e] = total
                 w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_b(h, c))) + e] -= total
                 w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_a(h, c))) + e] += total
+        couple(h, w)
         return column + 6 * h[m.N_CLOSURES]
 
     @kernel

@@ -43,7 +43,7 @@ def no_link_load(h, w, i):
 
 
 @kernel
-def no_closures(h, w, n):
+def no_closures(h, f, w, n):
     """A tree needs no multipliers."""
 
 
@@ -87,11 +87,17 @@ def drive_forces(h, w):
         w[h[m.DRIVE_FORCE] + m.KNOWN_PAIRS.drive(h, p)] += dot6(w, momentum, w, column) * acceleration
 
 
-def make_forces(flexible: Any = None, contacts: Callable | None = None, loads: Callable | None = None) -> Callable:
+def make_forces(
+    flexible: Any = None,
+    contacts: Callable | None = None,
+    loads: Callable | None = None,
+    stops: Callable | None = None,
+) -> Callable:
     """The kernel forces(h, f, w, n): inertia and applied forces of all links, before the tree gathers them."""
     flexible_inertia = nothing if flexible is None else flexible.inertia
     contact_forces = nothing if contacts is None else contacts
     applied = nothing if loads is None else loads
+    stop_forces = nothing if stops is None else stops
 
     @kernel
     def forces(h, f, w, n):
@@ -103,6 +109,7 @@ def make_forces(flexible: Any = None, contacts: Callable | None = None, loads: C
         flexible_inertia(h, f, w, n)
         contact_forces(h, f, w, n)
         applied(h, f, w, n)
+        stop_forces(h, f, w, n)
 
     return forces
 
@@ -112,17 +119,18 @@ def make_right_hand_side(
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
+    stops: Callable | None = None,
     closures: Any = None,
     harmonics: Callable | None = None,
 ) -> Callable:
     """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
 
-    joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads: the kernels that
-    apply them.  closures: the module of that name.  harmonics: adds those of the laws of time.
+    joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels
+    that apply them.  closures: the module of that name.  harmonics: adds those of the laws of time.
     """
     known_motion = make_known_motion(harmonics)
     kinematics = make_kinematics(joints, flexible)
-    forces = make_forces(flexible, contacts, loads)
+    forces = make_forces(flexible, contacts, loads, stops)
     port_load = no_link_load if flexible is None else flexible.port_load
     modal_mass = no_modal_mass if flexible is None else flexible.mass_matrix
     modal = no_modal_forces if flexible is None else flexible.modal_forces
@@ -136,8 +144,8 @@ def make_right_hand_side(
         for k in range(h[m.NV]):
             w[h[m.U] + k] = w[y + h[m.NQ] + k]
             w[h[m.DU] + k] = 0.0
-        for k in range(h[m.N_TURNS]):
-            w[h[m.TURN] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_TURNS] + k]
+        for k in range(h[m.N_INTERNAL]):
+            w[h[m.INTERNAL] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_INTERNAL] + k]
 
     @kernel
     def gather_forces(h, f, w, n):
@@ -185,7 +193,7 @@ def make_right_hand_side(
         for k in range(h[m.NV]):
             w[h[m.FORCE] + k] = -w[h[m.BIAS] + k]
         forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-        close(h, w, n)
+        close(h, f, w, n)
         backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
         for k in range(h[m.NV]):
             w[h[m.DU] + k] = w[h[m.FORCE] + k]

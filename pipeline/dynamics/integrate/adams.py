@@ -91,6 +91,5 @@ METHOD = Method(
     dense=hermite.ROWS,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,
-    gap=0.25,
     memory=memory,
 )

@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import singular_step
 from pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
-from pipeline.dynamics.integrate.singular_step import steer
 from pipeline.dynamics.integrate.stepper import FAILED
 from pipeline.dynamics.kernels import kernel
 
@@ -26,18 +24,16 @@ LEAST_NORM = 1e-4
 #: rebound speed, which every later impact magnifies. A bounce without loss keeps its energy to 1e-10 at the default
 #: tolerance, seven times better than with 1, for a fifth more evaluations
 STRICTER = 10.0
-#: a step over a singular pose may be so much longer than accuracy allows otherwise; it can be rejected like any other
-STRETCH = 1.1
 
 
 def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, error_norm, after_rejection, next_step, choose_step and foresee of the stepper."""
+    """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
-    steady, gap = method.steady, method.gap
+    steady = method.steady
     watch_start, any_closed = contacts
 
     @kernel
@@ -120,9 +116,4 @@ def make_step_control(
         w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 
-    @kernel
-    def choose_step(h, w, t):
-        """Length of the step to try from t: as planned, unless a singular pose is ahead."""
-        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, STRETCH)
-
-    return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)
+    return first_step, error_norm, after_rejection, next_step

@@ -300,7 +300,7 @@ def stepped_over(h, f, w, n, c):
 def make_resolve_events(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any, regimes: Callable
 ) -> Callable:
-    """The kernel resolve_events(h, f, w, n, step, t_new, events) -> (event?, dense output ready?, end, step)."""
+    """The kernel resolve_events(h, f, w, n, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     interpolate, last = method.interpolate, method.last
     spare = method.slopes - 1  # row of SLOPES that no stage uses
 
@@ -371,14 +371,14 @@ def make_resolve_events(
         return give_up(n, m.STUCK_EVENT, c) if n[m.IMMEDIATE] > MOST_IMMEDIATE else RESTART
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, rows, events):
         t = w[h[m.CONTROL] + m.TIME]
         for shortened in range(MOST_SHORTENED + 1):
             watch_end(h, w)
             which, first, ready = first_change(h, f, w, n, step)
             if which < 0:
                 n[m.IMMEDIATE] = 0
-                return 0, follow_contacts(h, f, w, n, step, ready, events), t_new, step
+                return 0, follow_contacts(h, f, w, n, step, ready, rows, events), t_new, step
             if first * step <= 1e-15 * max(abs(t), step):
                 return change_at_start(h, f, w, n, which, events), True, t, step
             length, there = end_on_event(h, f, w, n, first * step, which)
@@ -393,7 +393,7 @@ def make_resolve_events(
         n[m.IMMEDIATE] = 0
         watch_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
-        follow_contacts(h, f, w, n, length, True, events)
+        follow_contacts(h, f, w, n, length, True, rows, events)
         change_mode(h, w, n, events, which, t + length)
         return RESTART, True, t + length, length
 

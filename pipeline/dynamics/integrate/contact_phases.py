@@ -2,7 +2,8 @@
 
 None of these changes the equations, so that no step ends on them; they are located on the dense output of the steps
 taken, as precisely as the integration itself. The force of a strongly damped contact peaks early in compression, so
-that its own trend is followed, not the penetration's.
+that its own trend is followed, not the penetration's. Each leaves a row of the motion, as an event that ends a step
+does: an impact is shorter than most output intervals, and forces and accelerations have their extremes in it.
 
 Source: Brent (1973), *Algorithms for Minimization without Derivatives*, ch. 5 (maxima).
 """
@@ -14,7 +15,7 @@ from typing import Any
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.integrate.recording import add_event
+from pipeline.dynamics.integrate.recording import add_event, snapshot
 from pipeline.dynamics.kernels import kernel
 
 #: share of the step over which trends at its end are measured; a force's peak nearer to the end than this is
@@ -44,6 +45,12 @@ def end_becomes_start(h, w):
         w[o + m.WATCH.gap0], w[o + m.WATCH.rate0] = w[o + m.WATCH.gap1], w[o + m.WATCH.rate1]
         w[o + m.WATCH.force0], w[o + m.WATCH.trend0] = w[o + m.WATCH.force1], w[o + m.WATCH.trend1]
         w[o + m.WATCH.slip0], w[o + m.WATCH.slip_rate0] = w[o + m.WATCH.slip1], w[o + m.WATCH.slip_rate1]
+
+
+@kernel
+def record_here(h, w, n, step, theta, rows):
+    """A row of the motion at a share of the step whose dense output is in Y_STAGE."""
+    snapshot(h, w, n, rows, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE])
 
 
 # Regimes of friction -------------------------------------------------------------------------------------------------
@@ -90,12 +97,12 @@ def may_touch_level(w, o, level, step):
 def make_follow_contacts(
     evaluate: Callable, evaluate_at: Callable, extend: Callable, method: Any, has_regimes: Callable
 ) -> Callable:
-    """The kernel follow_contacts(h, f, w, n, step, ready, events) -> dense output ready?, after an accepted step.
+    """The kernel follow_contacts(h, f, w, n, step, ready, rows, events) -> dense output ready?, after an accepted step.
 
     evaluate_at(h, f, w, n, step, theta): evaluates the dense output at a share of the step.
     has_regimes: `regimes` or `no_regimes`.
     """
-    last, spare = method.last, method.slopes - 1
+    last, spare, interpolate = method.last, method.slopes - 1, method.interpolate
     locate_level, maximum = make_searches(evaluate_at)
 
     @kernel
@@ -144,14 +151,17 @@ def make_follow_contacts(
         return passes_level(w, o, level) or may_touch_level(w, o, level, step)
 
     @kernel
-    def record_peak(h, f, w, n, step, c, events):
+    def record_peak(h, f, w, n, step, c, rows, events):
         """The largest force within the step, if that is a record of this contact."""
         event = events[int(w[m.WATCH.row(h, c) + m.WATCH.event_row])]
-        peak, _ = maximum(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.normal_force, 1.0)
-        event[m.EVENT.peak_force] = max(event[m.EVENT.peak_force], peak)
+        peak, where = maximum(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.normal_force, 1.0)
+        if peak > event[m.EVENT.peak_force]:
+            event[m.EVENT.peak_force] = peak
+            interpolate(h, w, where, h[m.Y_STAGE])
+            record_here(h, w, n, step, where, rows)
 
     @kernel
-    def record_compression(h, f, w, n, step, c, events):
+    def record_compression(h, f, w, n, step, c, rows, events):
         """The deepest point of this compression, as an event."""
         o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
         rate, before, after = now + m.TOUCH.rate, w[o + m.WATCH.rate0], w[o + m.WATCH.rate1]
@@ -162,32 +172,34 @@ def make_follow_contacts(
         begun = events[int(w[o + m.WATCH.event_row])]
         begun[m.EVENT.peak_depth] = max(begun[m.EVENT.peak_depth], -w[now + m.TOUCH.gap])
         begun[m.EVENT.peak_force] = max(begun[m.EVENT.peak_force], w[now + m.TOUCH.normal_force])
+        record_here(h, w, n, step, theta, rows)
 
     @kernel
-    def record_passage(h, f, w, n, step, c, a, b, fa, fb, events):
+    def record_passage(h, f, w, n, step, c, a, b, fa, fb, rows, events):
         """Sticking begins or ends between the shares a and b of the step, as an event."""
         slip = m.TOUCH.row(h, c) + m.TOUCH.slip
         theta = locate_level(h, f, w, n, step, slip, stick_speed(h, f, c), a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
         add_event(events, n, c, kind, w[h[m.CONTROL] + m.TIME] + theta * step)
+        record_here(h, w, n, step, theta, rows)
 
     @kernel
-    def record_regimes(h, f, w, n, step, c, events):
+    def record_regimes(h, f, w, n, step, c, rows, events):
         """One passage between the regimes, or there and back, as events."""
         o, level = m.WATCH.row(h, c), stick_speed(h, f, c)
         first, second = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level
         if first * second < 0.0:
-            record_passage(h, f, w, n, step, c, 0.0, 1.0, first, second, events)
+            record_passage(h, f, w, n, step, c, 0.0, 1.0, first, second, rows, events)
             return
         sign = -1.0 if first > 0.0 else 1.0
         extreme, where = maximum(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.slip, sign)
         beyond = sign * extreme - level
         if first * beyond < 0.0:
-            record_passage(h, f, w, n, step, c, 0.0, where, first, beyond, events)
-            record_passage(h, f, w, n, step, c, where, 1.0, beyond, second, events)
+            record_passage(h, f, w, n, step, c, 0.0, where, first, beyond, rows, events)
+            record_passage(h, f, w, n, step, c, where, 1.0, beyond, second, rows, events)
 
     @kernel
-    def follow_contacts(h, f, w, n, step, ready, events):
+    def follow_contacts(h, f, w, n, step, ready, rows, events):
         if trends_matter(h, f, w, n):
             measure_trends(h, f, w, n, step)
         for c in range(h[m.N_CONTACTS]):
@@ -205,11 +217,11 @@ def make_follow_contacts(
                 extend(h, f, w, n, step)
                 ready = True
             if peaks:
-                record_peak(h, f, w, n, step, c, events)
+                record_peak(h, f, w, n, step, c, rows, events)
             if turns:
-                record_compression(h, f, w, n, step, c, events)
+                record_compression(h, f, w, n, step, c, rows, events)
             if passes:
-                record_regimes(h, f, w, n, step, c, events)
+                record_regimes(h, f, w, n, step, c, rows, events)
         end_becomes_start(h, w)
         return ready
 

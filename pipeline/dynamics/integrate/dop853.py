@@ -170,6 +170,5 @@ METHOD = Method(
     make_kernels=make_kernels,
     interpolate=interpolate,
     error_order=ERROR_ORDER,
-    gap=0.467,
     stability=6.1,  # Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
 )

@@ -108,6 +108,5 @@ METHOD = Method(
     interpolate=interpolate,
     error_order=ERROR_ORDER,
     ends=True,
-    gap=0.55,
     stability=3.25,  # Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
 )

@@ -1,5 +1,5 @@
-"""Steps of the length that the scene gives, shortened only to end on events, drive breaks and the run's end, and to
-be laid over singular poses."""
+"""Steps of the length that the scene gives, shortened only to end on events, drive breaks, the run's end, and before
+singular poses."""
 
 from __future__ import annotations
 
@@ -7,17 +7,14 @@ from collections.abc import Callable
 from typing import Any
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import singular_step
 from pipeline.dynamics.integrate.norms import finite, set_error_scales
-from pipeline.dynamics.integrate.singular_step import steer
 from pipeline.dynamics.kernels import kernel
 
 
 def make_step_control(
     evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
 ) -> tuple:
-    """The kernels first_step, error_norm, after_rejection, next_step, choose_step and foresee of the stepper."""
-    gap = method.gap
+    """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
     watch_start, _ = contacts
 
     @kernel
@@ -60,10 +57,5 @@ def make_step_control(
         """All steps are alike."""
         return w[h[m.CONTROL] + m.FIXED]
 
-    @kernel
-    def choose_step(h, w, t):
-        """Length of the step to try from t: as given, unless a singular pose is ahead."""
-        return steer(h, w, t, w[h[m.CONTROL] + m.STEP], gap, 1.0)
-
     error_norm = no_error if method.stability is None else no_error_with_scales
-    return first_step, error_norm, after_rejection, next_step, choose_step, singular_step.compose(evaluate)
+    return first_step, error_norm, after_rejection, next_step

@@ -54,7 +54,6 @@ class Method:
     error_order: the error estimate falls with this power of the step plus one; 0 for methods without one.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
-    gap: middle of the widest gap between the stages, as share of the step.
     memory: floats kept between steps, from the numbers of positions, speeds and state variables.
     parameter: the method's number in the scene's solver table.
     stability: reach of the region of stability along the negative real axis, of an explicit method whose last
@@ -70,7 +69,6 @@ class Method:
     error_order: int = 0
     ends: bool = False
     steady: float = 1.0
-    gap: float = 0.5
     memory: Callable[[int, int, int], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
     stability: float | None = None

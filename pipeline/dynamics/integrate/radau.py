@@ -349,6 +349,5 @@ METHOD = Method(
     interpolate=hermite.interpolate,
     error_order=ERROR_ORDER,
     steady=1.2,
-    gap=0.4,
     memory=memory,
 )

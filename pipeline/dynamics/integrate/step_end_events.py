@@ -40,11 +40,11 @@ def watch_end(h, w, n, events):
 def make_resolve_events(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any
 ) -> Callable:
-    """The kernel resolve_events(h, f, w, n, step, t_new, events) -> (event?, dense output ready?, end, step)."""
+    """The kernel resolve_events(h, f, w, n, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     last = method.last
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, rows, events):
         if not watch_end(h, w, n, events):
             return 0, False, t_new, step
         extend(h, f, w, n, step)  # before the modes change: the outputs of this step belong to the old ones

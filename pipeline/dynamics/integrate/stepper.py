@@ -8,27 +8,36 @@ evaluations is used, so that the caller can report progress and be interrupted. 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.projection import keep_scales, largest
 from pipeline.dynamics.integrate.norms import finite
+from pipeline.dynamics.integrate.poses import NO_POSES, Poses
 from pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
-from pipeline.dynamics.integrate.singular_step import allowed, forget, near, note, plan
 from pipeline.dynamics.integrate.stiffness import make_detect_stiffness
 from pipeline.dynamics.kernels import kernel
 
 #: what resolve_events returns for an event after which integration starts afresh; another positive number only
 #: records it
 RESTART = 1
-#: share of the mechanism's size to which closures are closed before a singular pose
-TIGHTLY = 1e-15
+#: share of the planned step below which a step has been cut short
+CUT = 0.9
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
 FAILED = 1e9
 #: a step below this share of the time reached cannot be told from rounding
 SMALLEST_STEP = 4e-16
+
+
+@kernel
+def plan(h, w, step, following):
+    """The step to try next; one that was cut short says little about how long it may be."""
+    planned = h[m.CONTROL] + m.STEP
+    least = w[planned] if step < CUT * w[planned] else 0.0
+    w[planned] = max(following, least)
 
 
 @kernel
@@ -46,7 +55,7 @@ def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, proj
     """The kernel resolve_events of a stepper that looks for none."""
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, events):
+    def resolve_events(h, f, w, n, step, t_new, rows, events):
         return 0, False, t_new, step
 
     return resolve_events
@@ -63,26 +72,32 @@ def make_advance(
     method: Any,
     stepping: Any,
     events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
+    poses: Poses = NO_POSES,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
     stepping: the module `adaptive` or `fixed`.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    begin, attempt, error, extend, keep = method.make_kernels(evaluate, retract)
+    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(evaluate, retract)
+    attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
     last, ends = method.last, method.ends
     watch_start, make_resolve_events, any_closed = events
-    resolve_events = make_resolve_events(evaluate, attempt, extend, project, method)
-    record_outputs = make_record_outputs(extend, method.interpolate)
+    dense = replace(method, interpolate=interpolate)
+    resolve_events = make_resolve_events(evaluate, attempt, extend, project, dense)
+    record_outputs = make_record_outputs(extend, interpolate)
     detect_stiffness = make_detect_stiffness(method)
-    first_step, error_norm, after_rejection, next_step, choose_step, foresee = stepping.make_step_control(
+    first_step, error_norm, after_rejection, next_step = stepping.make_step_control(
         evaluate, (watch_start, any_closed), begin, error, method
     )
+    note, stand, steer, ready, done = poses.note, poses.stand, poses.steer, poses.ready, poses.done
+    foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
 
     @kernel
     def must_stop(h, w, n, outputs, rows, events):
         """Whether to return now, with the reason in n[STATUS]."""
         c, waiting = h[m.CONTROL], outputs.shape[0] - n[m.NEXT_OUTPUT]
+        room = m.ROOM + m.EVENTS_OF_A_CONTACT * h[m.N_CONTACTS]
         if w[c + m.TIME] >= w[c + m.END]:
             n[m.STATUS] = m.SEGMENT_END
         elif n[m.EVALUATIONS] >= n[m.CAP]:
@@ -93,10 +108,7 @@ def make_advance(
             n[m.STATUS] = m.AT_SINGULAR
         elif w[h[m.PIVOT] + m.LAST_PIVOT] < w[h[m.PIVOT] + m.WANTED_PIVOT]:
             n[m.STATUS] = m.WORN_ROWS
-        elif (
-            n[m.N_RECORDED] + waiting + m.ROOM > rows.shape[0]
-            or n[m.N_EVENTS] + m.ROOM + m.EVENTS_OF_A_CONTACT * h[m.N_CONTACTS] > events.shape[0]
-        ):
+        elif n[m.N_RECORDED] + waiting + room > rows.shape[0] or n[m.N_EVENTS] + room > events.shape[0]:
             n[m.STATUS] = m.FULL
         else:
             return False
@@ -116,8 +128,7 @@ def make_advance(
             return False
         w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
         w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS]))
-        share = TIGHTLY if near(h, w, t_new) else w[c + m.RTOL]
-        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, share * w[c + m.LENGTH])
+        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, w[c + m.RTOL] * w[c + m.LENGTH])
         note(h, w)
         if used > 0:
             n[m.EVALUATIONS] += used
@@ -128,13 +139,16 @@ def make_advance(
     @kernel
     def try_step(h, f, w, n, step, t_new):
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
+        if ready(h, w):
+            arrive(h, f, w, n, step, t_new)
+            return 0.0
         if not attempt(h, f, w, n, step):
             return FAILED
         norm = error_norm(h, f, w, n, step)
         if norm != norm:
             n[m.EVALUATION] = m.NOT_FINITE
             return FAILED
-        if norm > allowed(h, w):
+        if norm > 1.0:
             return min(norm, FAILED)
         if not finish(h, f, w, n, t_new):
             return FAILED
@@ -153,51 +167,82 @@ def make_advance(
         keep_scales(h, w)
 
     @kernel
+    def set_off(h, f, w, n):
+        """What `first_step` does for the contacts, before a step along a polynomial; True, for it can be made."""
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], h[m.SLOPES])
+        n[m.EVALUATIONS] += 1
+        watch_start(h, w)
+        n[m.EVALUATION], n[m.FRESH] = m.OK, 0
+        return True
+
+    @kernel
+    def start(h, f, w, n):
+        """Begin at the start of a segment or after an event; False when that cannot be."""
+        if ready(h, w):
+            return set_off(h, f, w, n)
+        if not first_step(h, f, w, n):
+            return False
+        note(h, w)
+        stand(h, w, w[h[m.CONTROL] + m.TIME])
+        return True
+
+    @kernel
+    def choose_step(h, w, n, t):
+        """Length of the step to try from t; 0, with the reason in n[STATUS], when none can be."""
+        c = h[m.CONTROL]
+        step = w[c + m.COLLOCATED] if ready(h, w) else steer(h, w, t)
+        if step == 0.0:
+            n[m.STATUS] = m.SINGULAR_AHEAD
+            return 0.0
+        if t + 1.0001 * step >= w[c + m.END]:
+            step = w[c + m.END] - t
+        if step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
+            return step
+        if n[m.EVALUATION] == m.NOT_FINITE:
+            n[m.STATUS] = m.NOT_A_NUMBER
+        else:
+            n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
+        return 0.0
+
+    @kernel
     def advance(h, f, w, n, outputs, rows, events):
         """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
         c = h[m.CONTROL]
         while not must_stop(h, w, n, outputs, rows, events):
             t = w[c + m.TIME]
-            if n[m.FRESH]:
-                if not first_step(h, f, w, n):
-                    return
-                note(h, w)
-                forget(h, w, t)
-            step = choose_step(h, w, t)
-            final = t + 1.0001 * step >= w[c + m.END]
-            if final:
-                step = w[c + m.END] - t
-            if not step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
-                if n[m.EVALUATION] == m.NOT_FINITE:
-                    n[m.STATUS] = m.NOT_A_NUMBER
-                else:
-                    n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
+            if n[m.FRESH] and not start(h, f, w, n):
                 return
+            step = choose_step(h, w, n, t)
+            if step == 0.0:
+                return
+            final = t + 1.0001 * step >= w[c + m.END]
             t_new = w[c + m.END] if final else t + step
             norm = try_step(h, f, w, n, step, t_new)
-            if norm > allowed(h, w):
+            if norm > 1.0:
                 n[m.REJECTED] += 1
                 if not after_rejection(h, w, n, step, norm):
                     return
                 continue
-            following = next_step(h, w, n, step, norm)
+            along = ready(h, w)
+            following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
-            happened, ready, t_new, step = resolve_events(h, f, w, n, step, t_new, events)
+            happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
             if happened < 0:
                 return
             n[m.STEPS] += 1
-            straddling = w[c + m.STRADDLING] > 0.0
-            if straddling:
+            if along:
                 snapshot(h, w, n, rows, t, h[m.Y])
-            record_outputs(h, f, w, n, step, ready, outputs, rows, t_new)
+            record_outputs(h, f, w, n, step, known, outputs, rows, t_end)
             keep(h, f, w, n, step)
-            accept(h, w, t_new)
+            accept(h, w, t_end)
             plan(h, w, step, following)
-            foresee(h, f, w, n, t_new)
-            if happened > 0 or straddling:
+            if along:
+                done(h, w, t_end)
+            elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
+                foresee(h, f, w, n, t_end)
+            if happened > 0 or along:
                 hold_modes(h, w, n)
-                snapshot(h, w, n, rows, t_new, h[m.Y])
-            if happened > 0:
-                n[m.FRESH] = 1 if happened == RESTART else 0
+                snapshot(h, w, n, rows, t_end, h[m.Y])
+                n[m.FRESH] = 1 if along or happened == RESTART else 0
 
     return advance

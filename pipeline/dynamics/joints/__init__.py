@@ -24,9 +24,11 @@ NAMES = {name: f"{module_name(name)}:{name.title().replace('-', '')}" for name i
 CONTACTS = {
     "clearance-spherical": "clearance_spherical:ClearanceSpherical",
     "clearance-revolute": "clearance_revolute:ClearanceRevolute",
+    "clearance-slot": "clearance_slot:ClearanceSlot",
+    "ball-on-plane": "ball_on_plane:BallOnPlane",
 }
 #: joints that are always one link; others may become chains of those in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
 #: the ideal joint that a clearance joint keeps beside its contact
-HELD = {"clearance-revolute": "planar"}
+HELD = {"clearance-revolute": "planar", "clearance-slot": "planar"}

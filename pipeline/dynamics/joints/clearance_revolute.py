@@ -10,14 +10,15 @@ from __future__ import annotations
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import at9, axis, dot, scale, sub
+from pipeline.dynamics.vectors import at9, axis, dot, radial, scale, sub
 
 
 @kernel
-def separation(w, outer, p):
-    """Offset of the pin's centre that closes the gap [m]: the part of p normal to the journal's axis."""
+def separation(f, w, outer, numbers, p, v):
+    """As `clearance_spherical.separation`, of the parts of p and v normal to the journal's axis."""
     z = axis(at9(w, outer + m.FRAME.axes), 2)
-    return sub(p, scale(dot(z, p), z))
+    distance, rate, normal, turning = radial(sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z)))
+    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning, p
 
 
 class ClearanceRevolute:

@@ -16,6 +16,7 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model import initial, selection
 from pipeline.dynamics.model.driving import prescribed
+from pipeline.dynamics.model.gauges import angles
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import observation, singular
@@ -34,14 +35,14 @@ SHORTEST = 1e-4
 class Bench:
     """An engine with its drives held. drives: position and speed of each, in the tree's sense; shape (known, 2).
 
-    turns: angles that loads follow beyond half a turn [rad]; the one part that changes, with the pose.
+    internal: states of parts, such as angles beyond half a turn [rad]; the one thing that changes, with the pose.
     """
 
     scene: Scene
     engine: Engine
     time: float
     drives: np.ndarray
-    turns: np.ndarray
+    internal: np.ndarray
 
     @property
     def model(self) -> Model:
@@ -102,7 +103,7 @@ def hold(
         last[k, 0] = model.drive_signs[k] * value
     engine.modes[:], engine.latched[:] = 1, NO_IMPACT
     first[:, 1] = 0.0
-    bench = Bench(scene, engine, at, first, np.zeros(arrays.size(m.N_TURNS)))
+    bench = Bench(scene, engine, at, first, np.zeros(arrays.size(m.N_INTERNAL)))
     set_drives(bench, first)
     q = carry(bench, closed(bench, start[: model.nq]), last[:, 0])
     set_drives(bench, last)
@@ -154,7 +155,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
     y[: bench.model.nq] = q
     if v is not None:
         y[bench.model.speeds] = v
-    y[len(y) - len(bench.turns) :] = bench.turns
+    y[len(y) - len(bench.internal) :] = bench.internal
     return y
 
 
@@ -177,9 +178,9 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
     seen = observe(bench, state(bench, q)[None, :])
     if seen.status[0] != m.OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
-    if len(bench.turns):
-        turn = bench.model.arrays.table(m.LOADS)["turns"]
-        bench.turns[turn[turn >= 0]] = seen.loads["value"][0, turn >= 0]
+    for place, angle in angles(bench.model.arrays.table(m.GAUGES), seen.sites[0]).items():
+        before = bench.internal[place]
+        bench.internal[place] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
     return seen.state[0, : len(q)].copy()
 
 

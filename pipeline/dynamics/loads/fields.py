@@ -5,12 +5,11 @@ A load between two sites acts on both by one wrench, with opposite signs: it lea
 
 from __future__ import annotations
 
-import numpy as np
-
+from pipeline.dynamics import gauge
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.bodies.rigid import apply_wrench
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, put, scale, sub
+from pipeline.dynamics.vectors import put, scale
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -18,13 +17,19 @@ ZERO = (0.0, 0.0, 0.0)
 @kernel
 def number(h, f, k, which):
     """A number of load k."""
-    return f[m.LOAD_NUMBERS.row(h, k) + which]
+    return f[m.LOAD_NUMBERS.row(h, m.LOADS.number0(h, k)) + which]
 
 
 @kernel
 def law(h, w, k, which):
     """Present value of a law of load k."""
     return w[m.LAW.row(h, m.LOADS.law0(h, k) + which)]
+
+
+@kernel
+def law_rate(h, w, k, which):
+    """Its present rate [1/s of it]."""
+    return w[m.LAW.row(h, m.LOADS.law0(h, k) + which) + m.LAW.rate]
 
 
 @kernel
@@ -45,24 +50,5 @@ def act(h, w, k, moment, force, value, rate, stored, power, loss):
 
 @kernel
 def measure(h, w, k):
-    """Coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
-    a, b = m.SITE_FRAMES.row(h, m.LOADS.a(h, k)), m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
-    F, G = at9(w, a + m.FRAME.axes), at9(w, b + m.FRAME.axes)
-    along = axis(F if m.LOADS.side(h, k) == 0 else G, m.LOADS.axis(h, k))
-    omega = at(w, a + m.FRAME.omega)
-    if m.LOADS.turning(h, k):
-        sine = dot(axis(F, m.LOADS.sine_f(h, k)), axis(G, m.LOADS.sine_g(h, k)))
-        cosine = dot(axis(F, m.LOADS.cosine_f(h, k)), axis(G, m.LOADS.cosine_g(h, k)))
-        return np.arctan2(sine, cosine), dot(along, sub(at(w, b + m.FRAME.omega), omega)), along, ZERO
-    p = at(w, b + m.FRAME.origin)
-    r = sub(p, at(w, a + m.FRAME.origin))
-    slide = sub(at(w, b + m.FRAME.velocity), add(at(w, a + m.FRAME.velocity), cross(omega, r)))
-    return dot(along, r), dot(along, slide), cross(p, along), along
-
-
-@kernel
-def unwound(h, w, k, angle, rate):
-    """The angle of load k with the full turns that it has made; its state follows the rate."""
-    turn = m.LOADS.turns(h, k)
-    w[h[m.LEDGER_RATE] + h[m.LOAD_SLOT] + 2 + turn] = rate
-    return angle + 2.0 * np.pi * np.round((w[h[m.TURN] + turn] - angle) / (2.0 * np.pi))
+    """Joint coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
+    return gauge.counted(h, w, m.LOADS.gauge(h, k))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pipeline.core.scene.loads import JointSpring as Declared
 from pipeline.core.units import quantity
-from pipeline.dynamics import memory as m
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, measure, number, unwound
+from pipeline.dynamics.loads.fields import act, measure, number
 from pipeline.dynamics.loads.row import Row
 from pipeline.dynamics.vectors import scale
 
@@ -16,8 +15,6 @@ from pipeline.dynamics.vectors import scale
 def apply(h, f, w, k):
     """Apply load k."""
     value, rate, moment, force = measure(h, w, k)
-    if m.LOADS.turns(h, k) >= 0:
-        value = unwound(h, w, k, value, rate)
     stretch, damped = value - number(h, f, k, 2), number(h, f, k, 1) * rate
     size = -(number(h, f, k, 0) * stretch + damped)
     stored = 0.5 * number(h, f, k, 0) * stretch * stretch

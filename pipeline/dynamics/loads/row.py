@@ -10,8 +10,8 @@ from typing import Any
 class Row:
     """frames: the frame acted on, or the two between which it acts; or `joint`: that joint's frames.
 
-    laws: law, dimension and place of each.  numbers: at most five.  follows: whether it turns with
-    its frame.  counts_turns: whether it needs its angle beyond half a turn.
+    laws: law, dimension and place of each.  numbers: as many as it needs.  follows: whether it turns with
+    its frame.  counts_turns: whether it needs its angle beyond half a turn.  states: number of internal states.
     """
 
     frames: tuple[str, ...] = ()
@@ -20,3 +20,4 @@ class Row:
     numbers: tuple[float, ...] = ()
     follows: bool = False
     counts_turns: bool = False
+    states: int = 0

@@ -1,4 +1,4 @@
-"""What joints demand of the poses of links; from the poses that a scene gives to some that fit, or a refusal."""
+"""From the poses that a scene gives to some that all joints allow, or a refusal."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from scipy.sparse import csr_array, diags_array, eye_array
 from pipeline.core.algebra import rotation_vector_to_matrix, skew
 from pipeline.core.errors import InputError
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model import given_start
 from pipeline.dynamics.model.chain import path_positions
+from pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
 from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.laws import NONE, drive_laws
+from pipeline.dynamics.model.laws import NONE
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.tree import PATH, Edge
 
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
@@ -33,101 +34,6 @@ ROUNDING = 1e-15
 SAME_WAY = 0.5
 #: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
 LEAST_GYRATION = 0.01
-
-
-@dataclass(frozen=True)
-class Constraint:
-    """A joint between frames on two links; `values`: what drives prescribe at the start, by number of coordinate."""
-
-    edge: Edge
-    link_a: int
-    place_a: Placement
-    link_b: int
-    place_b: Placement
-    values: Mapping[int, float]
-
-    @property
-    def name(self) -> str:
-        """Name of the joint."""
-        return self.edge.name
-
-    def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
-        """Both frames in the world, from the poses of all links."""
-        return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
-
-
-def constraints(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> list[Constraint]:
-    """All joints but contacts and paths: those of the tree in the order of its links, then the closures."""
-    t = mechanism.scene.time.start
-    laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
-    tree = [link.branch.edge for link in mechanism.links if link.branch.edge is not None and not link.massless]
-    joints = []
-    for edge in [*tree, *(closure.edge for closure in mechanism.closures)]:
-        if edge.kind == PATH:
-            continue
-        a, b = mechanism.site(edge.frame_a), mechanism.site(edge.frame_b)
-        values = {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
-        joints.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
-    return joints
-
-
-def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
-    """A link's own side of its inboard joint, in the link's frame."""
-    frame = link.branch.frame
-    return Placement() if frame is None or not link.flexible else mechanism.frames[frame].place
-
-
-def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals (n,) [m or -] of a joint, and the wrenches (n, 6) (moment about the origin, force) that resist them.
-
-    A wrench times the twist of B relative to A (angular velocity; velocity of the point at the origin) is the
-    residual's rate.
-    """
-    declared = joint_class(kind)
-    residuals, wrenches = [], []
-    for k in declared.TRANSLATIONS:
-        along = A.R[:, k]
-        residuals.append(along @ (B.p - A.p))
-        wrenches.append([*_cross(B.p, along), *along])
-    for k, other in declared.ROTATIONS:
-        residuals.append(A.R[:, k] @ B.R[:, other])
-        wrenches.append([*_cross(B.R[:, other], A.R[:, k]), 0.0, 0.0, 0.0])
-    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
-
-
-def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> tuple[np.ndarray, np.ndarray]:
-    """The same for the driven coordinates of a joint."""
-    declared, relative = joint_class(kind), A.inverse().of(B)
-    now = declared.coordinates(relative.R, relative.p)
-    residuals, wrenches = [], []
-    for k, value in values.items():
-        coordinate = declared.COORDINATES[k]
-        along, miss = (A, B)[coordinate.side].R[:, coordinate.axis], float(now[k]) - value
-        if coordinate.turning:
-            miss = (miss + np.pi) % (2.0 * np.pi) - np.pi
-            wrenches.append([*along, 0.0, 0.0, 0.0])
-        else:
-            wrenches.append([*_cross(B.p, along), *along])
-        residuals.append(miss)
-    return np.array(residuals), np.array(wrenches).reshape(-1, 6)
-
-
-def _cross(a: np.ndarray, b: np.ndarray) -> tuple[float, float, float]:
-    """Vector product; numpy's own costs fifty times as much for one pair, and there are thousands."""
-    ax, ay, az = a.tolist()
-    bx, by, bz = b.tolist()
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-
-
-def freedoms(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:
-    """What a joint leaves free of the motion of B relative to A: axes of turns about B's origin, and of slides.
-
-    Shapes (turns, 3) and (slides, 3), orthonormal each; turns come first in the joint's speeds.
-    """
-    declared, (_, wrenches) = joint_class(kind), demands(kind, A, B)
-    turning = wrenches[len(declared.TRANSLATIONS) :, :3]
-    turns = np.linalg.svd(turning)[2][len(turning) :] if len(turning) else np.eye(3)
-    return np.asarray(turns), A.R.T[[k for k in range(3) if k not in declared.TRANSLATIONS]]
 
 
 @dataclass(frozen=True)
@@ -149,15 +55,19 @@ class Misfit:
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
     """The mechanism with links placed so that all joints fit and driven ones stand where their drives say.
 
-    Raises InputError for joints whose frames start far apart or face each other the wrong way, and
-    for a mechanism that cannot be assembled, with the residual of every joint.  One with flexible bodies
-    or paths is only checked: deformation and prescribed poses are part of its closing, which the engine does.
+    Raises InputError for joints whose frames start far apart or face each other the wrong way, for poses given that
+    contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.  One with
+    flexible bodies or paths is only checked: deformation and prescribed poses are part of its closing, which the
+    engine does.
     given: laws that replace the scene's.
     """
     joints, poses = constraints(mechanism, given), [link.start for link in mechanism.links]
     _refuse_apart(mechanism, joints, poses)
     _refuse_opposite(joints, poses)
-    mechanism = replace(mechanism, start_residual=max(residuals(joints, poses).values(), default=0.0))
+    missed = given_start.misses(mechanism, joints, poses, given)
+    given_start.refuse_far(mechanism, missed)
+    residual = max([*residuals(joints, poses).values(), *(miss.size for miss in missed)], default=0.0)
+    mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
     if mechanism.has_paths or not mechanism.all_rigid:
         return settled(mechanism, poses)
     closed = close(mechanism, joints, poses)

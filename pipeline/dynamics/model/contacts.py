@@ -10,8 +10,10 @@ from pipeline.core.registry import lookup
 from pipeline.core.scene.clearance import Clearance
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
+from pipeline.dynamics.model.gauges import Gauges
 from pipeline.dynamics.model.mechanism import Contact, Mechanism
 from pipeline.dynamics.model.numbering import Numbering
+from pipeline.dynamics.model.stops import End
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
@@ -25,8 +27,13 @@ def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
     return tuple(_resolve(mechanism, contact) for contact in mechanism.contacts)
 
 
-def fill(numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching) -> dict[Any, Any]:
-    """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact."""
+def fill(
+    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching, gauges: Gauges
+) -> dict[Any, Any]:
+    """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact.
+
+    gauges: take those of the stops.
+    """
     contacts = numbering.mechanism.contacts
     rows, reals = [], []
     for (name, joint, *_), law, sites, place in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
@@ -35,9 +42,13 @@ def fill(numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching:
             friction = _friction(name, joint)
             friction_kind = parts.frictions.index(joint.friction.law)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
-        kinds_of = (parts.forms.index(law.form), friction_kind, parts.surfaces.index(joint.type))
+        if isinstance(joint, End):
+            surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
+        else:
+            surfaces, shape = parts.surfaces.index(joint.type), joint.shape
+        kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         rows.append((*sites, *kinds_of, place))
-        reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers])
+        reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers, *shape])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 
@@ -70,21 +81,32 @@ def _bristles(mechanism: Mechanism) -> list[float | None]:
     ]
 
 
-def _friction(name: str, joint: Clearance) -> Any:
+def _friction(name: str, joint: Clearance | End) -> Any:
     assert joint.friction is not None
     return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
-    joint, place = contact.joint, f"[joint.{contact.name}.normal]"
+    joint, place = contact.joint, f"[{contact.place}.normal]"
     masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
     normal = lookup(NORMAL_LAWS, joint.normal.law, where=place)
+    if isinstance(joint, End):
+        return _resolved(normal, joint, joint.normal.stiffness, None, place)
     surfaces = lookup(CONTACTS, joint.type, where=place)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
-        return normal.resolve(joint.normal, surfaces.stiffness(joint, exponent), _reduced_mass(masses))
+        stiffness = surfaces.stiffness(joint, exponent)
     except ValueError as error:
         raise InputError(place, str(error)) from None
+    return _resolved(normal, joint, stiffness, _reduced_mass(masses), place)
+
+
+def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, place: str) -> Resolved:
+    try:
+        law: Resolved = normal.resolve(joint.normal, stiffness, mass)
+    except ValueError as error:
+        raise InputError(place, str(error)) from None
+    return law
 
 
 def _reduced_mass(masses: Sequence[float]) -> float | None:

@@ -76,6 +76,15 @@ def coordinate_of(scene: Scene, joint: str, name: str | None, place: str) -> tup
     return joint, names.index(name), known[names.index(name)]
 
 
+def named_coordinate(scene: Scene, text: str, place: str) -> tuple[str, Coordinate]:
+    """The joint and coordinate that ``A`` or ``A.rotation`` names; InputError when there is none."""
+    joint, _, coordinate = text.partition(".")
+    try:
+        return joint, coordinate_of(scene, joint, coordinate or None, place)[2]
+    except InputError as error:  # the joint and its coordinate stand in one text here
+        raise InputError(place, error.problem, error.remedy) from None
+
+
 def joint_drives(scene: Scene) -> dict[str, tuple[str | None, ...]]:
     """Driven joint -> the drive of each of its coordinates, or None."""
     driven: dict[str, tuple[str | None, ...]] = {}

@@ -9,20 +9,25 @@ import numpy as np
 
 from pipeline.core.errors import InputError
 from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import Ground, RigidBody
+from pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import chain_positions, outboard_place
+from pipeline.dynamics.model.assembly import chain_positions
+from pipeline.dynamics.model.constraints import outboard_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.flexible_bodies import bow, shift
+from pipeline.dynamics.model.gauges import angles
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.model import Model
 
 #: state -> frames of all links, named fields of LINK_FRAMES, and rates at which the loops open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
-#: misses below this share of the speeds asked for are rounding; speeds that contradict each other miss by more than
-#: this share
-RIGID, CONTRADICTS = 1e-9, 1e-6
+#: misses below this share of the speeds asked for are rounding
+RIGID = 1e-9
+#: given velocities that are missed by less than this share of the speeds were given as well as they were written
+WRITTEN = 1e-6
+#: given velocities that are missed by more than this share of the largest one are a mistake, not a rough start
+WRONG = 0.05
 #: combinations of speeds that change rates by less than this share of the largest change nothing: redundant closures
 REDUNDANT = 1e-9
 #: a spring shorter than this share of the mechanism's size has no direction
@@ -49,30 +54,33 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray:
-    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+@dataclass(frozen=True)
+class Velocities:
+    """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
-    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
-    of deformation if joints, drives and given velocities allow that.
-    Raises InputError when joints and drives do not allow the velocities.
+    asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
+    bodies: those that are given velocities, which the first `told` rows ask for; the others keep the loops closed.
+    fastest: size of all these velocities, those of a slow motion at least.
     """
-    wanted = {
-        n: b
-        for n, b in model.scene.body.items()
-        if not isinstance(b, Ground) and (b.velocity is not None or b.angular_velocity is not None)
-    }
-    elastic = np.zeros(model.nv, dtype=bool)
-    for modes in model.numbering.modal_coordinates.values():
-        elastic[modes] = True
-    if not wanted and not elastic.any():
-        return y
+
+    matrix: np.ndarray
+    asked: np.ndarray
+    target: np.ndarray
+    told: int
+    bodies: tuple[str, ...]
+    fastest: float
+
+
+def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
+    """What bodies and loops ask of the speeds in a state."""
+    wanted = with_velocities(model)
     y = y.copy()
     y[model.speeds] = 0.0
-    given = np.array([_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]).ravel()
-    told, centres = ~np.isnan(given), [_centre(model, name) for name in wanted]
+    given, centres = _given(wanted).ravel(), [_centre(model, name) for name in wanted]
+    told = ~np.isnan(given)
 
     unit, L = model.speed_scales, model.length
-    lengths = np.tile([1.0] * 3 + [L] * 3, len(wanted))[told]
+    lengths = np.tile(_units(model), len(wanted))[told]
     opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
@@ -86,25 +94,86 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray) -> np.ndarray
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    matrix = np.array(columns).T.reshape(len(base), model.nv)
     asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
-    target = asked - base
-    # a radian, or the mechanism's size, in the time of the whole run is slow
-    slow = 1.0 / (model.scene.time.end - model.scene.time.start)
-    fastest = slow + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
-    speeds, miss = _least(matrix * ~elastic, target)
-    if miss > RIGID * fastest:
-        speeds, miss = _least(matrix, target)
-    if wanted and miss > CONTRADICTS * fastest:
-        names = ", ".join(wanted)
+    fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
+    matrix = np.array(columns).T.reshape(len(base), model.nv)
+    return Velocities(matrix, asked, asked - base, int(told.sum()), tuple(wanted), fastest)
+
+
+def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
+    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+
+    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
+    of deformation if joints, drives and given velocities allow that.
+    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
+    Raises InputError when joints and drives do not allow the velocities.
+    """
+    elastic = np.zeros(model.nv, dtype=bool)
+    for modes in model.numbering.modal_coordinates.values():
+        elastic[modes] = True
+    if not with_velocities(model) and not elastic.any():
+        return y
+    equations = velocity_equations(model, motion, y)
+    speeds, miss = _least(equations.matrix * ~elastic, equations.target)
+    if miss > RIGID * equations.fastest:
+        speeds, miss = _least(equations.matrix, equations.target)
+    largest = float(np.max(np.abs(equations.asked), initial=0.0))
+    if equations.bodies and miss > max(WRITTEN * equations.fastest, share * largest):
         raise InputError(
-            f"[body.{next(iter(wanted))}.velocity]",
-            f"joints and drives do not allow the velocities given for {names} (they miss by {miss:.3g} of the "
-            "mechanism's size, or radians, per second)",
+            f"[body.{equations.bodies[0]}.velocity]",
+            f"joints and drives do not allow the velocities given for {', '.join(equations.bodies)} (they miss by "
+            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the "
+            "largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
         )
-    y[model.speeds] = unit * speeds
+    y = y.copy()
+    y[model.speeds] = model.speed_scales * speeds
     return y
+
+
+def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
+    """The bodies that the scene gives velocities, by name."""
+    return {
+        name: body
+        for name, body in model.scene.body.items()
+        if not isinstance(body, (Ground, MeshedRigidBody))
+        and (body.velocity is not None or body.angular_velocity is not None)
+    }
+
+
+def changed_velocities(model: Model, frames: np.ndarray, y: np.ndarray) -> list[str]:
+    """Sentences about bodies that do not start with the velocities that the scene gives, with amounts.
+
+    y: state at the start.  frames: of all links there, named fields of LINK_FRAMES.
+    """
+    wanted, found, unit = with_velocities(model), [], _units(model)
+    given = _given(wanted)
+    limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
+    for name, row in zip(wanted, given, strict=True):
+        apart = np.abs(_centre(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
+        if np.nanmax(apart / unit) > limit:
+            turning, moving = np.fmax.reduce(apart.reshape(2, 3), axis=1, initial=0.0)
+            found.append(
+                f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
+                f"{moving:.3g} m/s and {turning:.3g} rad/s"
+            )
+    return found
+
+
+def _given(wanted: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
+    """Angular velocity and velocity given for each body, shape (bodies, 6); nan where none is."""
+    given = [_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]
+    return np.array(given).reshape(-1, 6)
+
+
+def _units(model: Model) -> np.ndarray:
+    """What counts as much among angular velocity and velocity: radians, and the mechanism's size; shape (6,)."""
+    return np.array([1.0] * 3 + [model.length] * 3)
+
+
+def _slow(model: Model) -> float:
+    """A radian, or the mechanism's size, in the time of the whole run is slow [1/s]."""
+    return 1.0 / (model.scene.time.end - model.scene.time.start)
 
 
 def _least(matrix: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float]:
@@ -155,17 +224,18 @@ def _centre(model: Model, name: str) -> _Centre:
     return _Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
-def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """Y with the angles that loads follow; `loads`: what each does at y, rows of LOAD with named fields.
+def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:
+    """Y with the internal states of parts as they start; `sites`: their frames at y, rows of SITE_FRAMES."""
+    y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
+    for place, angle in angles(model.arrays.table(m.GAUGES), sites).items():
+        y[first + place] = angle
+    return y
 
-    Raises InputError for a spring or damper of no length, which has no direction.
-    """
-    y = y.copy()
-    turns, first = model.arrays.table(m.LOADS)["turns"], model.ny - model.arrays.size(m.N_TURNS)
-    for (name, _), turn, value in zip(model.loads, turns, loads["value"], strict=True):
+
+def check_loads(model: Model, loads: np.ndarray) -> None:
+    """InputError for a spring or damper of no length, which has no direction; `loads`: rows of LOAD at the start."""
+    for (name, _), value in zip(model.loads, loads["value"], strict=True):
         load = model.scene.load[name]
-        if turn >= 0:
-            y[first + turn] = value
         has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
         if has_direction and value <= SHORTEST * model.length:
             raise InputError(
@@ -173,4 +243,3 @@ def start_loads(model: Model, y: np.ndarray, loads: np.ndarray) -> np.ndarray:
                 "its two ends start in one place, so that it pulls in no direction",
                 "move an end; only a spring of no free length and no damping may start so",
             )
-    return y

@@ -16,7 +16,8 @@ from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.effects import LOADS
 from pipeline.dynamics.joints.coordinate import Coordinate
 from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.driving import coordinate_of, named_coordinate
+from pipeline.dynamics.model.gauges import Gauges
 from pipeline.dynamics.model.laws import checked_law
 from pipeline.dynamics.model.mechanism import Mechanism
 from pipeline.dynamics.model.merge import find_frame
@@ -35,13 +36,12 @@ class Load(NamedTuple):
 
 @dataclass(frozen=True)
 class Loaded:
-    """Tables of the loads, kind after kind; `laws` are theirs, `turns` counts the angles that they follow."""
+    """Tables of the loads, kind after kind; `laws` are theirs."""
 
     kinds: tuple[str, ...]
     loads: tuple[Load, ...]
     tables: dict[Any, Any]
     laws: list[Pieces] = field(default_factory=list)
-    turns: int = 0
 
 
 def gravity(scene: Scene) -> np.ndarray:
@@ -52,29 +52,37 @@ def gravity(scene: Scene) -> np.ndarray:
     return field
 
 
-def tabulate(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pieces]) -> Loaded:
-    """Check the loads of a mechanism, give their frames sites, and fill their tables; `given`: as `model.tabulate`."""
+def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: Mapping[str, Pieces]) -> Loaded:
+    """Check the loads of a mechanism, give their frames sites, and fill their tables; `given`: as `model.tabulate`.
+
+    gauges: take those of the loads and their internal states.
+    """
     scene, forces = mechanism.scene, mechanism.scene.forces()
     names = sorted(forces, key=lambda name: forces[name].type)  # stable: within a kind as the scene has them
     kinds = tuple(sorted({load.type for load in forces.values()}))
     loads: list[Load] = []
     rows: list[tuple[int, ...]] = []
-    numbers, laws, turns = list[list[float]](), list[Pieces](), 0
+    numbers, laws = list[float](), list[Pieces]()
     for name in names:
-        row, coordinate = _describe(scene, name)
+        row, coordinate, measured = _describe(scene, name)
         frames = row.frames if row.joint is None else tuple(scene.joint[row.joint].between)
         loads.append(Load(name, frames))
         a, b = _sites(mechanism, numbering, loads[-1])
-        turn = -1
-        if row.counts_turns:
-            turn, turns = turns, turns + 1
+        gauge = -1 if coordinate is None else gauges.add(a, b, coordinate, counts=row.counts_turns)
+        look = -1
+        if measured is not None:
+            first_end, second_end = (
+                numbering.site(mechanism.site(frame)) for frame in scene.joint[measured[0]].between
+            )
+            look = gauges.add(first_end, second_end, measured[1], counts=True)
+        internal = gauges.states(row.states) if row.states else -1
         first = numbering.known + len(laws)
         if f"load.{name}" in given:
             laws.append(given[f"load.{name}"])
         else:
             laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
-        rows.append((a, b, first, turn, int(row.follows), *_motion(coordinate)))
-        numbers.append([*row.numbers, *[0.0] * (m.LOAD_NUMBERS.size - len(row.numbers))])
+        rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows)))
+        numbers += row.numbers
     counts = [sum(forces[n].type == kind for n in names) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     tables = {
@@ -82,22 +90,31 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pie
         m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
         m.LOAD_NUMBERS: numbers,
     }
-    return Loaded(kinds, tuple(loads), tables, laws, turns)
+    return Loaded(kinds, tuple(loads), tables, laws)
 
 
-def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None]:
-    """What a load acts on and with; InputError for what cannot be."""
+def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[str, Coordinate] | None]:
+    """What a load acts on and with, its joint coordinate, and the one that it measures with that joint's name.
+
+    Raises InputError for what cannot be.
+    """
     load: Any = scene.load[name]
     place = f"[load.{name}]"
     part = lookup(LOADS, load.type, where=place)
-    coordinate = None
+    coordinate: Coordinate | None = None
+    measured: tuple[str, Coordinate] | None = None
     if hasattr(load, "joint"):
         coordinate = coordinate_of(scene, load.joint, load.coordinate, place)[2]
+    if hasattr(load, "measured") and coordinate is not None:
+        measured = load.joint, coordinate
+        if load.measured is not None:
+            measured = named_coordinate(scene, load.measured, f"[load.{name}.measured]")
+    given = [*([coordinate] if coordinate else []), *([measured[1]] if measured else [])]
     try:
-        row: Row = part.row(load, place) if coordinate is None else part.row(load, place, coordinate)
+        row: Row = part.row(load, place, *given)
     except ValueError as error:
         raise InputError(place, str(error)) from None
-    return row, coordinate
+    return row, coordinate, measured
 
 
 def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int, int]:
@@ -110,10 +127,3 @@ def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int,
         raise InputError(place, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
     sites = [numbering.site(mechanism.site(frame)) for frame in frames]
     return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])
-
-
-def _motion(coordinate: Coordinate | None) -> tuple[int, ...]:
-    """Columns of the table that say how a coordinate is measured."""
-    if coordinate is None:
-        return (0,) * 7
-    return (int(coordinate.turning), coordinate.side, coordinate.axis, *coordinate.sine, *coordinate.cosine)

@@ -26,6 +26,7 @@ from pipeline.dynamics.model.merge import (
     rigid_inertia,
     start_places,
 )
+from pipeline.dynamics.model.stops import STOP, End, ends
 from pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
 
 #: share of the largest radius of gyration below which the distances of a scene are no size of it
@@ -48,14 +49,32 @@ class Closure(NamedTuple):
     a: Site
     b: Site
 
+    @property
+    def name(self) -> str:
+        """Of the joint."""
+        return self.edge.name
+
 
 class Contact(NamedTuple):
-    """A clearance joint: its name and part of the scene, the site of the socket or journal, and of the ball or pin."""
+    """A clearance joint, or an end of a stop: its name, what the scene says of it, and two sites.
+
+    outer, inner: of the socket or journal, and of the ball or pin; of a stop, of the joint's first and second frame.
+    """
 
     name: str
-    joint: Clearance
+    joint: Clearance | End
     outer: Site
     inner: Site
+
+    @property
+    def words(self) -> str:
+        """What it is called in messages."""
+        return f"joint {self.name}" if self.joint.type != STOP else f"stop {self.name}"
+
+    @property
+    def place(self) -> str:
+        """Where the scene says what it is."""
+        return f"joint.{self.name}" if self.joint.type != STOP else f"stop.{self.name.rpartition('.')[0]}"
 
 
 @dataclass(frozen=True)
@@ -115,7 +134,8 @@ class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
     origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
-    start_residual: largest residual of a joint in the poses that the scene gives [m, or the sine of an angle].
+    start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
+    placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     """
 
     scene: Scene
@@ -127,6 +147,7 @@ class Mechanism:
     origin: np.ndarray
     length: float
     start_residual: float = 0.0
+    placed: tuple[Placement, ...] = ()
 
     @cached_property
     def drives(self) -> tuple[str, ...]:
@@ -192,8 +213,10 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
         return _site(frames, links, link_of, frame)
 
     closures = [Closure(e, at(e.frame_a), at(e.frame_b)) for e in closing]
-    contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in scene.contacts().items()]
-    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, _length(scene, links, frames))
+    length = _length(scene, links, frames)
+    touching: list[tuple[str, Clearance | End]] = [*scene.contacts().items(), *ends(scene, length)]
+    contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in touching]
+    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length)
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:

@@ -12,7 +12,7 @@ import xarray as xr
 from pipeline.core.algebra import quaternion_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.core.registry import suggestion
-from pipeline.core.scene.parts import FlexibleBody, Ground, RigidBody
+from pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from pipeline.core.scene.schema import Scene
 
 GROUND = "ground"
@@ -68,6 +68,8 @@ def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Fram
             for k, frame in enumerate(bundle["frame"].values):
                 place = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
                 frames[f"{name}.{frame}"] = Frame(name, place)
+        elif isinstance(body, MeshedRigidBody):
+            raise InputError(f"[body.{name}.mesh]", "its mass and frames have not been read from the recipe")
         else:
             for frame, pose in body.frames.items():
                 R = quaternion_to_matrix(pose.as_quaternion())

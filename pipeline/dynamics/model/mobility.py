@@ -17,10 +17,12 @@ import scipy.linalg
 from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import LEAST_GYRATION, close, constraints, settled
+from pipeline.dynamics.model.assembly import LEAST_GYRATION, close, settled
+from pipeline.dynamics.model.constraints import constraints
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, sites
+from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
 
 #: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
 #: how many are enough; share of the displacement that such a pose must keep when its loops are closed
@@ -43,7 +45,7 @@ class Mobility:
 
     rank: independent closure rows of `rows`; those of poses nearby where the start is singular.
     redundant_joints: joints whose reaction the equations of motion of rigid bodies do not determine.
-    singular_start: of a start in a singular pose, why it cannot go on by itself, in words.
+    singular_start: of a start in a singular pose, where it is and why it cannot go on by itself, in words.
     """
 
     coordinates: int
@@ -61,6 +63,14 @@ class Mobility:
     def redundant(self) -> int:
         """Closure rows that follow from the others."""
         return self.rows - self.rank
+
+    @property
+    def start_refusal(self) -> str:
+        """The same with what helps."""
+        return (
+            f"{self.singular_start}: give its bodies the velocities of one of these, choose one by [start] branch if "
+            "drives or forces move it, or start it in another pose of its path"
+        )
 
     def text(self) -> str:
         """In words, for the user."""
@@ -123,13 +133,12 @@ def _distance(one: Sequence[Placement], other: Sequence[Placement], length: floa
 
 def _singular_start(model: Model, here: Rates) -> str:
     """What is said of a start in a singular pose."""
-    names = {closure.edge.name: None for closure in model.closures}
+    names = {closure.name: None for closure in model.closures}
     values = here.values
     ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
     return (
         f"at t = {model.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
-        f"loops (closed at joints {', '.join(names)}) can go on in several ways: condition number {ratio:.3g}; "
-        "give its bodies the velocities of one of these, or start it in another pose of its path"
+        f"loops (closed at joints {', '.join(names)}) can go on in several ways (condition number {ratio:.3g})"
     )
 
 
@@ -153,6 +162,14 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     carried = np.zeros((len(mechanism.links), 6, len(stresses)))  # wrench that a link takes from its closures
     joints, row = set[str](), 0
     for closure in model.closures:
+        if isinstance(closure, Coupling):
+            share = stresses[:, row]
+            for side, factor in closure.parts:
+                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), share)
+                carried[side.a.link] -= wrench
+                carried[side.b.link] += wrench
+            row += 1
+            continue
         edge, a, b = closure
         along, about, force = row_axes(closure, poses)
         point = sites(closure, poses)[1].p
@@ -196,7 +213,7 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
 def _refuse_contradiction(model: Model, here: Rates) -> None:
     """Drives that the loops tie to each other can follow their laws only if these happen to agree."""
     drives = [name for name, tied in zip(model.drives, here.tied, strict=True) if tied]
-    moving = [name for name in drives if _moves(model, name)]
+    moving = [name for name in drives if moves(model, name)]
     if not moving:
         return
     raise InputError(
@@ -207,7 +224,8 @@ def _refuse_contradiction(model: Model, here: Rates) -> None:
     )
 
 
-def _moves(model: Model, name: str) -> bool:
+def moves(model: Model, name: str) -> bool:
+    """Whether the law of a drive is not one value all along."""
     first, count = model.arrays.table(m.LAWS)[model.drives.index(name)]
     pieces = slice(first, first + count)
     values = model.arrays.table(m.PIECES)["coefficients"][pieces]

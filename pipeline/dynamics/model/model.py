@@ -17,11 +17,14 @@ from pipeline.dynamics.model import flexible_bodies, laws, wiring
 from pipeline.dynamics.model import loads as loading
 from pipeline.dynamics.model.arrays import Arrays, pack
 from pipeline.dynamics.model.assembly import assembled
+from pipeline.dynamics.model.couplings import Coupling, couplings, tables
 from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.gauges import Gauges
 from pipeline.dynamics.model.loads import Load
 from pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.numbering import Numbering, number
+from pipeline.dynamics.model.stops import STOP
 
 if TYPE_CHECKING:
     from pipeline.dynamics.contact.law import Resolved
@@ -43,7 +46,7 @@ class Model:
     arrays: Arrays
     scene: Scene
     links: list[Link]
-    closures: tuple[Closure, ...]
+    closures: tuple[Closure | Coupling, ...]
     contacts: list[Contact]
     laws: tuple[Resolved, ...]
     loads: tuple[Load, ...]
@@ -61,10 +64,14 @@ class Model:
         return slice(self.nq, self.nq + self.nv)
 
     @property
+    def state_scales(self) -> np.ndarray:
+        """Natural unit of each state variable: the mechanism's size or a radian, both per second, ...; shape (NY,)."""
+        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][self.arrays.table(m.GROUPS)["group"]])
+
+    @property
     def speed_scales(self) -> np.ndarray:
         """Size of a large displacement of each free coordinate: the mechanism's size, or a radian; shape (nv,)."""
-        groups = self.arrays.table(m.GROUPS)["group"][self.speeds]
-        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][groups])
+        return self.state_scales[self.speeds]
 
 
 def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> Model:
@@ -82,21 +89,26 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
     normals = contacting.resolve(mechanism)
     site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
-    closures, order = wiring.closures(numbering, site_pairs)
-    loaded = loading.tabulate(mechanism, numbering, given)
+    coupled, gauges = couplings(mechanism), Gauges()
+    closures, order = wiring.closures(numbering, site_pairs, coupled)
+    loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
     contact_ledger = contacting.ledger_size(mechanism)
     gravity = loading.gravity(mechanism.scene)
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
-    groups, floors = _error_groups(numbering, ledger, loaded.turns)
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
+    contacts = contacting.fill(numbering, parts, normals, touching, gauges)
+    coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
+    groups, floors = _error_groups(numbering, ledger, gauges.internal)
     arrays = pack(
         {
             m.NQ: numbering.nq,
-            m.N_LEDGER: contact_ledger + ledger + loaded.turns,
+            m.N_LEDGER: contact_ledger + ledger + gauges.internal,
             m.N_DRIVES: numbering.known,
-            m.N_TURNS: loaded.turns,
+            m.N_INTERNAL: gauges.internal,
+            m.N_COUPLINGS: len(coupled),
+            m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
@@ -108,9 +120,11 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
             **flexible_bodies.fill(numbering),
             **wiring.mass_entries(numbering),
             **closures,
-            **contacting.fill(numbering, parts, normals, touching),
+            **contacts,
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
+            **coupling_tables,
+            m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
             m.GROUPS: groups,
             m.FLOORS: floors,
@@ -124,7 +138,7 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
         arrays,
         mechanism.scene,
         mechanism.links,
-        tuple(mechanism.closures[k] for k in order),
+        tuple([*mechanism.closures, *coupled][k] for k in order),
         mechanism.contacts,
         normals,
         loaded.loads,
@@ -143,11 +157,13 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
     contacts = [contact.joint for contact in mechanism.contacts]
     return Parts(
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
-        surfaces=tuple(sorted({joint.type for joint in contacts})),
+        surfaces=tuple(sorted({joint.type for joint in contacts} - {STOP})),
         forms=tuple(sorted({law.form for law in normals})),
         frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
         loads=loads,
-        closures=bool(mechanism.closures),
+        stops=any(joint.type == STOP for joint in contacts),
+        couplings=bool(mechanism.scene.gear),
+        closures=bool(mechanism.closures or mechanism.scene.gear),
         flexible=not mechanism.all_rigid,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,
@@ -179,12 +195,12 @@ def _link_numbers(link: Link) -> np.ndarray:
     return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
 
 
-def _error_groups(numbering: Numbering, loads: int, turns: int) -> tuple[np.ndarray, np.ndarray]:
+def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and the floor below which a group is resolved absolutely.
 
     A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
     size, one radian, both per second, and the energy of moving its mass by its size in a second.
-    loads: number of the loads' energies; turns: number of angles after them.
+    loads: number of the loads' energies; internal: number of internal states of parts after them.
     """
     mechanism, floors = numbering.mechanism, list[float]()
     L = mechanism.length
@@ -207,7 +223,7 @@ def _error_groups(numbering: Numbering, loads: int, turns: int) -> tuple[np.ndar
                 target[mine] = len(floors) - 1
     groups = [*q_group, *v_group]
     energy = sum(link.mass for link in mechanism.links) * L**2
-    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * turns]
+    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * internal]
     for floor, count in tail:
         floors.append(floor)
         groups += [len(floors) - 1] * count

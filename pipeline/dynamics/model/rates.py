@@ -24,7 +24,8 @@ from functools import cached_property
 import numpy as np
 
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import demands, freedoms, outboard_place
+from pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
+from pipeline.dynamics.model.couplings import Coupling, Side
 from pipeline.dynamics.model.mechanism import Closure
 from pipeline.dynamics.model.merge import Placement
 from pipeline.dynamics.model.model import Model
@@ -107,6 +108,10 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     J, sizes = (np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), speeds)) for _ in range(2))
     first = 0
     for line, closure in zip(model.arrays.table(m.CLOSURES), model.closures, strict=True):
+        if isinstance(closure, Coupling):
+            J[first], sizes[first] = _coupling_row(model, closure, poses, motion)
+            first += 1
+            continue
         B = sites(closure, poses)[1]
         along, about, force = row_axes(closure, poses)
         route = uncommon(closure_route(numbering, int(line["site_a"]), int(line["site_b"])))
@@ -122,6 +127,43 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
     by_row, by_column = scales(sizes)
     J *= by_row[:, None] * by_column
     return Rates(J[:, : model.nv], J[:, model.nv :], by_row, by_column)
+
+
+def _coupling_row(
+    model: Model, coupling: Coupling, poses: Sequence[Placement], motion: Motions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Row of a coupling against unit motions of all coordinates, and the natural sizes of its entries."""
+    numbering, L = model.numbering, model.length
+    row, size = np.zeros((2, model.nv + len(model.drives)))
+    for side, factor in coupling.parts:
+        place, along = poses[side.b.link].of(side.b.place).p, side.along(poses)
+        unit = abs(factor) / row_unit(coupling, L)
+        route = uncommon(closure_route(numbering, numbering.site(side.a), numbering.site(side.b)))
+        for coordinate, column, sign in route:
+            turn, arm = motion.turn[column], place - motion.at[column]
+            shift = motion.shift[column] + np.cross(turn, arm)
+            angle = float(np.linalg.norm(turn))
+            way = float(np.linalg.norm(motion.shift[column])) + angle * (float(np.linalg.norm(arm)) + L * LEAST_ARM)
+            turning = side.coordinate.turning
+            row[coordinate] += sign * np.copysign(unit, factor) * float(along @ (turn if turning else shift))
+            size[coordinate] += unit * (angle if turning else way)
+    return row, size
+
+
+def row_unit(coupling: Coupling, length: float) -> float:
+    """What the row of a coupling is measured in: a radian, or the mechanism's size [m]."""
+    return 1.0 if coupling.second.coordinate.turning else length
+
+
+def unit_wrench(side: Side, poses: Sequence[Placement], length: float) -> np.ndarray:
+    """Moment about the kernels' origin, in units of force times size, and force of a unit force along a coordinate.
+
+    Of an angle: of a unit torque.
+    """
+    along = side.along(poses)
+    if side.coordinate.turning:
+        return np.concatenate([along / length, np.zeros(3)])
+    return np.concatenate([np.cross(poses[side.b.link].of(side.b.place).p, along) / length, along])
 
 
 def sites(closure: Closure, poses: Sequence[Placement]) -> tuple[Placement, Placement]:

@@ -18,9 +18,6 @@ from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.laws import drive_laws
 from pipeline.dynamics.model.model import Model, filled
 
-#: what says where a load acts; the rest of it are numbers and laws
-ACTS = ("type", "frame", "between", "joint", "coordinate")
-
 
 def refilled(model: Model, scene: Scene) -> Model | None:
     """The model of `scene`, equal to the one that would be made from scratch; None when it must be made so.
@@ -29,7 +26,8 @@ def refilled(model: Model, scene: Scene) -> Model | None:
     """
     if not _same_structure(model, scene) or not _same_start(model, scene):
         return None
-    contacts = [contact._replace(joint=scene.contacts()[contact.name]) for contact in model.contacts]
+    clearances = scene.contacts()
+    contacts = [c._replace(joint=clearances[c.name]) if c.name in clearances else c for c in model.contacts]
     mechanism = replace(model.mechanism, scene=scene, contacts=contacts)
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
@@ -41,6 +39,8 @@ def refilled(model: Model, scene: Scene) -> Model | None:
 def _same_structure(model: Model, scene: Scene) -> bool:
     old = model.scene
     if scene.body != old.body or scene.time.start != old.time.start:
+        return False
+    if (scene.stop, scene.gear, scene.start) != (old.stop, old.gear, old.start):
         return False
     if list(scene.joint) != list(old.joint) or list(scene.drive) != list(old.drive):
         return False
@@ -68,9 +68,16 @@ def _held(joint: Any) -> tuple[str, tuple[str, str]]:
 
 
 def _acts_alike(new: Any, was: Any) -> bool:
-    places = ([getattr(load, name, None) for name in ACTS] for load in (new, was))
-    first, second = places
-    return first == second or (isinstance(new, Gravity) and isinstance(was, Gravity))
+    """Whether two loads are of one kind and act between the same frames or coordinates."""
+    return _words(new) == _words(was) or (isinstance(new, Gravity) and isinstance(was, Gravity))
+
+
+def _words(load: Any) -> dict[str, Any]:
+    """What a load says in words: its type, frames, joint and coordinate; the rest of it are numbers and laws."""
+    values = {name: value for name, value in load if name != "source"}
+    return {
+        n: v for n, v in values.items() if isinstance(v, str) or (isinstance(v, tuple) and v and isinstance(v[0], str))
+    }
 
 
 def _drives_alike(new: Any, was: Any) -> bool:

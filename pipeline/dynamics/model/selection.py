@@ -7,6 +7,8 @@ ever. A selection keeps as many rows as the rank says; the others are only looke
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from pipeline.dynamics import memory as m
@@ -75,6 +77,9 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
     mobility = np.sum(inverse**2, axis=0)  # diagonal of M^-1
     for c in arrays.table(m.CLOSURES):
         mine = entries[c["entry0"] : c["entry0"] + c["n_entries"]]
+        if c["coupling"] >= 0:
+            lengths[c["row0"]] = _coupling_length(model, c, mine, columns, points, mobility)
+            continue
         turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
         angle = np.linalg.norm(turn, axis=1)
         way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.length * angle
@@ -83,6 +88,23 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
         along, about = (np.sqrt(np.sum(size**2 * share)) for size in (way, angle))
         lengths[rows] = np.where(kinds[rows] == 0, along, about)
     return lengths
+
+
+def _coupling_length(
+    model: Model, c: Any, entries: np.ndarray, columns: np.ndarray, points: np.ndarray, mobility: np.ndarray
+) -> float:
+    """Natural length of the row of a coupling, as of `natural_lengths`; c: its closure."""
+    gauges, table = model.arrays.table(m.GAUGES), model.arrays.table(m.COUPLINGS)[c["coupling"]]
+    ratio = model.arrays.table(m.COUPLING_NUMBERS)["ratio"][c["coupling"]]
+    support, total = model.arrays.table(m.SUPPORT)["coordinate"], 0.0
+    for part, gauge, factor in ((0, gauges[table["second"]], 1.0), (1, gauges[table["first"]], ratio)):
+        mine = entries[entries["part"] == part]
+        turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
+        size = np.linalg.norm(turn, axis=1)
+        if not gauge["turning"]:
+            size = np.linalg.norm(shift + np.cross(turn, points[gauge["b"]]), axis=1) + model.length * size
+        total += float(np.sum((factor * size) ** 2 * mobility[support[c["support0"] + mine["slot"]]]))
+    return total**0.5
 
 
 def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
@@ -129,7 +151,16 @@ def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
     return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
+def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Which free coordinates the closures of the chosen kept rows depend on; masks (kept rows,) -> (nv,)."""
+    support, found = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
+    for c in model.arrays.table(m.CLOSURES, h):
+        if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
+            found[support[c["support0"] : c["support0"] + c["n_support"]]] = True
+    return found
+
+
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
     """Name of the joint to which each kept row belongs."""
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
-    return [closure.edge.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]
+    return [closure.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import arrays
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.numbering import Numbering
 
@@ -60,28 +62,35 @@ def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, in
     return [(first + j, first + k, modes[j], modes[k]) for j in range(len(modes)) for k in range(j + 1)]
 
 
-def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tuple[dict[Any, Any], np.ndarray]:
-    """Tables of the closures, given (joint type, site a, site b) each, and their order there, for a thin envelope."""
-    routes = [closure_route(numbering, a, b) for _, a, b in site_pairs]
-    order = _order([{c for c, _, _ in route} for route in routes])
+def closures(
+    numbering: Numbering, site_pairs: list[tuple[str, int, int]], coupled: Sequence[Coupling] = ()
+) -> tuple[dict[Any, Any], np.ndarray]:
+    """Tables of the closures, and their order there, for a thin envelope.
+
+    site_pairs: (joint type, site a, site b) of the joints that close loops; coupled: couplings, numbered after them.
+    """
+    ends = [[(a, b)] for _, a, b in site_pairs]
+    ends += [[(numbering.site(side.a), numbering.site(side.b)) for side, _ in one.parts] for one in coupled]
+    routes = [[closure_route(numbering, a, b) for a, b in parts] for parts in ends]
+    order = _order([{c for route in parts for c, _, _ in route} for parts in routes])
     closure: list[tuple[int, ...]] = []
     rows: list[tuple[int, int, int]] = []
     support: list[int] = []
-    entries: list[tuple[int, int, int]] = []
-    known: list[tuple[int, int, int, int]] = []
+    entries: list[tuple[int, ...]] = []
+    known: list[tuple[int, ...]] = []
     supports: list[list[int]] = []
     row0 = jacobian0 = 0
     for new, old in enumerate(order):
-        kind, a, b = site_pairs[old]
-        declared = joint_class(kind)
-        mine = [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
-        slots = sorted({c for c, _, _ in routes[old] if c < numbering.nv})
-        moved = uncommon(routes[old])
+        (a, b), coupling = ends[old][0], old - len(site_pairs) if old >= len(site_pairs) else -1
+        mine = _rows(site_pairs[old][0]) if coupling < 0 else [(int(coupled[coupling].second.coordinate.turning), 0, 0)]
+        slots = sorted({c for route in routes[old] for c, _, _ in route if c < numbering.nv})
+        moved = [(*motion, part) for part, route in enumerate(routes[old]) for motion in uncommon(route)]
         entry0 = len(entries)
-        entries += [(slots.index(c), col, sign) for c, col, sign in moved if c < numbering.nv]
-        known += [(new, c - numbering.nv, col, sign) for c, col, sign in moved if c >= numbering.nv]
+        entries += [(slots.index(c), col, sign, part) for c, col, sign, part in moved if c < numbering.nv]
+        known += [(new, c - numbering.nv, col, sign, part) for c, col, sign, part in moved if c >= numbering.nv]
         n_entries = len(entries) - entry0
-        closure.append((a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine)))
+        own = (a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine), coupling)
+        closure.append(own)
         rows += mine
         support += slots
         supports.append(slots)
@@ -96,6 +105,12 @@ def closures(numbering: Numbering, site_pairs: list[tuple[str, int, int]]) -> tu
         **_couplings(arrays.named(m.CLOSURES, closure), supports),
     }
     return tables, np.array(order, dtype=np.int64)
+
+
+def _rows(kind: str) -> list[tuple[int, int, int]]:
+    """Rows of the table CLOSURE_ROWS of a joint type."""
+    declared = joint_class(kind)
+    return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
 
 
 def closure_route(numbering: Numbering, a: int, b: int) -> list[tuple[int, int, int]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from importlib.metadata import version
-from pathlib import Path
 
 import numpy as np
 import xarray as xr
@@ -34,6 +33,18 @@ def dataset(run: Run) -> xr.Dataset:
     parts = [_motion(motions), _modes(motions), _drives(run), _joint_coordinates(model, seen)]
     if model.loads:
         parts.append(_loads(model, seen))
+    if "bushing" in model.parts.loads:
+        from pipeline.dynamics.record.bushings import give
+
+        parts.append(give(model, seen))
+    if {"pid", "sampled-pid"} & set(model.parts.loads):
+        from pipeline.dynamics.record.controllers import controllers
+
+        parts.append(controllers(model, seen))
+    if model.parts.couplings:
+        from pipeline.dynamics.record.gears import gear_series
+
+        parts.append(gear_series(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(trajectory), {})]
     if run.twin is not None:
@@ -52,12 +63,11 @@ def dataset(run: Run) -> xr.Dataset:
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """What the run was made from: parameters, assumptions, sources, versions; no times, no paths."""
-    parameters = scene.model_dump(mode="json", exclude={"title", "description"}, exclude_none=True)
+    """What the run was made from: parameters, assumptions, sources, versions; no times, no names of files."""
+    parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
-        parameters["body"][body]["mesh"] = Path(parameters["body"][body]["mesh"]).name
+        del parameters["body"][body]["mesh"]
     return {
-        "scene": scene.name,
         "parameters": json.dumps(parameters, sort_keys=True),
         "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
         "sources": json.dumps(scene.sources(), sort_keys=True),
@@ -65,9 +75,9 @@ def attributes(scene: Scene) -> dict[str, str]:
     }
 
 
-def warnings(model: Model, trajectory: Trajectory) -> list[str]:
+def warnings(run: Run) -> list[str]:
     """Sentences about what a run is to be doubted for."""
-    return [*_contact_warnings(model, trajectory), *_step_warnings(model, trajectory)]
+    return [*run.mended, *_contact_warnings(run), *_flexible_warnings(run), *_step_warnings(run.model, run.trajectory)]
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
@@ -82,18 +92,26 @@ def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:
     ]
 
 
-def _contact_warnings(model: Model, trajectory: Trajectory) -> list[str]:
+def _contact_warnings(run: Run) -> list[str]:
     """Sentences about contacts that left the range for which their laws were made."""
-    if not model.contacts:
+    if not run.model.contacts:
         return []
     from pipeline.dynamics.contact import validity
 
+    depths, forces = validity.deepest(run.trajectory.events, run.observed.touch)
     sentences = list[str]()
-    for c, ((name, joint, *_), law) in enumerate(zip(model.contacts, model.laws, strict=True)):
-        mine = trajectory.events[trajectory.events["contact"] == c]
-        depth, force = (float(np.fmax.reduce(mine[peak], initial=0.0)) for peak in ("peak_depth", "peak_force"))
-        sentences += validity.warnings(name, joint, law, depth, force)
+    for contact, law, depth, force in zip(run.model.contacts, run.model.laws, depths, forces, strict=True):
+        sentences += validity.warnings(contact.words, contact.joint, law, float(depth), float(force))
     return sentences
+
+
+def _flexible_warnings(run: Run) -> list[str]:
+    """Sentences about flexible bodies that left the range of linear modes."""
+    if not run.model.numbering.flexible:
+        return []
+    from pipeline.dynamics.run import validity
+
+    return validity.warnings(run.model, run.trajectory.time, run.observed)
 
 
 def _report(run: Run) -> dict[str, float | int | str]:
@@ -110,11 +128,13 @@ def _report(run: Run) -> dict[str, float | int | str]:
     if run.twin is not None:
         told["twin_perturbation"] = run.twin.perturbation
     told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
+    if run.mended:
+        told["start_mended"] = "\n".join(run.mended)
     if run.switched:
         told["switched"] = run.switched
     if redundant:
         told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
-    doubts = "\n".join(warnings(run.model, run.trajectory))
+    doubts = "\n".join(warnings(run))
     if run.model.contacts:
         from pipeline.dynamics.contact import validity
 

@@ -7,7 +7,6 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 
 import numpy as np
 import xarray as xr
@@ -32,12 +31,14 @@ from pipeline.dynamics.run.trajectory import Trajectory, output_times
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
     wanted = scene.ensemble or Ensemble()
-    if not scene.contacts():
+    if not scene.contacts() and not scene.stop:
         raise InputError(
-            "[ensemble]", "its members differ by the ball's offset, but there is no clearance joint", "remove it"
+            "[ensemble]",
+            "its members differ by the ball's offset, but there is no clearance joint and no stop",
+            "remove it",
         )
     engine, other = engines(scene, bundles, progress)
-    names = _bodies(engine.model, wanted)
+    names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
     members, reasons = [], []
@@ -60,39 +61,43 @@ def ball_offsets(model: Model, wanted: Ensemble, members: int) -> Iterator[np.nd
         yield (offsets * (wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
-def _bodies(model: Model, wanted: Ensemble) -> list[str]:
-    """Bodies whose motion is kept: those asked for, or those that have contacts."""
+def kept_bodies(model: Model, wanted: tuple[str, ...] | None, place: str) -> list[str]:
+    """Bodies whose motion is kept: those asked for, else those that have contacts, without contacts all."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
-    if wanted.bodies is None:
+    if wanted is None:
         frames = model.mechanism.frames
-        return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known))
-    for name in wanted.bodies:
+        return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known)) or known
+    for name in wanted:
         if name not in known:
-            raise InputError("[ensemble.bodies]", f"there is no body '{name}'", f"known: {', '.join(known)}")
-    return list(wanted.bodies)
+            raise InputError(place, f"there is no body '{name}'", f"known: {', '.join(known)}")
+    return list(wanted)
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
     model = engine.model
     regular = output_times(engine.breaks, model.scene.output.interval)
     peak, count, share = _contact_statistics(engine, trajectory)
-    kept = replace(trajectory, rows=trajectory.rows[np.searchsorted(trajectory.time, regular)])
-    seen = observed(engine, kept)
-    require_closed(model, kept, seen)
+    kept = np.searchsorted(trajectory.time, regular)
+    seen = observed(engine, trajectory)
+    require_closed(model, trajectory, seen)
     bodies = Motions(model, seen).bodies
+    series = motion_series([bodies[n] for n in names], model.mechanism.origin)
     variables = {
-        **_series([bodies[n] for n in names], model.mechanism.origin),
-        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"]),
-        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"]),
+        **{name: (dims, values[kept]) for name, (dims, values) in series.items()},
+        # of the rows at events, too: an impact is shorter than the output interval
+        "peak_acceleration": (("body", "axis"), np.abs(series["acceleration"][1]).max(axis=0)),
+        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][kept]),
+        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][kept]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
     contacts = [contact.name for contact in model.contacts]
-    return xr.Dataset(variables, coords={"time": kept.time, "body": names, "contact": contacts})
+    return xr.Dataset(variables, coords={"time": regular, "body": names, "contact": contacts})
 
 
-def _series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def motion_series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Position, orientation, velocities and acceleration of bodies over time, by variable."""
     dims = ("time", "body", "axis")
     return {
         "position": (dims, np.stack([m.p + origin for m in motions], axis=1)),

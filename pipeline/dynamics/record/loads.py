@@ -35,30 +35,18 @@ def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndar
     """Force [N] or torque [N m] of loads along their joint coordinates, shape (time, names)."""
     forces, numbers = [], {name: k for k, (name, _) in enumerate(model.loads)}
     for k in (numbers[name] for name in names):
-        row = model.arrays.table(m.LOADS)[k]
+        row = model.arrays.table(m.GAUGES)[model.arrays.table(m.LOADS)[k]["gauge"]]
         axes = seen.sites["axes"][:, row["b"] if row["side"] else row["a"]]
         acting = seen.loads["moment" if row["turning"] else "force"]
         forces.append(np.einsum("ti,ti->t", axes[:, :, row["axis"]], acting[:, k]))
     return np.stack(forces, axis=1)
 
 
-def on_body(model: Model, seen: Observed, body: str) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of the loads on a body: moment about the kernels' origin, force; (time, 3) each."""
-    moment, force = np.zeros((len(seen.loads), 3)), np.zeros((len(seen.loads), 3))
-    for _, n, f in on_frames(model, seen, body):
-        moment, force = moment + n, force + f
-    return moment, force
-
-
-def on_frames(model: Model, seen: Observed, body: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Each load on a body: its frame, moment about the kernels' origin, force; (time, 3) each."""
+def on_loaded_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Each load on every frame that it acts on: frame, moment about the kernels' origin, force; (time, 3) each."""
     ends = [
         (k, frame, sign)
         for k, (_, frames) in enumerate(model.loads)
         for frame, sign in zip(reversed(frames), (1.0, -1.0), strict=False)  # the last frame is acted on
     ]
-    return [
-        (frame, sign * seen.loads["moment"][:, k], sign * seen.loads["force"][:, k])
-        for k, frame, sign in ends
-        if model.mechanism.frames[frame].body == body
-    ]
+    return [(frame, sign * seen.loads["moment"][:, k], sign * seen.loads["force"][:, k]) for k, frame, sign in ends]

@@ -24,7 +24,7 @@ from pipeline.dynamics.record.wrenches import joint_wrenches
 from pipeline.dynamics.run.alike import engines_alike
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.run import follow, observed
+from pipeline.dynamics.run.run import follow, observed, require_shallow
 from pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from pipeline.dynamics.run.start import consistent_start
 from pipeline.dynamics.run.trajectory import Trajectory
@@ -95,6 +95,7 @@ def thinned(scene: Scene, kept: Sequence[Kept]) -> Scene:
 
 def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Values:
     seen = observed(engine, trajectory)
+    require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
     motions, series = Motions(engine.model, seen), dict[str, np.ndarray]()
     forces = joint_wrenches(motions, sorted({k.quantity.owner for k in kept if k.quantity.kind in ("force", "moment")}))

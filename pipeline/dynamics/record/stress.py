@@ -20,6 +20,7 @@ import xarray as xr
 
 from pipeline.core.algebra import skew
 from pipeline.core.errors import InputError
+from pipeline.dynamics.record.acting import on_frames
 from pipeline.dynamics.record.motion import Motions
 from pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
 
@@ -169,8 +170,5 @@ def _loads(motions: Motions, name: str) -> list[tuple[str, np.ndarray, np.ndarra
         about_origin = n + np.cross(motions.frame_positions[between[1]], f)
         acting += [(at, sign * about_origin, sign * f) for at, sign in zip(between, (-1.0, 1.0), strict=True)]
     acting += path_wrenches(model, seen)
-    if model.loads:
-        from pipeline.dynamics.record.loads import on_frames
-
-        acting += on_frames(model, seen, name)
+    acting += on_frames(model, seen, name)
     return [load for load in acting if model.mechanism.frames[load[0]].body == name]

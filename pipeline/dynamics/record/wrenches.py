@@ -8,8 +8,11 @@ import numpy as np
 
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.parts import RigidBody
+from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.record.acting import on_body
 from pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
@@ -22,7 +25,7 @@ def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> di
     """
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
-    for c, contact in enumerate(model.contacts):
+    for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
         moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds beside its contact
         push = seen.touch["force"][:, c]
         known[contact.name] = (moment + np.cross(seen.touch["point"][:, c], push), force + push)
@@ -54,7 +57,8 @@ def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
 
 
 def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
-    return {closure.edge.name: _wrench(seen.closure_wrenches[:, c]) for c, closure in enumerate(model.closures)}
+    joints = [(c, closure) for c, closure in enumerate(model.closures) if not isinstance(closure, Coupling)]
+    return {closure.name: _wrench(seen.closure_wrenches[:, c]) for c, closure in joints}
 
 
 def _wrench(rows: np.ndarray, sign: float = 1.0) -> Wrench:
@@ -101,11 +105,8 @@ def _demand(motions: Motions, name: str, known: Mapping[str, Wrench]) -> Wrench:
         if name in (a, b):
             sign = 1.0 if name == b else -1.0
             moment, force = moment - sign * n, force - sign * f
-    if model.loads:
-        from pipeline.dynamics.record.loads import on_body
-
-        n, f = on_body(model, seen, name)
-        moment, force = moment - n, force - f
+    n, f = on_body(model, seen, name)
+    moment, force = moment - n, force - f
     return moment, force
 
 

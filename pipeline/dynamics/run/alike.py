@@ -34,7 +34,7 @@ def engines_alike(
 
 
 def _may_serve(known: Engine, scene: Scene) -> bool:
-    """Whether the scene runs on the same kernels, its motion is not found by runs of its own, and any start is right."""
+    """Whether the scene runs on the same kernels, no other run finds its motion, and its start is no special one."""
     old = known.model.scene
     paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
     return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start

@@ -8,6 +8,7 @@ from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.model import Model
 
@@ -27,7 +28,10 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
             position, rate, second = (link.joint.sign * part for part in parts)
             series[label(edge.name, edge.kind, place)] = position, rate, second
     closures = model.arrays.table(m.CLOSURES)
-    for row, (edge, *_) in zip(closures, model.closures, strict=True):
+    for row, closure in zip(closures, model.closures, strict=True):
+        if isinstance(closure, Coupling):
+            continue
+        edge = closure.edge
         a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
         for place, coordinate in enumerate(joint_class(edge.kind).COORDINATES):
             series[label(edge.name, edge.kind, place)] = _measured(a, b, coordinate)

@@ -8,15 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.errors import SolverError
+from pipeline.core.errors import InputError, SolverError
 from pipeline.core.progress import Progress
 from pipeline.core.registry import lookup
+from pipeline.core.scene.loads import SampledPid
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.compile import functions
 from pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import selection
-from pipeline.dynamics.model.mobility import Mobility, analyse
+from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
 
@@ -47,10 +49,12 @@ class Engine:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads in between, end [s]; breaks that only rounding sets apart are one."""
+        """Start, breaks of drives and loads and samples in between, end [s]; what only rounding sets apart is one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
         for first, count in self.model.arrays.table(m.LAWS):
             inner |= {float(t) for t in starts[first + 1 : first + count]}
+        for period in {load.period for load in self.model.scene.load.values() if isinstance(load, SampledPid)}:
+            inner |= set((self.start + period * np.arange(1, np.ceil((self.end - self.start) / period))).tolist())
         shortest = SHORTEST_SEGMENT * (self.end - self.start)
         times = [self.start]
         for t in sorted(inner):
@@ -122,6 +126,12 @@ class Engine:
             L[i, first : i + 1] = entries[start : start + i + 1 - first]
         return L
 
+    def independence(self) -> np.ndarray:
+        """How far each kept closure row is from depending on those before it, at the last evaluated state."""
+        envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
+        diagonal = envelope["start"] - envelope["first"] + np.arange(len(envelope))
+        return np.abs(self.view(m.SCHUR)[diagonal])
+
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
         return selection.dense(self.model, self.h, self.view(stored))
@@ -139,8 +149,9 @@ def prepare(model: Model, progress: Progress) -> Engine:
     """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot go on."""
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
-    if mobility.singular_start and not may_depart(model):
-        raise SolverError(mobility.singular_start)
+    if mobility.singular_start and not may_start_singular(model):
+        raise SolverError(mobility.start_refusal)
+    _check_branch(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
     return assemble(model, entry, lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]"), mobility)
 
@@ -155,8 +166,21 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     return engine
 
 
-def may_depart(model: Model) -> bool:
-    """Whether a run may start in a singular pose: bodies are given velocities, and no contact may interfere."""
+def may_start_singular(model: Model) -> bool:
+    """Whether a run may start in a singular pose: something moves or says which way, and no contact may interfere."""
     bodies = model.scene.body.values()
     given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
-    return not model.contacts and any(v is not None and np.any(np.asarray(v) != 0.0) for v in given)
+    moved = any(v is not None and np.any(np.asarray(v) != 0.0) for v in given) or model.scene.start is not None
+    return not model.contacts and (moved or any(moves(model, name) for name in model.drives))
+
+
+def _check_branch(model: Model, mobility: Mobility) -> None:
+    """InputError for a choice between branches where there is none, or by a coordinate that is not there."""
+    if model.scene.start is None:
+        return
+    for choice in model.scene.start.branch:
+        coordinate_of(model.scene, choice.joint, choice.coordinate, "[start.branch]")
+    if not mobility.singular_start:
+        raise InputError(
+            "[start.branch]", "the mechanism does not start in a change point: there is nothing to choose", "remove it"
+        )

@@ -167,15 +167,17 @@ def _closure_jacobian(engine: Engine) -> np.ndarray:
     """Rates of all closure rows per speed, free ones first, then prescribed; shape (rows, speeds)."""
     model, columns = engine.model, _columns(engine)
     rows = engine.view(m.ROWS.place).reshape(-1, m.ROWS.size)
-    J = np.zeros((len(rows), model.nv + len(model.drives)))
+    J = np.zeros((model.arrays.size(m.N_CLOSURE_ROWS), model.nv + len(model.drives)))
     closures, entries, support = (model.arrays.table(table) for table in (m.CLOSURES, m.ENTRIES, m.SUPPORT))
     for c in closures:
         mine = slice(c["row0"], c["row0"] + c["n_rows"])
-        for slot, col, sign in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
-            J[mine, support["coordinate"][c["support0"] + slot]] += sign * rows[mine] @ columns[col]
-    for c, d, col, sign in model.arrays.table(m.KNOWN_ENTRIES):
+        for slot, col, sign, part in entries[c["entry0"] : c["entry0"] + c["n_entries"]]:
+            wrenches = rows[mine] if not part else rows[[len(J) + c["coupling"]]]
+            J[mine, support["coordinate"][c["support0"] + slot]] += sign * wrenches @ columns[col]
+    for c, d, col, sign, part in model.arrays.table(m.KNOWN_ENTRIES):
         mine = slice(closures["row0"][c], closures["row0"][c] + closures["n_rows"][c])
-        J[mine, model.nv + d] += sign * rows[mine] @ columns[col]
+        wrenches = rows[mine] if not part else rows[[len(J) + closures["coupling"][c]]]
+        J[mine, model.nv + d] += sign * wrenches @ columns[col]
     return J
 
 
@@ -192,7 +194,7 @@ def _rate(engine: Engine, scene: Scene, actuator: str) -> np.ndarray:
         if link.branch.edge is not None and link.branch.edge.name == joint and k in link.joint.positions:
             rates[model.numbering.coordinates[i][link.joint.positions.index(k)]] = link.joint.sign
             return rates
-    row = model.arrays.table(m.CLOSURES)[[closure.edge.name for closure in model.closures].index(joint)]
+    row = model.arrays.table(m.CLOSURES)[[closure.name for closure in model.closures].index(joint)]
     a, b = int(row["site_a"]), int(row["site_b"])
     wrench, columns = _unit_wrench(engine.table(m.SITE_FRAMES), a, b, coordinate), _columns(engine)
     for site, sign in ((b, 1.0), (a, -1.0)):

@@ -91,9 +91,9 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None
 
 def _losses(model: Model, totals: dict[str, np.ndarray], k: int) -> str:
     parts = []
-    for c, (name, *_) in enumerate(model.contacts):
+    for c, contact in enumerate(model.contacts):
         for cause in ("damping", "friction"):
-            parts.append(f"{totals[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of joint {name}")
+            parts.append(f"{totals[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of {contact.words}")
     if "modal_damping_loss" in totals:
         parts.append(f"{totals['modal_damping_loss'][k]:.3g} J to modal damping")
     if "load_loss" in totals:

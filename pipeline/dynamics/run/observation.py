@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from pipeline.dynamics import memory as m
@@ -9,16 +11,19 @@ from pipeline.dynamics.equations import observation
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.run.engine import Engine, pieces_at
 
+if TYPE_CHECKING:
+    from pipeline.dynamics.run.collocation import Collocation
+
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14
-#: first distance in time from a singular pose, as share of the run, and its factor from try to try
-NEAREST, WIDER = 1e-8, 4.0
-#: pivot ratio of the closures at which the equations hold six digits
-CLEAR = 1e-6
-#: where it is looked, in units of the distance, and the weights there of the limit between: exact for cubics
-SIDES, WEIGHTS = np.array([-2.0, -1.0, 1.0, 2.0]), np.array([[-1.0, 4.0, 4.0, -1.0]]) / 6.0
-#: tries, the last of which is some share of 1e-2 of the run away
-TRIES = 11
+#: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
+#: 1e-14, and six, with which a row must do in whose own pose they hold nothing
+CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
+#: first distance in time from a singular pose, as share of the polynomial over it, its factor from try to try, and how
+#: many tries there are
+NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
+#: where it is looked, in units of the distance, and the weights there of the limit between: exact for quintics
+SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
 
 
 def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observed:
@@ -31,12 +36,17 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 
 def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np.ndarray:
     """The same as the kernel writes it, shape (rows, columns); see `equations.observation.by_name`."""
-    arrays, segments = engine.model.arrays, engine.breaks
+    segments = engine.breaks
     sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
     middles = 0.5 * (segments[sides - 1] + segments[sides])
     per_segment = {x: pieces_at(engine.model, x) for x in set(middles.tolist())}
     pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64)
-    tolerance = max(RECORD_SHARE * engine.rtol, ROUNDING) * engine.model.length
+    return observe_with(engine, rows, pieces, max(RECORD_SHARE * engine.rtol, ROUNDING))
+
+
+def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> np.ndarray:
+    """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
+    arrays = engine.model.arrays
     out = observation.room(len(rows), arrays.size)
     engine.entry.observe(
         engine.h,
@@ -44,42 +54,37 @@ def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np
         engine.w,
         engine.n,
         np.ascontiguousarray(rows),
-        pieces.reshape(len(rows), arrays.size(m.N_LAWS)),
-        tolerance,
+        np.ascontiguousarray(pieces).reshape(len(rows), arrays.size(m.N_LAWS)),
+        share * engine.model.length,
         out,
     )
     return out
 
 
-def beside(engine: Engine, row: np.ndarray) -> np.ndarray | None:
-    """What is observed of a row whose pose is singular: the limit from both sides, shape (columns,); None without one.
+def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
+    """Whether a row of the record is so near to a singular pose that its accelerations and forces are rounding."""
+    one = m.record(row[None], len(engine.model.contacts))
+    seen = engine.attempt(one.state[0], float(one.time[0]))
+    return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
+
+
+def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> np.ndarray | None:
+    """What is observed of such a row: the limit from both sides, shape (columns,); None without one.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
-    of both sides, at a distance and at twice that, is but its fourth power from their value.  The states there follow
-    from the row's velocities and the closures.  Before the run's start all laws are as just after it.
+    of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states
+    there are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold
+    between them.
+    clear: pivot ratio of the closures that the sides must have.
     """
-    nq, contacts = engine.model.nq, len(engine.model.contacts)
-    t, y = float(row[0]), m.record(row[None], contacts).state[0]
-    engine.attempt(y, t)
-    rate = engine.slope[:nq].copy()
-    distance = NEAREST * (engine.end - engine.start)
-    for _ in range(TRIES):
-        away = distance * SIDES
-        rows = np.tile(row, (len(away), 1))
-        near = m.record(rows, contacts)
-        near.time[:] += away
-        near.state[:, :nq] += np.outer(away, rate)
-        inside = (t == engine.start or engine.start < near.time.min()) and near.time.max() < engine.end
-        if inside and _clear(engine, near):
-            out = observe_flat(engine, rows)
+    pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))
+    for k in range(TRIES):
+        rows = np.tile(row, (len(SIDES), 1))
+        near = m.record(rows, len(engine.model.contacts))
+        near.time[:] += NEAREST * motion.span * WIDER**k * SIDES
+        near.state[:] = motion.states(near.time)
+        if not any(blurred(engine, side, clear) for side in rows):
+            out = observe_with(engine, rows, pieces, ROUNDING)
             if not np.any(observation.by_name(out, engine.model.arrays.size).status):
-                return (WEIGHTS @ out)[0]
-        distance *= WIDER
+                return np.asarray(WEIGHTS @ out)
     return None
-
-
-def _clear(engine: Engine, rows: m.Record) -> bool:
-    """Whether the closures are well apart from singular in all rows."""
-    pivots = engine.view(m.PIVOT)
-    states = zip(rows.state, rows.time, strict=True)
-    return all(engine.attempt(y, float(t)) and pivots[m.LAST_PIVOT] > CLEAR for y, t in states)

@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.integrators import DEFAULT
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
+#: why the stepper stops where loops are pulled further than they reach
+LOOPS = (m.STEP_TOO_SMALL, m.NO_START, m.NO_CONVERGENCE, m.AT_SINGULAR, m.LOST_CLOSURE)
 #: events per step from which on they are named as the cause
 OFTEN = 0.05
 
 
-def text(engine: Engine) -> str:
-    """When and why the stepper stopped, in words."""
+def text(engine: Engine, rows: np.ndarray) -> str:
+    """When and why the stepper stopped, in words; rows: of the record so far."""
     control, n, contacts = engine.control, engine.n, engine.model.contacts
+    if n[m.STATUS] in LOOPS:
+        told = beyond_reach(engine) or end_in_pose(engine, rows)
+        if told:
+            return told
     where = singular.diagnosis(engine)
-    culprit = contacts[n[m.CULPRIT]].name if contacts else ""
+    culprit = contacts[n[m.CULPRIT]].words if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
     unsolvable = (
         f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
-    unsolvable += _other_integrator(engine)
     if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
     reasons = {
@@ -38,22 +43,27 @@ def text(engine: Engine) -> str:
         "divides by zero",
         m.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
-        m.STUCK_EVENT: f"joint {culprit} opens and closes without end at one time: a smaller rtol tells these "
+        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol tells these "
         "times apart, a softer contact or more damping parts them",
-        m.STEPPED_OVER: f"the contact of joint {culprit} began unseen within a step: a smaller rtol or a shorter "
+        m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
         "step finds it",
-        m.AT_SINGULAR: "the mechanism comes to rest in a singular pose, where it can go on in several ways "
-        f"({where}): give it another motion{_other_integrator(engine)}",
+        m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can go on in several ways "
+        f"({where}): let it pass the pose at speed, or stop elsewhere",
         m.LOST_CLOSURE: unsolvable,
     }
-    return f"at t = {control[m.TIME]:.6g} s: {reasons[int(n[m.STATUS])]}"
+    status = int(n[m.STATUS])
+    if status == m.NO_CONVERGENCE and not engine.method.traits.implicit:
+        status = m.LOST_CLOSURE  # it was the loops that could not be closed
+    return f"at t = {control[m.TIME]:.6g} s: {reasons[status]}{_doubts(engine)}"
 
 
-def _other_integrator(engine: Engine) -> str:
-    """Advice for a singular pose where implicit iterations, whose matrix turns over in it, may have failed."""
-    if engine.method.traits.passes_singular:
+def _doubts(engine: Engine) -> str:
+    """What flexible bodies are doubted for where the run ended, which may well be why; or nothing."""
+    if not engine.model.numbering.flexible:
         return ""
-    return f"; or it moves on and {engine.model.scene.solver.integrator} does not get over the pose: try {DEFAULT}"
+    from pipeline.dynamics.run.validity import doubts
+
+    return "".join(f"; {sentence}" for sentence in doubts(engine))
 
 
 def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:

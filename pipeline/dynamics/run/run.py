@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING
@@ -23,10 +23,11 @@ from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.mechanism import build
 from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import trajectory as stepping
+from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine, prepare
 from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.observation import beside, observe_flat
-from pipeline.dynamics.run.start import consistent_start
+from pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from pipeline.dynamics.run.start import consistent_start, mends
 from pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
@@ -39,6 +40,7 @@ class Run:
 
     scene: as the user gave it; the engine may hold another, made for it.
     twin: the run's twin, of scenes with contacts.
+    mended: what was changed of the start that the scene gives, in words.
     switched: from when on and why an implicit integrator took the place of the scene's; empty when none did.
     """
 
@@ -48,6 +50,7 @@ class Run:
     observed: Observed
     twin: Twin | None = None
     switched: str = ""
+    mended: tuple[str, ...] = ()
 
     @property
     def model(self) -> Model:
@@ -88,10 +91,14 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
+    mended = tuple(mends(engine, start))
+    for sentence in mended:
+        progress(None, sentence)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
+    require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, _twin(engine, start, trajectory), switched)
+    return Run(scene, engine, trajectory, seen, twin_of(engine, start, trajectory), switched, mended)
 
 
 def follow(
@@ -109,7 +116,19 @@ def follow(
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
 
-def _twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+    """SolverError for a contact so deep that its surfaces mean nothing."""
+    if not model.contacts:
+        return
+    from pipeline.dynamics.contact.validity import deepest, refuse_deep
+
+    depths, _ = deepest(trajectory.events, seen.touch)
+    for contact, depth in zip(model.contacts, depths, strict=True):
+        refuse_deep(contact.words, contact.joint, float(depth))
+
+
+def twin_of(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
+    """The twin of a run with contacts."""
     if not engine.model.contacts:
         return None
     from pipeline.dynamics.run.sensitivity import twin
@@ -122,22 +141,38 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 
     Raises SolverError where one of them could not be evaluated.
     """
-    size, parts = engine.model.arrays.size, []
+    parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
         out = observe_flat(engine, trajectory.rows[part])
-        blurred = observation.by_name(out, size).status == m.SINGULAR
-        if engine.mobility.singular_start and part.start == 0:
-            blurred[0] = True  # rows of the closures that vanish there had no size before to be compared with
-        for k in np.flatnonzero(blurred):
-            limit = beside(engine, trajectory.rows[part][k])
+        for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
+            row, lost = trajectory.rows[part][k], observation.by_name(out, engine.model.arrays.size).status[k]
+            limit = beside(engine, row, motion, CLEAR)
+            if limit is None and lost:
+                limit = beside(engine, row, motion, NEARLY_CLEAR)
             if limit is not None:
                 out[k] = limit
         parts.append(out)
-    seen = observation.by_name(np.concatenate(parts), size)
+    seen = observation.by_name(np.concatenate(parts), engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
     if len(bad):
-        raise SolverError(
-            f"at t = {trajectory.time[bad[0]]:.6g} s: the recorded state does not satisfy the loop closures"
-        )
+        at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
+        if seen.status[bad[0]] == m.SINGULAR:
+            lost = (
+                "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "
+                "the mechanism pass the pose at speed, or stop elsewhere"
+            )
+        raise SolverError(at + lost)
     return seen
+
+
+def _near_singular(
+    engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
+) -> Iterator[tuple[int, Collocation]]:
+    """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
+    for motion in motions:
+        engine.select_pieces(0.5 * (motion.start + motion.end))
+        begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
+        for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
+            if blurred(engine, rows[k]):
+                yield k, motion

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipeline.core.artifacts.event_kinds import OPENING
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import silent
 from pipeline.core.quantities import PARTED
@@ -20,8 +21,8 @@ from pipeline.dynamics.run.observation import observe
 from pipeline.dynamics.run.start import project
 from pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
 
-#: the two are compared at every so manieth regular output, which bounds the cost
-EVERY = 10
+#: the two are compared at so many regular outputs, which bounds the cost, and wherever a contact of the run ends
+SAMPLES = 180
 #: offsets below this cannot be told from rounding of the positions [m]
 SMALLEST = 1e-14
 
@@ -45,7 +46,7 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     size = max(engine.rtol * engine.model.length, SMALLEST)
     direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
     moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
-    time = output_times(engine.breaks, engine.model.scene.output.interval)[::EVERY]
+    time = _compared(engine, trajectory)
     one = _velocities(engine, trajectory, time)
     visible = PARTED * float(np.linalg.norm(one, axis=2).max())
 
@@ -58,7 +59,7 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
         return bool(np.linalg.norm(one[[k]] - two, axis=2).max() > visible)
 
     try:
-        other = integrate(engine, moved, silent, parted)
+        other = integrate(engine, moved, silent, parted, outputs=time)
     except SolverError:
         # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
         return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
@@ -66,6 +67,16 @@ def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
     separation = np.linalg.norm(one[: len(time)] - _velocities(engine, other, time), axis=2).max(axis=1)
     beyond = np.flatnonzero(separation > visible)
     return Twin(size, time, separation, float(time[beyond[0]] if len(beyond) else engine.end))
+
+
+def _compared(engine: Engine, trajectory: Trajectory) -> np.ndarray:
+    """Times at which the two are compared, of which the run has rows.
+
+    Motions part in impacts: where outputs are as rare as a stroke, they alone would tell of it one stroke late.
+    """
+    regular = output_times(engine.breaks, engine.model.scene.output.interval)
+    openings = trajectory.events["time"][trajectory.events["kind"] == OPENING]
+    return np.union1d(np.append(regular[:: max(1, len(regular) // SAMPLES)], regular[-1]), openings)
 
 
 def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.ndarray:
@@ -77,25 +88,35 @@ def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Change of the ball-to-socket vectors (world) per change of the positions, closures kept; (3 contacts, nv).
 
-    From the velocities that unit speeds give, so that no step width enters.
+    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds add
+    to those of the drives, so that no step width enters.
     """
     engine.select_pieces_after(engine.start)
-    contacts, columns = engine.model.arrays.table(m.CONTACTS), []
-    for k in range(engine.model.nv):
-        moved = y.copy()
-        moved[engine.model.speeds] = np.eye(engine.model.nv)[k]
-        engine.evaluate(project(engine, moved), engine.start)
+    contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
+
+    def offset_rates(speeds: np.ndarray) -> np.ndarray:
+        _moving(engine, y, speeds)
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
-        columns.append((velocity[contacts["inner"]] - velocity[contacts["outer"]]).ravel())
-    return np.array(columns).T
+        offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
+        offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
+        return np.asarray(offset).ravel()
+
+    driven = offset_rates(np.zeros(engine.model.nv))
+    return np.array([offset_rates(unit) - driven for unit in np.eye(engine.model.nv)]).T
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
-    moving, moved, nq = y.copy(), y.copy(), engine.model.nq
-    moving[engine.model.speeds] = speeds
+    moved, nq = y.copy(), engine.model.nq
     # rates per unit time, for one unit: a displacement of 1e-8 m is linear
-    moved[:nq] += engine.evaluate(project(engine, moving), engine.start)[:nq]
+    moved[:nq] += _moving(engine, y, speeds)[:nq] - _moving(engine, y, np.zeros(len(speeds)))[:nq]
     return project(engine, moved)
+
+
+def _moving(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Rates of the start's state with other speeds, as nearly as drives and loops allow."""
+    moved = y.copy()
+    moved[engine.model.speeds] = speeds
+    return engine.evaluate(project(engine, moved), engine.start)

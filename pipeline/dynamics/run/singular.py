@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.projection import BLIND
+from pipeline.dynamics.integrate.singular_step import NEVER
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.mobility import INFINITE
@@ -19,8 +21,8 @@ if TYPE_CHECKING:
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1
 #: a selection is looked at again when its pivot ratio has fallen to this share of what it was, and replaced when
-#: another is this much better
-WORN, BETTER = 1e-2, 10.0
+#: another is this much better; or this much, where a singular pose seems ahead that may only be one of the selection
+WORN, BETTER, CLEARLY = 1e-2, 10.0, 4.0
 
 
 def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
@@ -46,8 +48,8 @@ def _natural_lengths(engine: Engine) -> np.ndarray:
     return selection.natural_lengths(engine.model, columns, points, engine.mass_factor())
 
 
-def improve(engine: Engine, t: float) -> bool:
-    """Select rows anew where the present ones have become nearly dependent; whether others are better.
+def improve(engine: Engine, t: float, wanted: float = BETTER) -> bool:
+    """Select rows anew where the present ones have become nearly dependent; whether others are so much better.
 
     The state in Y and its slope stay as they are: the motion does not depend on the selection.
     """
@@ -56,13 +58,16 @@ def improve(engine: Engine, t: float) -> bool:
     pivots, before = engine.view(m.PIVOT), engine.kept.copy()
     present = float(pivots[m.LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
-    better = ratio > BETTER * present and not np.array_equal(before, engine.kept)
+    better = ratio > max(wanted * present, BLIND) and not np.array_equal(before, engine.kept)
     if not better:
         engine.keep(before)
         engine.view(m.ROW_SCALE)[: len(row_scale)] = row_scale
     engine.view(m.Y)[:], engine.slope[:] = y, slope
     pivots[m.LAST_PIVOT] = ratio if better else present
     pivots[m.WANTED_PIVOT] = WORN * ratio if better else WORN * present
+    if better:
+        engine.view(m.INDEPENDENCE)[:] = 0.0  # that of other rows
+        engine.control[[m.PASS_TIME, m.MOST_REACH, m.LEFT]] = NEVER, NEVER, 1.0
     return better
 
 

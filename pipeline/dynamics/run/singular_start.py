@@ -1,9 +1,8 @@
-"""Out of a singular pose in which a run starts, along the branch that the given velocities are tangent to.
+"""Out of a singular pose in which a run starts, along one of the branches that cross there.
 
-In the pose itself the equations have no unique solution, and just beside it an integrator's stages would leave
-the branch. A short way beside it both are regular: so the motion over that way is a polynomial through the
-start whose slopes are those of the equations at points which are closed first (collocation, by Picard's iteration).
-Velocities that belong to no branch show in that closing changes them, however short the way.
+Velocities that are given choose the branch; where they, and the drives, leave a choice, `[start] branch` of the scene
+does. Each branch has a motion out of the pose, a polynomial with closed states (`collocation`). Velocities that belong
+to no branch show in that there is none, however short the way.
 """
 
 from __future__ import annotations
@@ -11,114 +10,123 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial import chebyshev
 
-from pipeline.core.errors import SolverError
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.scene.start import Branch
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.run import singular
+from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.run import branches, singular
+from pipeline.dynamics.run.branches import Direction
+from pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
+from pipeline.dynamics.run.coordinates import joint_coordinates, label
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.observation import observe
 
-#: points of the polynomial: the zero of its first gap is the singular pose
-POINTS = 8
-#: the way is first this share of the time in which the fastest coordinate moves by its unit, then half of that
-FIRST, HALVINGS = 0.1, 6
-#: rounds of Picard's iteration; each leaves of the error a share like the way's
-ROUNDS = 30
+#: the way is first as long as the fastest coordinate takes for this share of its unit, then half of that, and so on
+FIRST, HALVINGS = 0.3, 9
 #: velocities may differ from those of a branch by this share: they are given with some digits
 SAME = 1e-6
-#: rounding of slopes so near to the pose, in units of the coordinates
-ROUNDING = 1e-11
-
-NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
-
-
-def _integrals(ends: np.ndarray) -> np.ndarray:
-    """Weights (ends, POINTS) of values at the nodes in the integral of their polynomial from 0 to each end."""
-    basis = [chebyshev.chebint(row, lbnd=-1.0) for row in np.eye(POINTS)]
-    integrals = 0.5 * np.array([chebyshev.chebval(2.0 * ends - 1.0, c) for c in basis]).T
-    return np.asarray(integrals @ np.linalg.inv(chebyshev.chebvander(2.0 * NODES - 1.0, POINTS - 1)))
-
-
-#: weights of values at the nodes in the value of their polynomial at the start
-AT_START = chebyshev.chebvander(-1.0, POINTS - 1) @ np.linalg.inv(chebyshev.chebvander(2.0 * NODES - 1.0, POINTS - 1))
+#: directions that were looked for are good to some hundredths
+ANY = 0.5
+#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this share are
+#: alike
+ALIKE = 0.05
 
 
 @dataclass(frozen=True)
-class Departure:
-    """The way out. span [s]; y0: state at the start; slopes at the nodes, (POINTS, n); y: state at its end, closed."""
+class StartMotion:
+    """A motion out of the pose; kept: closure rows that are solved for on it."""
 
-    span: float
-    y0: np.ndarray
-    slopes: np.ndarray
-    y: np.ndarray
-    evaluations: int
+    motion: Collocation
+    kept: np.ndarray
 
-    def states(self, after: np.ndarray) -> np.ndarray:
-        """States at times after the start [s], (len(after), n)."""
-        return np.asarray(self.y0 + self.span * _integrals(after / self.span) @ self.slopes)
+    @property
+    def state(self) -> np.ndarray:
+        """The state in the pose, with the speeds of the branch."""
+        return self.motion.states(np.array([self.motion.start]))[0]
 
 
-def depart(engine: Engine, y0: np.ndarray) -> Departure:
-    """From the state at the start; SolverError when its velocities are not those of one smooth motion.
+def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
+    """From the state at the start, which has all loops closed; leaves its closure rows selected.
 
-    y0: with all loops closed.
+    SolverError when its velocities are not those of one smooth motion, or nothing says which of several it takes.
     """
-    nq, nv = engine.model.nq, engine.model.nv
-    engine.select_pieces(0.5 * (engine.breaks[0] + engine.breaks[1]))
-    engine.attempt(y0, engine.start)
-    slope = engine.slope.copy()
-    slope[nq:] = 0.0
-    floors = engine.model.arrays.table(m.FLOORS)["magnitude"][engine.model.arrays.table(m.GROUPS)["group"]]
-    fastest = float(np.max(np.abs(slope[:nq] / floors[:nq]), initial=0.0))
-    if fastest > 0.0:
-        span = min(FIRST / fastest, 0.5 * (engine.breaks[1] - engine.breaks[0]))
-        size = np.where(np.arange(len(y0)) < nq, 1.0, fastest)[: nq + nv] * floors[: nq + nv]
-        for _ in range(HALVINGS):
-            found = _along(engine, y0, slope, span, size)
-            if found is not None:
-                return found
-            span *= 0.5
-    raise SolverError(engine.mobility.singular_start)
+    choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
+    if np.any(y[engine.model.speeds] != 0.0) and not choices:
+        found, turn = [branches.by_speeds(engine, y)], SAME
+    else:
+        found, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
+    way = _along(engine, found[0], turn) if found else None
+    if way is None:
+        raise SolverError(engine.mobility.start_refusal)
+    engine.keep(way.kept)
+    return way
 
 
-def _along(engine: Engine, y0: np.ndarray, slope: np.ndarray, span: float, size: np.ndarray) -> Departure | None:
-    """The way of one length; None when there is none within the tolerance.
-
-    size: of positions and speeds, that what is left is compared with.
-    """
-    nq, n = engine.model.nq, len(size)
-    start, weights, used = y0.copy(), span * _integrals(NODES), 0
-    states = y0 + span * NODES[:, None] * slope
-    singular.select_rows(engine, states[-1], engine.start + span)
-    for _ in range(2):  # once more with the velocities that the branch itself has at the start
-        for _ in range(ROUNDS):
-            seen = _closed(engine, states, span)
-            used += 2 * POINTS
-            if seen is None:
-                return None
-            closed, slopes = seen
-            before, states = states, start + weights @ slopes
-            if np.max(np.abs(states - before)[:, :n] / size) < ROUNDING:
-                break
-        start[nq:n] = (AT_START @ closed[:, nq:n])[0]
-        if np.max(np.abs(start - y0)[:n] / size) > SAME:
-            return None
-    left = np.max(np.abs(closed - states)[:, :n] / size)
-    if not left <= max(engine.rtol, ROUNDING):
+def _along(engine: Engine, way: Direction, turn: float) -> StartMotion | None:
+    """The motion in a direction; None when there is none, or none whose start differs by `turn` at most."""
+    if not way.moves:
         return None
-    return Departure(span, start, slopes, closed[-1], used)
+    engine.control[m.END] = engine.breaks[1]
+    for k in range(HALVINGS):
+        span = min(way.reaching(FIRST * 0.5**k), engine.breaks[1] - engine.start)
+        singular.select_rows(engine, way.state(engine.start + span), engine.start + span)
+        kept, sampler = engine.kept.copy(), Sampler(engine)
+        lead = Lead(way.state, turn if way.at_speed else 0.0)
+        made = collocate(sampler, engine.start, way.start, span, None, lead)
+        sampler.restore()
+        engine.n[m.EVALUATIONS] += sampler.evaluations
+        if made is not None:
+            return StartMotion(made, kept)
+    return None
 
 
-def _closed(engine: Engine, states: np.ndarray, span: float) -> tuple[np.ndarray, np.ndarray] | None:
-    """States at the nodes with their loops closed, and the slopes there; None where that cannot be."""
-    times = engine.start + span * NODES
-    seen = observe(engine, np.column_stack([times, states]))
-    if np.any(seen.status):
-        return None
-    closed, slopes = seen.state, np.zeros_like(states)
-    for line, y, t in zip(slopes, closed, times, strict=True):
-        if not engine.attempt(y, float(t)):
-            return None
-        line[:] = engine.slope
-    return closed, slopes
+# Which of them -------------------------------------------------------------------------------------------------------
+
+
+def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) -> list[Direction]:
+    """The ways that the choices leave; an error unless there is one at most."""
+    if len(ways) > 1:
+        until = engine.start + min(way.reaching(branches.WAY) for way in ways)
+        changes = [_changes(engine, way, until) for way in ways]
+        for number, choice in enumerate(choices):
+            place = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
+            scene = engine.model.scene
+            joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, place)
+            wanted = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
+            near = [max(wanted) - value <= ALIKE * max(map(abs, wanted)) for value in wanted]
+            ways = [way for way, best in zip(ways, near, strict=True) if best]
+            changes = [change for change, best in zip(changes, near, strict=True) if best]
+        if len(ways) > 1:
+            _refuse_open(engine, changes, choices)
+    return ways
+
+
+def _changes(engine: Engine, way: Direction, until: float) -> dict[str, float]:
+    """Change of every joint coordinate up to a time, roughly."""
+    contacts = len(engine.model.contacts)
+    rows = m.empty_record(2, contacts, engine.model.ny)
+    record = m.record(rows, contacts)
+    record.time[:] = engine.start, until
+    record.state[:] = [way.state(t) for t in record.time]
+    seen = observe(engine, rows)
+    return {name: float(np.diff(series[0])[0]) for name, series in joint_coordinates(engine.model, seen).items()}
+
+
+def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple[Branch, ...]) -> None:
+    """Say which joint tells the branches apart best, and how its coordinate changes on each."""
+    spread = {name: float(np.ptp([change[name] for change in changes])) for name in changes[0]}
+    size = {name: max(abs(change[name]) for change in changes) for name in changes[0]}
+    best = max(spread, key=lambda name: spread[name] / size[name] if size[name] > 0.0 else 0.0)
+    told = ", ".join(f"{change[best] / size[best]:+.2g}" for change in changes)
+    joint, _, coordinate = best.partition(".")
+    written = f'joint = "{joint}", ' + (f'coordinate = "{coordinate}", ' if coordinate else "") + "sign = 1"
+    ways = f"{len(changes)} ways, on which joint {best} begins to move like {told}"
+    if choices:
+        raise InputError(
+            "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as one more of a list"
+        )
+    raise SolverError(
+        f"{engine.mobility.singular_start}, here in {ways}: choose by [start] branch = {{ {written} }} or sign = -1, "
+        "or give the bodies velocities"
+    )

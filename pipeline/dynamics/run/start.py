@@ -8,6 +8,9 @@ from pipeline.core.errors import InputError, SolverError
 from pipeline.core.scene.drives import PathDrive
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model import initial
+from pipeline.dynamics.model.given_start import moved
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.stops import End
 from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.observation import observe
@@ -27,19 +30,35 @@ def consistent_start(engine: Engine) -> np.ndarray:
     singular.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
+    # a singular pose has no rates to project on
+    share = 0.0 if engine.mobility.singular_start else initial.WRONG
+    y = initial.given_velocities(model, start_motions(engine), y, share)
+    if not engine.mobility.singular_start:
+        y = project(engine, y)
+    if model.loads or model.arrays.size(m.N_INTERNAL):
+        _look(engine, y)
+        y = initial.start_internal(model, y, engine.table(m.SITE_FRAMES))
+        initial.check_loads(model, engine.table(m.LOAD))
+    _refuse_penetration(engine, y)
+    return y
+
+
+def start_motions(engine: Engine) -> initial.Motions:
+    """What speeds at the start mean: motions of the links, and rates at which the loops open."""
 
     def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         _look(engine, state)
         return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
 
-    y = initial.given_velocities(model, motion, y)
-    if not engine.mobility.singular_start:
-        y = project(engine, y)
-    if model.loads:
-        _look(engine, y)
-        y = initial.start_loads(model, y, engine.table(m.LOAD))
-    _refuse_penetration(engine, y)
-    return y
+    return motion
+
+
+def mends(engine: Engine, y: np.ndarray) -> list[str]:
+    """Sentences about what a consistent start y has changed of the poses and velocities that the scene gives."""
+    _look(engine, y)
+    frames = engine.table(m.LINK_FRAMES)
+    now = [Placement(frame["origin"], frame["axes"]) for frame in frames]
+    return [*moved(engine.model.mechanism, now), *initial.changed_velocities(engine.model, frames, y)]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -86,11 +105,17 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
 
 def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
     for c, depth in overlapping(engine, y).items():
-        name, joint, *_ = engine.model.contacts[c]
-        if joint.initial_approach_speed is None:
-            raise InputError(
-                f"[joint.{name}]",
-                f"its surfaces start {depth:.3g} m deep in each other (clearance {joint.clearance:.3g} m)",
-                "move a body, enlarge the clearance, or declare the speed at which this contact began as "
-                "initial_approach_speed",
-            )
+        contact = engine.model.contacts[c]
+        joint = contact.joint
+        if joint.initial_approach_speed is not None:
+            continue
+        found, remedy = f"its surfaces start {depth:.3g} m deep in each other", "enlarge the clearance"
+        found += f" (clearance {joint.clearance:.3g} m)"
+        if isinstance(joint, End):
+            unit = "rad" if joint.coordinate.turning else "m"
+            found, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+        raise InputError(
+            f"[{contact.place}]",
+            found,
+            f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
+        )

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipeline.core.errors import SolverError
 from pipeline.core.progress import Progress
+from pipeline.core.scene.loads import SampledPid
 from pipeline.dynamics import memory as m
+from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from pipeline.dynamics.run import refusal, singular
+from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.singular_start import depart
+from pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
+from pipeline.dynamics.run.singular_start import start_motion
 from pipeline.dynamics.run.start import overlapping
 
 #: evaluations between two looks at the clock and the keyboard
@@ -21,6 +25,8 @@ SLICE = 20_000
 EVENT_ROWS = 4096
 #: why the stepper stops that another choice of closure rows may mend
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
+#: why it stops that a polynomial over a singular pose may mend
+STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
 #: control floats of a method that another one goes on with
@@ -43,6 +49,8 @@ class Trajectory:
     contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
+    collocations: polynomial motions that the run followed, over singular poses and out of them.
+    passes: the poses that were passed.
     """
 
     rows: np.ndarray
@@ -53,6 +61,8 @@ class Trajectory:
     drift: float = 0.0
     rate_drift: float = 0.0
     steepest: float = 0.0
+    collocations: tuple[Collocation, ...] = ()
+    passes: tuple[Pass, ...] = ()
 
     @property
     def time(self) -> np.ndarray:
@@ -111,12 +121,18 @@ class StiffError(SolverError):
 
 @dataclass
 class _Tape:
-    """The arrays of one integration; rows and events may be replaced by larger ones."""
+    """The arrays of one integration; rows and events may be replaced by larger ones.
+
+    doubted: flexible bodies of which has been said that they left the range of their modes.
+    """
 
     outputs: np.ndarray
     rows: np.ndarray
     events: np.ndarray
     selections: list[tuple[float, np.ndarray]]
+    collocations: list[Collocation] = field(default_factory=list)
+    passes: list[Pass] = field(default_factory=list)
+    doubted: set[str] = field(default_factory=set)
 
 
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
@@ -129,20 +145,33 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
 
 
 def integrate(
-    engine: Engine, y: np.ndarray, progress: Progress, stop: Stop = never, left: Handover | None = None
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    stop: Stop = never,
+    left: Handover | None = None,
+    outputs: np.ndarray | None = None,
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
     stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is gone on with from there.
+    outputs: times of output [s], the start first; the scene's where there are none.
     """
-    tape = _begin(engine, y) if left is None else _resume(engine, left)
+    sample = _sampler(engine)
+    if outputs is None:
+        outputs = output_times(engine.breaks, engine.model.scene.output.interval)
+    if left is None:
+        y = sample(y, engine.start)
+    tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
     if left is None and engine.mobility.singular_start:
-        _depart(engine, tape)
+        _leave_singular_start(engine, tape)
     control = engine.control
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
+        if a > (engine.start if left is None else left.time):
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
         engine.select_pieces(0.5 * (a + b))
         control[m.END], engine.n[m.FRESH] = b, 1
         if _segment(engine, tape, progress, stop):
@@ -150,9 +179,18 @@ def integrate(
     return _collect(engine, tape)
 
 
-def _begin(engine: Engine, y: np.ndarray) -> _Tape:
+def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
+    """What gives the state after the samples of controllers, from that at a break [s] before them."""
+    if not any(isinstance(load, SampledPid) for load in engine.model.scene.load.values()):
+        return lambda y, t: y
+    from pipeline.dynamics.run.sampling import sampler
+
+    return sampler(engine)
+
+
+def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> _Tape:
     """A tape with its first row, and contacts that are closed at the start."""
-    tape = _prepare(engine, y, engine.start)
+    tape = _prepare(engine, y, engine.start, outputs)
     first = m.record(tape.rows[:1], len(engine.model.contacts))
     first.time[:], first.state[:] = engine.start, y
     engine.n[m.N_RECORDED], engine.n[m.NEXT_OUTPUT] = 1, 1
@@ -162,9 +200,9 @@ def _begin(engine: Engine, y: np.ndarray) -> _Tape:
     return tape
 
 
-def _resume(engine: Engine, left: Handover) -> _Tape:
+def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> _Tape:
     """A tape with what another method has recorded; the engine as that method left it."""
-    tape, n = _prepare(engine, left.y, left.time), engine.n
+    tape, n = _prepare(engine, left.y, left.time, outputs), engine.n
     cap = n[m.CAP]
     n[m.STATUS : m.INTEGERS] = left.counters
     n[m.CAP] = cap
@@ -177,7 +215,7 @@ def _resume(engine: Engine, left: Handover) -> _Tape:
     return tape
 
 
-def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Tape:
+def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> _Tape:
     """Work space and tape of an integration from state y at time t, nothing recorded yet."""
     model, n, control = engine.model, engine.n, engine.control
     solver, contacts = model.scene.solver, len(model.contacts)
@@ -185,11 +223,12 @@ def _prepare(engine: Engine, y: np.ndarray, t: float) -> _Tape:
     control[:] = 0.0
     control[m.TIME], control[m.SPAN] = t, engine.end - engine.start
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
+    control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
+    engine.view(m.INDEPENDENCE)[:] = 0.0
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
-    outputs = output_times(engine.breaks, model.scene.output.interval)
     room = EVENT_ROWS if contacts else m.ROOM
     rows = m.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
@@ -204,18 +243,17 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
     return engine.kept.copy()
 
 
-def _depart(engine: Engine, tape: _Tape) -> None:
-    """Lay the way out of a singular start, and choose the closure rows at its end."""
-    n, record = engine.n, m.record(tape.rows, len(engine.model.contacts))
-    way = depart(engine, record.state[0])
-    passed = tape.outputs[(tape.outputs > engine.start) & (tape.outputs < engine.start + way.span)]
-    times = np.concatenate([[engine.start], passed, [engine.start + way.span]])
-    record.time[: len(times)] = times
-    record.state[: len(times)] = np.vstack([way.y0, way.states(passed - engine.start), way.y])
-    n[m.N_RECORDED], n[m.NEXT_OUTPUT] = len(times), 1 + len(passed)
-    n[m.EVALUATIONS] += way.evaluations
-    engine.control[m.TIME] = times[-1]
-    tape.selections[:] = [(engine.start, _select(engine, way.y, float(times[-1])))]
+def _leave_singular_start(engine: Engine, tape: _Tape) -> None:
+    """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
+    first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
+    engine.select_pieces_after(engine.start)
+    way = start_motion(engine, first.copy())
+    first[:] = engine.view(m.Y)[:] = way.state
+    engine.view(m.COLLOCATION)[:] = way.motion.series.ravel()
+    engine.view(m.PIVOT)[:] = 1.0, 0.0
+    engine.control[m.COLLOCATED] = way.motion.span
+    tape.collocations.append(way.motion)
+    tape.selections[:] = [(engine.start, engine.kept.copy())]
 
 
 def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
@@ -246,17 +284,61 @@ def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> boo
         if status == m.FULL:
             tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
             tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
+        elif status == m.SINGULAR_AHEAD:
+            _pass_over(engine, tape)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if singular.improve(engine, t):
                 tape.selections.append((t, engine.kept.copy()))
-            elif status != m.WORN_ROWS:
-                raise SolverError(refusal.text(engine))
+            elif status != m.WORN_ROWS and not _rescued(engine, tape):
+                raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif status != m.PAUSED:
-            raise SolverError(refusal.text(engine))
+            if not _rescued(engine, tape):
+                raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif _crawls(engine):
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
-        elif stop(tape.rows[: n[m.N_RECORDED]]):
-            return True
+        else:
+            _warn(engine, tape, progress)
+            if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):
+                return True
+
+
+def _warn(engine: Engine, tape: _Tape, progress: Progress) -> None:
+    """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
+    if not engine.model.numbering.flexible:
+        return
+    from pipeline.dynamics.run.validity import doubts
+
+    for sentence in doubts(engine):
+        body = sentence.partition(":")[0]
+        if body not in tape.doubted:
+            tape.doubted.add(body)
+            progress(None, f"warning: {sentence}")
+
+
+def _pass_over(engine: Engine, tape: _Tape) -> bool:
+    """Get the stepper on where closure rows come to depend on each other; whether there is a way.
+
+    Other rows, if these alone do; else a polynomial over the singular pose.
+    """
+    t = float(engine.control[m.TIME])
+    if engine.mobility.redundant and singular.improve(engine, t, singular.CLEARLY):
+        tape.selections.append((t, engine.kept.copy()))
+        return True
+    made, passes = lay_over(engine)
+    if made is not None:
+        tape.collocations.append(made)
+        known = tape.passes[-1].time if tape.passes else -np.inf
+        tape.passes += [p for p in passes if p.time - known > SAME * made.span]
+    return made is not None
+
+
+def _rescued(engine: Engine, tape: _Tape) -> bool:
+    """Whether a stepper that cannot go on has got a polynomial: the singular pose ahead may be what stopped it."""
+    control, status = engine.control, engine.n[m.STATUS]
+    if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
+        return False
+    ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
+    return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
 
 
 def _crawls(engine: Engine) -> bool:
@@ -285,11 +367,19 @@ def _hand_over(engine: Engine, tape: _Tape) -> Handover:
     )
 
 
+def _in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
+    """The rows by time: those of a step's inner events were written before its outputs.
+
+    An event on an output time is one row, the later.
+    """
+    time = m.record(rows, contacts).time
+    order = np.argsort(time, kind="stable")
+    return rows[order[np.append(np.diff(time[order]) > 0.0, True)]]
+
+
 def _collect(engine: Engine, tape: _Tape) -> Trajectory:
     n, contacts = engine.n, len(engine.model.contacts)
-    rows = tape.rows[: n[m.N_RECORDED]]
-    # an event on an output time is one row, the later
-    keep = np.append(np.diff(m.record(rows, contacts).time) > 0.0, True)
+    rows = _in_order(tape.rows[: n[m.N_RECORDED]], contacts)
     counters = {
         "evaluations": int(n[m.EVALUATIONS]),
         "steps": int(n[m.STEPS]),
@@ -303,4 +393,5 @@ def _collect(engine: Engine, tape: _Tape) -> Trajectory:
     # what happens inside a step is noted when the step is done: one contact after the other
     in_order = events[np.argsort(events["time"], kind="stable")]
     drift, rate_drift, steepest = (float(engine.control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
-    return Trajectory(rows[keep], in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest)
+    laid = tuple(tape.collocations), tuple(tape.passes)
+    return Trajectory(rows, in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid)

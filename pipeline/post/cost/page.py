@@ -20,8 +20,9 @@ Made from the datasets `results/cost/<scene>/cost.nc` by
 
 Nothing on this page is typed in. Errors are the largest differences from a reference
 run over the whole run, or up to the horizon beyond which the motion of the scene cannot be predicted point by point;
-each is a share of the quantity's own size. Times are processor seconds of warm runs on one core of the machine that
-made the page: their ratios carry over to others, their values do not.
+each is a share of the quantity's own size. Times are processor seconds of the integration of warm runs,
+without their record, on one core of the machine that made the page: their ratios carry over to others, their values do
+not.
 """
 
 

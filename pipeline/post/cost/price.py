@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.post.cost.study import GROUPS, resolved
+from pipeline.post.cost.study import GROUPS, recording, resolved
 from pipeline.post.plotting.table import Table
 
 TARGETS = (1e-3, 1e-6, 1e-9)
@@ -45,7 +45,7 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
         best = min(_choices(one), key=lambda c: c.error, default=NOTHING)
         rows.append((str(name), *(_cell(cheapest(one, target)) for target in TARGETS), f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
-    return Table(title, heads, tuple(rows), ("In brackets: processor time of one run.",))
+    return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
 
 
 def _cell(choice: Choice | None) -> str:
@@ -97,12 +97,17 @@ def _choices(study: xr.Dataset) -> list[Choice]:
 
 
 def _notes(study: xr.Dataset) -> list[str]:
+    recorded = recording(study)
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
         + "; each as a share of its own size, the reference's uncertainty included.",
         _confirmed(study),
     ]
+    if recorded == recorded:
+        notes.append(
+            f"CPU is that of the integration; the record of a run takes {recorded:.2g} s more, whatever the way."
+        )
     missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
     if missing:
         notes.append(f"{' and '.join(missing)} cannot be had: {_why_not(study)}.")

@@ -28,7 +28,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 MARGIN = 10.0
 LONG_NAMES = {
     "error": "largest error up to the horizon, as a share of the quantity's size",
-    "cpu_seconds": "processor time of one warm run, median of the repeats",
+    "cpu_seconds": "processor time of the integration of a warm run, median of the repeats",
+    "recording_seconds": "processor time of its record: rows and dataset",
     "cpu_spread": "largest minus smallest processor time of the repeats",
     "evaluations": "right-hand sides evaluated",
     "peak_memory": "largest resident memory of the process that made the run",
@@ -37,12 +38,13 @@ LONG_NAMES = {
 UNITS = {
     "error": "1",
     "cpu_seconds": "s",
+    "recording_seconds": "s",
     "cpu_spread": "s",
     "evaluations": "1",
     "peak_memory": "B",
     "compile_seconds": "s",
 }
-COSTS = ("cpu_seconds", "cpu_spread", "evaluations", "peak_memory", "compile_seconds")
+COSTS = ("cpu_seconds", "cpu_spread", "recording_seconds", "evaluations", "peak_memory", "compile_seconds")
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,6 +145,14 @@ def cost(run: xr.Dataset, name: str) -> float:
     if name == "cpu_spread":
         return float(seconds.max() - seconds.min())
     return float(run.attrs[name])
+
+
+def recording(study: xr.Dataset) -> float:
+    """Processor time of the record of one run [s]: of as many rows whatever the integration took, so one median."""
+    found = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
+             if f"recording_seconds_by_{group}" in study]  # fmt: skip
+    values = np.concatenate([*found, [np.nan]])
+    return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 
 def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity]) -> dict[str, float]:

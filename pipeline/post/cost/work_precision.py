@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from pipeline.core.integrators import INTEGRATORS
-from pipeline.post.cost.study import GROUPS, MARGIN, resolved
+from pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
 from pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
@@ -50,13 +50,14 @@ def make(
     """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     found = curves(study)
-    rows = -(-len(chosen) // COLUMNS)
+    rows, recorded = -(-len(chosen) // COLUMNS), recording(study)
     with style():
         figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
         for k, ax in enumerate(axes.ravel()):
             if k < len(chosen):
                 bound = MARGIN * float(study["reference_uncertainty"].values[k])
                 _panel(ax, chosen[k], k, (found, others), marks, bound)
+                _mark_recording(ax, recorded)
             else:
                 ax.set_visible(False)
         _legend(figure, found, others, marks)
@@ -129,8 +130,14 @@ def _panel(
     if bound > 0.0:
         ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
         ax.set_ylim(bottom=0.3 * bound)
-    ax.set_xlabel("CPU time of one run (s)")
+    ax.set_xlabel("CPU time of the integration (s)")
     ax.set_ylabel("relative error")
+
+
+def _mark_recording(ax: Axes, seconds: float) -> None:
+    """A line where the record of a run would stand: it costs that whatever the integration took."""
+    if np.isfinite(seconds):
+        ax.axvline(seconds, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
 
 
 def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
@@ -147,6 +154,7 @@ def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: 
         handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
     handles.append(Patch(color=GRID, label="cannot be told"))
+    handles.append(Line2D([], [], color=SOFT, linewidth=0.9, linestyle=":", label="recording, the same for all"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
     figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)  # type: ignore[attr-defined]

@@ -1,8 +1,7 @@
 """The paper's figures and tables. To add one: a module here with NEEDS and make, and a line below.
 
 ``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``; a literal.
-``USES_GL``: true where the result also depends on the machine's GL libraries.
-Both are kept in an index (`stages.figure`), since asking the modules takes the import of the plotting libraries.
+They are kept in an index (`stages.figure`), since asking the modules takes the import of the plotting libraries.
 ``make(data)``: artifacts by reference -> file contents by file name.
 """
 
@@ -14,11 +13,14 @@ from pipeline.core.registry import lookup, module_of
 
 KIND = "figure or table"
 NAMES = {
+    "fig01": "fig01:make",
     "fig03": "fig03:make",
     "fig04": "fig04:make",
+    "fig05": "fig05:make",
     "fig06": "fig06:make",
     "fig08": "fig08:make",
     "fig09": "fig09:make",
+    "fig10": "fig10:make",
     "fig11": "fig11:make",
     "fig12": "fig12:make",
     "fig13": "fig13:make",
@@ -27,8 +29,12 @@ NAMES = {
     "fig16": "fig16:make",
     "fig17": "fig17:make",
     "sections": "sections:make",
+    "table01": "table01:make",
+    "table02": "table02:make",
+    "table03": "table03:make",
     "table04": "table04:make",
     "table05": "table05:make",
+    "table06": "table06:make",
     "table07": "table07:make",
     "table08": "table08:make",
     "table09": "table09:make",

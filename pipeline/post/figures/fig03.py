@@ -8,9 +8,10 @@ from pipeline.post.figures import mode_shapes
 from pipeline.post.paper import TABLE4_NORMAL_MODE
 
 NEEDS = ("sps4/frequencies/fixed_circle:bundle/rod",)
-USES_GL = True
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig03.png and fig03.svg."""
-    return mode_shapes.make("fig03", "Figure 3: fixed-fixed mode shapes", data[NEEDS[0]], TABLE4_NORMAL_MODE)
+    return mode_shapes.make(
+        "fig03", "Figure 3: fixed-fixed modes leave both ends of the rod at rest", data[NEEDS[0]], TABLE4_NORMAL_MODE
+    )

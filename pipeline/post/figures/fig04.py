@@ -8,9 +8,13 @@ from pipeline.post.figures import mode_shapes
 from pipeline.post.paper import TABLE5_NORMAL_MODE
 
 NEEDS = ("sps4/frequencies/free_circle:bundle/rod",)
-USES_GL = True
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig04.png and fig04.svg."""
-    return mode_shapes.make("fig04", "Figure 4: free-free mode shapes", data[NEEDS[0]], TABLE5_NORMAL_MODE)
+    return mode_shapes.make(
+        "fig04",
+        "Figure 4: free-free modes bend the rod about its middle, its ends move most",
+        data[NEEDS[0]],
+        TABLE5_NORMAL_MODE,
+    )

@@ -25,7 +25,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         _label(axes[0, 0], limits)
         _curve(axes[0, 1], limits, 3.0 * limits[0], marks=False)
         for panel in axes.flat:
-            panel.scatter(1e3 * v, mu, s=7, color="#E69F00", lw=0, zorder=3, label=f"run {CSJ.scene}, in contact")
+            panel.scatter(1e3 * v, mu, s=7, color=CSJ.color, lw=0, zorder=3, label=f"run {CSJ.scene}, in contact")
             panel.set_xlabel("tangential velocity (mm/s)")
         axes[0, 0].set_xlim(-1.5e3 * limits[1], 1.5e3 * limits[1])
         axes[0, 1].set_xlim(-3e3 * limits[0], 3e3 * limits[0])
@@ -34,8 +34,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         axes[0, 0].legend(loc="upper left", fontsize=8)
         style.heading(
             figure,
-            "Figure 6: modified Coulomb friction",
-            "force against the sliding velocity; negative velocities mirror the law",
+            f"Figure 6: friction grows over {1e3 * limits[0]:g} mm/s and falls from {limits[2]:g} to {limits[3]:g}",
+            "modified Coulomb law, force against the sliding velocity; negative velocities mirror the law",
         )
         return style.files("fig06", figure)
 

@@ -22,14 +22,19 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         axes[0, 0].plot(ideal.time, ideal.angle, color=IDEAL.color, lw=1.8)
         axes[0, 0].set(xlabel="time (s)", ylabel="angle about y0 (rad)", xlim=(ideal.time[0], ideal.time[-1]))
         _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
-        style.heading(figure, "Figure 8", "trajectory of the moving platform about y0, ideal model")
+        tilt = float(np.degrees(np.abs(ideal.angle).max()))
+        style.heading(
+            figure,
+            f"Figure 8: the platform tilts by {tilt:.1f}° and comes back",
+            "rotation about y0 = asin R_WP[0, 2], ideal model",
+        )
         return style.files("fig08", figure)
 
 
 def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None:
     """A dot and the value at the largest tilt."""
     i = int(np.argmax(np.abs(angle)))
-    axes.plot(time[i], angle[i], "o", color="#0072B2", ms=5)
+    axes.plot(time[i], angle[i], "o", color=IDEAL.color, ms=5)
     text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s"
     below = angle[i] > 0.0
     axes.annotate(

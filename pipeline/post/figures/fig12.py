@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import xarray as xr
 
-from pipeline.post.models import CSJ, IDEAL, motion
+from pipeline.post.models import CSJ, IDEAL, JOINT, motion
 from pipeline.post.plotting import style
 from pipeline.post.plotting.panels import six_panels
 
@@ -19,10 +20,15 @@ NEEDS = (
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig12.png and fig12.svg."""
     with style.style():
-        figure, labelled = six_panels(motion(IDEAL, data), [motion(CSJ, data)], impacts=True)
+        ideal, csj, post = motion(IDEAL, data), motion(CSJ, data), data[f"{CSJ.scene}:post"]
+        figure, labelled = six_panels(
+            ideal, [csj], impacts=True, clearance=1e3 * float(post.clearance.sel(contact=JOINT))
+        )
         style.heading(
             figure,
-            "Figure 12: CSJ model",
+            f"Figure 12: {int(post.impact_count.sel(contact=JOINT))} impacts raise the largest force at A1 from "
+            f"{ideal.reaction.max():.0f} to {csj.reaction.max():.0f} N, the acceleration from "
+            f"{1e-3 * np.abs(ideal.acceleration).max():.0f} to {1e-3 * np.abs(csj.acceleration).max():.0f} m/s²",
             "slim panels (added): difference from the ideal model, or a zoom to its range; "
             "dots: largest force of each impact",
         )

@@ -35,7 +35,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         figure = maps(PLANE, data)
         style.heading(
             figure,
-            "Figure 16: z velocity and z acceleration",
+            "Figure 16: the acceleration shows every impact; in between it is nearly that of the ideal model",
             "the paper calls these phase plots Poincaré maps; second row (added): states when an impact "
             "begins, hollow beyond the horizon; grey band: linear scale, logarithmic outside",
         )

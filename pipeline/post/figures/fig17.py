@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import CSJ, FAR_CSJ, JOINT, Model
+from pipeline.post.models import CSJ, FAR_CSJ, JOINT, Model, believed_until
 from pipeline.post.plotting import style
 
 NEEDS = (
@@ -37,8 +37,9 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             axes[-1, column].set_xlabel("x in the socket (mm)")
         style.heading(
             figure,
-            "Figure 17: centre of the ball in the socket",
-            "grey: clearance sphere; dots: where impacts begin; pale beyond the horizon",
+            "Figure 17: the ball flies from wall to wall; with a flexible rod its ways part from run to run",
+            "centre of the ball in the socket; grey: clearance sphere; dots: where impacts begin; pale beyond "
+            "the horizon",
         )
         return style.files("fig17", figure)
 
@@ -47,7 +48,7 @@ def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: di
     run, post = data[f"{model.scene}:run"], data[f"{model.scene}:post"]
     offset = 1e3 * run.contact_offset.sel(contact=JOINT)
     x, y = (offset.sel(axis=name).values for name in plane)
-    time, horizon = run.time.values, float(post.horizon)
+    time, horizon = run.time.values, believed_until(post)
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     radius = 1e3 * float(post.clearance.sel(contact=JOINT))
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", zorder=0)

@@ -5,42 +5,61 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
 
 from pipeline.post.plotting import style
-from pipeline.post.render import gl
-from pipeline.post.rod_shape import centre_line, scale_to
+from pipeline.post.plotting.drawing import View, shell, triad, view
+from pipeline.post.rod_shape import scale_to, surface
 
 COUNT = 4
+#: drawn size of the largest displacement, as a share of the body's length
+SHARE = 0.16
+#: the rod lies across the picture, seen from above and in front; both planes of bending are seen
+TOWARDS, UP = np.array([-0.35, -1.0, 0.9]), np.array([0.0, 0.0, 1.0])
 
 
-def make(name: str, title: str, bundle: xr.Dataset, printed: tuple[float, ...]) -> dict[str, bytes]:
-    """Figure `name` with COUNT shapes: rendered where GL works, drawn as lines elsewhere."""
-    drawn = gl.works()
+def make(name: str, finding: str, bundle: xr.Dataset, printed: tuple[float, ...]) -> dict[str, bytes]:
+    """Figure `name` with COUNT shapes.
+
+    finding: what the figure shows, its title.  printed: the paper's frequencies [Hz].
+    """
+    seen = view(TOWARDS, UP)
     with style.style():
-        figure, axes = style.grid(2, 2, (10.6, 6.0 if drawn else 5.2))
+        figure, axes = style.grid(2, 2, (10.6, 6.3))
         for mode, panel in enumerate(axes.flat):
-            (_rendered if drawn else _lines)(panel, bundle, mode)
+            factor = _shape(panel, seen, bundle, mode)
             frequency = float(bundle.frequency[mode])
-            panel.set_title(f"mode {mode + 1}: {frequency:.1f} Hz (paper {printed[mode]:.1f} Hz)")
-        how = "colour: their size" if drawn else "drawn as lines, because this machine has no working GL libraries"
-        style.heading(figure, title, f"round section; displacements exaggerated; {how}")
+            panel.set_title(
+                f"({'abcd'[mode]}) mode {mode + 1}: {frequency:.1f} Hz (paper {printed[mode]:.1f} Hz), "
+                f"drawn × {factor:.2g} √kg m",
+                fontsize=8.8,
+            )
+        bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=axes, shrink=0.7, pad=0.01, aspect=30)
+        bar.set_label("displacement, largest = 1")
+        style.heading(
+            figure,
+            finding,
+            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor beside each; grey: "
+            "undeformed",
+        )
         return style.files(name, figure)
 
 
-def _rendered(axes: Axes, bundle: xr.Dataset, mode: int) -> None:
-    from pipeline.post.render.shapes import picture  # pyvista is imported only where it can draw
-
-    axes.imshow(picture(bundle, mode), interpolation="antialiased")
-    axes.set_axis_off()
-
-
-def _lines(axes: Axes, bundle: xr.Dataset, mode: int) -> None:
-    """Centre line in an oblique projection, with its undeformed ghost."""
+def _shape(axes: Axes, seen: View, bundle: xr.Dataset, mode: int) -> float:
+    """One shape over its undeformed ghost; returns the factor of the drawn displacements [kg^0.5 m]."""
     q = np.zeros(bundle.sizes["mode"])
+    ghost, _ = surface(bundle, q)
     q[mode] = 1.0
-    points, displacement, _ = centre_line(bundle, q, scale_to(bundle, q, 0.16))
-    for offset, color, width in ((0.0, "#b5bdc6", 1.2), (1.0, "#0072B2", 3.0)):
-        x, y, z = (points + offset * displacement).T * 1e3
-        axes.plot(x - 0.35 * y, z - 0.35 * y, color=color, lw=width)
-    axes.set(xlabel="along the rod (mm)", ylabel="oblique view (mm)")
-    axes.set_aspect("equal", adjustable="datalim")
+    factor = scale_to(bundle, q, SHARE)
+    rings, size = surface(bundle, q, factor)
+    shell(axes, seen, ghost, None, alpha=0.22, antialiased=False, zorder=1)
+    shell(axes, seen, rings, size / max(float(size.max()), 1e-300), zorder=2)
+    corner = ghost.reshape(-1, 3).min(axis=0) + np.array([0.0, 0.0, -0.055])
+    triad(axes, seen, corner, 0.03, ("x", "y", "z"))
+    places = seen.project(np.concatenate([ghost.reshape(-1, 3), rings.reshape(-1, 3), corner[None] - 0.008]))
+    (left, low), (right, high) = places.min(axis=0), places.max(axis=0)
+    axes.set(xlim=(left - 0.008, right + 0.008), ylim=(low - 0.008, high + 0.008))
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    return factor

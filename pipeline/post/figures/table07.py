@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.errors import max_deviation
+from pipeline.post.errors import Deviation, max_deviation
 from pipeline.post.models import FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, PLATFORM
-from pipeline.post.paper import TABLE7
+from pipeline.post.paper import TABLE7, TABLE8
 from pipeline.post.plotting.error_table import MEANING, NOTHING, comparison, heads, paper, ratios, rows, single
 from pipeline.post.plotting.table import Table, files
 
@@ -55,8 +55,23 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         "is the reference. Errors this small depend on the assumed joint coordinates and on the absent "
         "structural damping."
     )
+    notes.append(_contradiction(both))
     notes.append(MEANING)
     return files(
         "table07",
         Table("Table 7: largest errors, ideal model and FAR model", heads(columns), rows(columns), tuple(notes)),
+    )
+
+
+def _contradiction(ours: Deviation) -> str:
+    """The paper's two rows beside what a change of leg 1's length can do."""
+    printed = TABLE7["free-free"]
+    return (
+        f"The paper's two rows contradict each other: {printed.angle:.3g} rad with {printed.displacement:.3g} mm is "
+        f"{printed.angle / printed.displacement:.2g} rad/mm. Whatever changes the length of leg 1 turns and lifts the "
+        f"platform in a ratio that geometry sets: {TABLE8.angle / TABLE8.displacement:.2g} rad/mm by the paper's "
+        "Table 8, "
+        f"{1e-3 * ours.angle / ours.displacement:.2g} rad/mm here (Craig-Bampton). {printed.displacement:.3g} mm "
+        "may be no "
+        "more than the last digit that the displacement was printed with."
     )

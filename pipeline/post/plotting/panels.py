@@ -1,4 +1,4 @@
-"""The six panels of figures 11-13: angle, z, vz, az, reaction at A1, trajectory of the ball's centre."""
+"""The six panels of figures 11-13: angle, z, vz, az, reaction at A1, deviation of the ball's centre."""
 
 from __future__ import annotations
 
@@ -17,6 +17,13 @@ from pipeline.post.plotting import style
 
 #: alpha of a curve inside its horizon, of one that the paper does not have, and beyond the horizon
 FIRM, ADDED, PALE = 0.95, 0.6, 0.28
+#: what the paper does not have is drawn as the band that it fills, in so many stretches of time: a rod that rings would
+#: cover the paper's own curves
+STRETCHES = 120
+#: differences whose sizes are further apart than this are drawn on a logarithmic scale around zero
+APART = 20.0
+#: differences below this share of the largest are rounding
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +49,20 @@ LETTERS = "abcdef"
 
 
 def six_panels(
-    reference: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset] = (), *, impacts: bool
+    reference: Motion,
+    others: Sequence[Motion],
+    posts: Sequence[xr.Dataset] = (),
+    *,
+    impacts: bool,
+    clearance: float = 0.0,
 ) -> tuple[Figure, Axes]:
     """Figure with the paper's six panels, each with a slim one below; returns it and the axes that hold labels.
 
     reference: the ideal model.  others: the models compared with it, drawn in this order.
-    posts: post artifacts whose ensemble mean +- std is drawn as a band, one per model of `others`.
+    posts: post artifacts whose ensemble's quantiles are drawn as a band, one per model of `others`.
     impacts: with them the slim panels of acceleration and reaction zoom to the ideal model's range;
     all others show the difference from the ideal model.
+    clearance: of joint A1 [mm], drawn as a circle where there is one.
     """
     figure, axes = style.grid(6, 2, (11.0, 12.2), height_ratios=[3, 1.15] * 3, sharex=False)
     for k, quantity in enumerate(QUANTITIES):
@@ -60,11 +73,11 @@ def six_panels(
         if impacts and quantity.jumps:
             zoomed(strip, quantity, reference, others)
         else:
-            difference(strip, quantity, reference, others)
+            difference(strip, quantity, reference, others, posts)
     for motion in others:
         _peaks(axes[4, 0], motion)
-    trajectory(axes[4, 1], reference, others)
-    axes[4, 1].set_title("(f) centre of ball A1 in the global frame")
+    ball_deviation(axes[4, 1], reference, others, clearance)
+    axes[4, 1].set_title("(f) centre of ball A1, minus ideal, global frame")
     ball_distance(axes[5, 1], reference, others)
     for panel in axes.flat:
         # the same place in every panel; aligning by the tick labels' sizes takes seconds
@@ -101,16 +114,38 @@ def zoomed(axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[M
     axes.set_ylabel(f"zoom\n{quantity.unit}")
 
 
-def difference(axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion]) -> None:
+def difference(
+    axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset] = ()
+) -> None:
     """The slim panel with what differs from the ideal model."""
     axes.margins(y=0.12)
+    for motion, post in zip(others, posts, strict=bool(posts)):
+        _band(axes, quantity, motion, post, reference)
+    found = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
     for motion in others:
-        time, values = deviation(quantity, motion, reference)
+        time, values = found[motion.model.scene]
         _curve(axes, motion, values, 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"minus ideal\n{quantity.unit}")
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+    _scale(axes, [float(np.abs(values).max()) for _, values in found.values()])
+
+
+def _scale(axes: Axes, sizes: Sequence[float]) -> None:
+    """A scale on which all differences are seen, of whatever size."""
+    largest = max(sizes, default=0.0)
+    smallest = min((size for size in sizes if size > ROUNDING * largest), default=largest)
+    if largest <= APART * smallest:
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+        return
+    linear = 10.0 ** np.floor(np.log10(smallest))
+    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
+    top = 10.0 ** np.ceil(np.log10(largest))
+    axes.set_ylim(-top, top)
+    axes.set_yticks([-top, 0.0, top])
+    axes.minorticks_off()
+    told = f"linear within ±{linear:.0e}"
+    axes.text(0.995, 0.03, told, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 
 def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -119,15 +154,26 @@ def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np
     return motion.time[i], quantity.values(motion)[i] - quantity.values(reference)[j]
 
 
-def trajectory(axes: Axes, reference: Motion, others: Sequence[Motion]) -> None:
-    """Path of the ball's centre in the x-z plane of the world, equal scales."""
-    for motion in others:
-        inside = motion.time <= motion.horizon
-        axes.plot(motion.ball[:, 0], motion.ball[:, 2], color=motion.model.color, lw=0.8, alpha=PALE)
-        axes.plot(motion.ball[inside, 0], motion.ball[inside, 2], color=motion.model.color, lw=1.2, alpha=FIRM)
-    axes.plot(reference.ball[:, 0], reference.ball[:, 2], color=reference.model.color, lw=1.1, ls=(0, (5, 2)))
-    axes.set_xlabel("x (mm)")
-    axes.set_ylabel("z (mm)")
+def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clearance: float = 0.0) -> None:
+    """Where the ball's centre is beside its place in the ideal model, x-z plane of the world, equal scales.
+
+    The path itself is 60 mm long: nothing is seen on it.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    if clearance > 0.0:
+        axes.plot(clearance * np.cos(turn), clearance * np.sin(turn), color=style.SOFT, lw=0.9, ls=":")
+        axes.annotate("clearance", (0.0, clearance), ha="center", va="bottom", fontsize=7.6, color=style.SOFT)
+    for motion in sorted(others, key=lambda m: not m.model.ours):
+        i, j = common_times(motion.time, reference.time)
+        x, _, z = (motion.ball[i] - reference.ball[j]).T
+        inside = motion.time[i] <= motion.horizon
+        axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
+        axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
+    axes.plot(0.0, 0.0, "+", color=reference.model.color, ms=8, mew=1.4, zorder=4)
+    axes.set_xlabel("x minus ideal (mm)")
+    axes.set_ylabel("z minus ideal (mm)")
+    axes.locator_params(nbins=6)
+    axes.ticklabel_format(style="sci", scilimits=(-3, 4))
     axes.set_aspect("equal", adjustable="datalim")
 
 
@@ -148,11 +194,27 @@ def _curve(axes: Axes, motion: Motion, values: np.ndarray, width: float, time: n
     """Firm inside the horizon, pale beyond it; what the paper does not have lies below what it has."""
     time = motion.time if time is None else time
     inside = time <= motion.horizon
-    look: dict[str, Any] = {"color": motion.model.color, "lw": width, "zorder": 2.0 if motion.model.ours else 2.2}
+    if motion.model.ours:
+        _envelope(axes, motion, values, time)
+        return
+    look: dict[str, Any] = {"color": motion.model.color, "lw": width, "zorder": 2.2}
     if not inside.all():
         axes.plot(time[~inside], values[~inside], alpha=PALE, **look)
-    alpha = ADDED if motion.model.ours else FIRM
-    axes.plot(time[inside], values[inside], alpha=alpha, label=motion.model.label, **look)
+    axes.plot(time[inside], values[inside], alpha=FIRM, label=motion.model.label, **look)
+
+
+def _envelope(axes: Axes, motion: Motion, values: np.ndarray, time: np.ndarray) -> None:
+    """The band that a curve fills, from stretch to stretch, paler beyond the horizon."""
+    edges = np.linspace(time[0], time[-1], STRETCHES + 1)
+    first = np.searchsorted(time, edges[:-1])
+    first = first[np.append(np.diff(first) > 0, first[-1] < len(time))]
+    low, high = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+    middle = np.append(0.5 * (time[first[:-1]] + time[first[1:]]), time[-1])
+    middle[0] = time[0]
+    for part, alpha in ((middle <= motion.horizon, ADDED), (middle >= motion.horizon, PALE)):
+        look: dict[str, Any] = {"color": motion.model.color, "alpha": alpha, "lw": 0.8, "zorder": 1.8}
+        axes.fill_between(middle[part], low[part], high[part], **look)
+    axes.plot([], [], color=motion.model.color, lw=1.6, label=motion.model.label)
 
 
 def _peaks(axes: Axes, motion: Motion) -> None:
@@ -161,18 +223,23 @@ def _peaks(axes: Axes, motion: Motion) -> None:
     axes.plot(*motion.impacts[inside].T, "o", ms=2.2, color=motion.model.color)
 
 
-def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset) -> None:
-    """Mean +- one standard deviation over the ensemble, beyond the horizon only."""
+def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset, reference: Motion | None = None) -> None:
+    """Middle nine tenths of the ensemble and its median, beyond the horizon only; less the reference where given.
+
+    Quantiles, as forces are not negative and most of their values are zero: a mean minus a deviation would be.
+    """
     if quantity.ensemble is None or "ensemble_time" not in post.sizes:
         return
     name, factor = quantity.ensemble
-    mean, std = _column(post[f"{name}_mean"]) * factor, _column(post[f"{name}_std"]) * factor
+    low, middle, high = (_column(post[f"{name}_quantile"].sel(quantile=q)) * factor for q in (0.05, 0.5, 0.95))
     time = post.ensemble_time.values
+    if reference is not None:
+        i, j = common_times(time, reference.time)
+        ideal = quantity.values(reference)[j]
+        time, low, middle, high = time[i], low[i] - ideal, middle[i] - ideal, high[i] - ideal
     beyond = time >= motion.horizon
-    axes.fill_between(
-        time[beyond], (mean - std)[beyond], (mean + std)[beyond], color=motion.model.color, alpha=0.22, lw=0
-    )
-    axes.plot(time[beyond], mean[beyond], color=motion.model.color, lw=0.8)
+    axes.fill_between(time[beyond], low[beyond], high[beyond], color=motion.model.color, alpha=0.22, lw=0)
+    axes.plot(time[beyond], middle[beyond], color=motion.model.color, lw=0.8)
 
 
 def _column(variable: xr.DataArray) -> np.ndarray:

@@ -9,13 +9,15 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from pipeline.post import poincare
 from pipeline.post.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
 from pipeline.post.plotting import style
 
 Values = Callable[[Motion], np.ndarray]
+#: of an axis that is logarithmic on both sides
+SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sign in (-1.0, 1.0)] + [0.0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,9 @@ def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
         reach = 1.3 * float(np.abs(plane.y(motions[0])).max())
         for panel in axes.flat:
             panel.set_yscale("symlog", linthresh=reach, linscale=1.2)
+            panel.yaxis.set_major_locator(FixedLocator(SPIKE_TICKS))
             panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            panel.yaxis.set_minor_locator(FixedLocator([]))
             panel.axhspan(-reach, reach, color="#f4f6f8", zorder=0, lw=0)
     axes[0, 0].set_ylabel(f"phase plot\n{plane.y_label}")
     axes[1, 0].set_ylabel(f"section\n{plane.y_label}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, cast
@@ -18,6 +19,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 INK, SOFT, GRID = "#222222", "#6b6b6b", "#e3e3e3"
+#: letters per inch of a line of a heading
+TITLE_LETTERS, SUBTITLE_LETTERS = 9.4, 14.0
 
 RC: dict[str, Any] = {
     "figure.dpi": 100,
@@ -87,13 +90,16 @@ def plain(axis: Axis) -> None:
 
 
 def heading(figure: Figure, title: str, subtitle: str = "") -> None:
-    """Title at the left, and a softer line below it."""
-    text = title if not subtitle else f"{title}\n"
-    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK)
-    if subtitle:
-        figure.text(
-            0.012, 0.995 - 0.27 / figure.get_figheight(), subtitle, ha="left", va="top", fontsize=8.6, color=SOFT
-        )
+    """Title at the left, and a softer text below it; both in as many lines as the width asks for."""
+    width = figure.get_figwidth()
+    lines = textwrap.wrap(title, round(TITLE_LETTERS * width))
+    below = textwrap.wrap(subtitle, round(SUBTITLE_LETTERS * width))
+    # the layout leaves room for the title's lines: empty ones are for the text below
+    text = "\n".join([*lines, *("" for _ in below)])
+    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold", color=INK, parse_math=False)
+    if below:
+        top = 0.995 - (0.07 + 0.2 * len(lines)) / figure.get_figheight()
+        figure.text(0.012, top, "\n".join(below), ha="left", va="top", fontsize=8.6, color=SOFT)
 
 
 def shared_legend(figure: Figure, axes: Axes, columns: int) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,6 +38,7 @@ class Actors:
     rigid: tuple[Any, ...]
     balls: tuple[Any, ...]
     flexible: tuple[pv.PolyData, ...]
+    pins: tuple[Any, ...] = ()
 
 
 def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> np.ndarray:
@@ -51,9 +52,14 @@ def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> n
     return result
 
 
-def film(drawn: Mechanism, post: xr.Dataset, progress: Progress = silent) -> tuple[str, bytes]:
-    """File suffix and content: MP4 where ffmpeg is there, else GIF; the whole run in SECONDS."""
-    frames = _frames(drawn, post, progress)
+def film(
+    drawn: Mechanism, post: xr.Dataset, watched: Sequence[str] = (), progress: Progress = silent
+) -> tuple[str, bytes]:
+    """File suffix and content: MP4 where ffmpeg is there, else GIF; the whole run in SECONDS.
+
+    watched: names of bodies, joints and contacts, of which the first of each is shown beside the mechanism.
+    """
+    frames = _frames(drawn, post, watched, progress)
     return write(frames, RATE)
 
 
@@ -89,18 +95,16 @@ def write(frames: Iterator[np.ndarray], rate: int) -> tuple[str, bytes]:
         return path.suffix.lstrip("."), path.read_bytes()
 
 
-def _frames(drawn: Mechanism, post: xr.Dataset, progress: Progress) -> Iterator[np.ndarray]:
+def _frames(drawn: Mechanism, post: xr.Dataset, watched: Sequence[str], progress: Progress) -> Iterator[np.ndarray]:
     time = drawn.run.time.values
     steps = np.searchsorted(time, np.linspace(time[0], time[-1], round(SECONDS * RATE)) - 1e-9)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
     _look(scene, drawn)
     slow = SECONDS / (time[-1] - time[0])
-    scene.add_text(
-        f"{slow:.0f} times slower{_exaggeration(drawn)}", position=(16, HEIGHT - 34), font_size=9, color=SOFT
-    )
+    scene.add_text(f"{_pace(slow)}{_exaggeration(drawn)}", position=(16, HEIGHT - 34), font_size=9, color=SOFT)
     with style.style():
-        plots = panel(drawn.run, post, (SIDE, HEIGHT))
+        plots = panel(drawn.run, post, (SIDE, HEIGHT), watched)
         for k, step in enumerate(steps):
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
@@ -108,6 +112,12 @@ def _frames(drawn: Mechanism, post: xr.Dataset, progress: Progress) -> Iterator[
             if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")
     scene.close()
+
+
+def _pace(slow: float) -> str:
+    if 0.95 < slow < 1.05:
+        return "as fast as it is"
+    return f"{slow:.3g} times slower" if slow > 1.0 else f"{1.0 / slow:.3g} times faster"
 
 
 def _exaggeration(drawn: Mechanism) -> str:
@@ -134,7 +144,11 @@ def _build(scene: pv.Plotter, drawn: Mechanism) -> Actors:
         )
         for ball in drawn.balls
     )  # fmt: skip
-    return Actors(rigid, balls, tuple(_flexible(scene, drawn, body) for body in drawn.flexible))
+    pins = tuple(
+        scene.add_mesh(pin.mesh, color=JOINT_COLOR if pin.contact is None else CLEARANCE_COLOR, specular=0.4)
+        for pin in drawn.pins
+    )
+    return Actors(rigid, balls, tuple(_flexible(scene, drawn, body) for body in drawn.flexible), pins)
 
 
 def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyData:
@@ -157,12 +171,20 @@ def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
         actor.position = run.frame_position.values[step, ball.frame]
         if ball.contact is not None:
             actor.prop.color = IMPACT_COLOR if glow else CLEARANCE_COLOR
+    for pin, actor in zip(drawn.pins, actors.pins, strict=True):
+        matrix = np.eye(4) if pin.owner is None else pose(run, pin.owner, step)
+        matrix[:3, 3] = run.frame_position.values[step, pin.frame]
+        actor.user_matrix = matrix
+        if pin.contact is not None:
+            actor.prop.color = IMPACT_COLOR if glow else CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
         mesh.points, mesh["deflection"] = placed(run, bent, step)
 
 
 def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:
-    """A pale disc under the mechanism."""
+    """A pale disc under the mechanism; none behind a planar one."""
+    if drawn.view.planar:
+        return
     bottom = min(drawn.run.frame_position.values[..., 2].min(), drawn.run.position.values[..., 2].min())
     level = float(bottom) - 0.05 * drawn.size
     disc = pv.Disc(
@@ -176,7 +198,9 @@ def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:
 
 
 def _look(scene: pv.Plotter, drawn: Mechanism) -> None:
-    direction = np.array([-0.95, 1.45, 0.68])
-    centre = drawn.centre - np.array([0.0, 0.0, 0.04 * drawn.size])
-    scene.camera_position = [tuple(centre + 1.12 * drawn.size * direction), tuple(centre), (0.0, 0.0, 1.0)]
+    seen = drawn.view
+    centre = drawn.centre - (0.0 if seen.planar else 0.04) * drawn.size * seen.up
+    reach = 0.85 if seen.planar else 1.12
+    eye = centre + reach * drawn.size * seen.direction
+    scene.camera_position = [tuple(eye), tuple(centre), tuple(seen.up)]
     scene.enable_anti_aliasing("msaa", multi_samples=8)

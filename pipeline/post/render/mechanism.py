@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +11,10 @@ import pyvista as pv
 import xarray as xr
 
 from pipeline.core.algebra import quaternion_to_matrix
+from pipeline.core.scene.fields import Pose
 from pipeline.post.body_shape import scale_to, surface
-from pipeline.post.render.solids import Solid, equivalent, mesh
+from pipeline.post.render.solids import Solid, equivalent, link, mesh, plate
+from pipeline.post.render.view import View, view
 from pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -22,6 +24,12 @@ JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf",
 JOINT_SHARE = 0.03
 #: radius of the arms from a body to its frames, as a share of the mechanism's size
 ARM_SHARE = 0.014
+#: half width of links, radius of pins, and largest half extent of a body with one place, as shares of it
+LINK_SHARE, PIN_SHARE, LARGEST_LONE = 0.016, 0.014, 0.12
+#: a solid is slender where it is so many times longer than thick
+SLENDER = 2.5
+#: size of what has none: one body that rests [m]
+LONE = 1.0
 #: a body with at most so many frames that surrounds a joint is drawn translucent: it is the joint's socket
 SOCKET_FRAMES = 3
 #: largest drawn deformation as a share of the body's length
@@ -58,6 +66,16 @@ class Ball:
 
 
 @dataclass(frozen=True, slots=True)
+class Pin:
+    """A pin of a joint that turns about one axis: its frame, mesh about it, index of the body that it turns with."""
+
+    frame: int
+    owner: int | None  #: None for the world
+    mesh: pv.PolyData
+    contact: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class Mechanism:
     """All that is drawn of one run."""
 
@@ -65,22 +83,27 @@ class Mechanism:
     rigid: tuple[Rigid, ...]
     flexible: tuple[Flexible, ...]
     balls: tuple[Ball, ...]
+    pins: tuple[Pin, ...]
+    view: View
     centre: np.ndarray
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
 
 
-def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
-    """The drawn mechanism of a run; bundles by name of the flexible body."""
+def mechanism(
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], direction: Sequence[float] | None = None
+) -> Mechanism:
+    """The drawn mechanism of a run; bundles by name of the flexible body, direction as of `render.view`."""
     told = parameters(run)
     flexible = tuple(_flexible(run, name, bundle) for name, bundle in bundles.items() if name in run.body.values)
     places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
     shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     low, high = shown.min(axis=0), shown.max(axis=0)
-    size = float(np.linalg.norm(high - low)) or 1.0
+    size = float(np.linalg.norm(high - low)) or LONE
     balls = _balls(run, told, JOINT_SHARE * size)
     solids = _solids(run, told.get("body", {}), bundles)
-    rigid = _rigid(run, solids, balls, _spherical_frames(told), ARM_SHARE * size)
-    return Mechanism(run, rigid, flexible, balls, 0.5 * (low + high), size)
+    rigid = _rigid(run, solids, balls, _spherical_frames(told), size)
+    pins = _pins(run, told, bundles, PIN_SHARE * size)
+    return Mechanism(run, rigid, flexible, balls, pins, view(run, told, direction), 0.5 * (low + high), size)
 
 
 def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
@@ -117,9 +140,14 @@ def _solids(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.D
 
 
 def _rigid(
-    run: xr.Dataset, solids: Mapping[str, Solid | None], balls: tuple[Ball, ...], sockets: set[str], arm: float
+    run: xr.Dataset, solids: Mapping[str, Solid | None], balls: tuple[Ball, ...], sockets: set[str], size: float
 ) -> tuple[Rigid, ...]:
-    """Rigid bodies; one whose centre of mass lies inside its joint's ball is drawn by that ball and its arms."""
+    """Rigid bodies; one whose centre of mass lies inside its joint's ball is drawn by that ball and its arms.
+
+    The equivalent solid of a body is drawn where it can be the body itself: where it is no larger than what its
+    frames span. Else a link between the frames is.
+    """
+    arm = ARM_SHARE * size
     names, known = _names(run, "body"), _names(run, "frame")
     radius = {known[ball.frame]: ball.radius for ball in balls}
     kinds: dict[tuple[float, ...], str] = {}
@@ -127,7 +155,9 @@ def _rigid(
     for name, given in solids.items():
         frames = _frames(run, names.index(name), name)
         inside = any(np.linalg.norm(origin) < radius.get(frame, 0.0) for frame, origin in frames.items())
-        solid = None if inside else given
+        solid = None if inside else _plausible(given, frames, size)
+        if solid is not None:
+            solid = plate(solid, np.array(list(frames.values())).reshape(-1, 3))
         # a slim solid is drawn with slim arms
         width = arm if solid is None else min(arm, float(np.sort(solid.half)[1]))
         holds = solid is not None and any(solid.holds(frames[frame]) for frame in frames if frame in sockets)
@@ -138,8 +168,69 @@ def _rigid(
         else:
             kind = () if solid is None else tuple(np.round(1e3 * solid.half, 1))
             color, opacity = kinds.setdefault(kind, COLORS[len(kinds) % len(COLORS)]), 1.0
-        result.append(Rigid(names.index(name), mesh(solid, frames, width), color, opacity))
+        drawn = mesh(solid, frames, width) if solid is not None or inside else link(frames, LINK_SHARE * size)
+        result.append(Rigid(names.index(name), drawn, color, opacity))
     return tuple(result)
+
+
+def _plausible(solid: Solid | None, frames: Mapping[str, np.ndarray], size: float) -> Solid | None:
+    """The equivalent solid, made smaller where a body with one place is far larger than the mechanism; None for a link.
+
+    A body whose frames lie apart is a link where its solid reaches beyond them, as the disc does that has the inertia
+    of a crank, or where it is slender and lies across them.
+    """
+    if solid is None:
+        return None
+    places = np.array(list(frames.values()) or [np.zeros(3)])
+    span = float(np.linalg.norm(places[:, None] - places[None], axis=-1).max())
+    reach = float(solid.half.max())
+    if span <= JOINT_SHARE * size:  # all frames in one place: a block or a disc there
+        most = LARGEST_LONE * size
+        return solid if reach <= most else Solid(solid.axes, solid.half * most / reach, solid.round)
+    along = places[int(np.linalg.norm(places - places[0], axis=1).argmax())] - places[0]
+    axis = solid.axes[:, int(solid.half.argmax())]
+    slender = reach > SLENDER * float(np.sort(solid.half)[1])
+    if slender:
+        return solid if abs(axis @ along) > 0.9 * np.linalg.norm(along) and 2.0 * reach < 1.5 * span else None
+    flat = float(solid.half.min()) < 0.35 * reach
+    # a plate or a platform carries its joints; a disc about one pin of two is the inertia of a link, not its shape
+    return solid if flat and len(places) > 2 and 2.0 * reach < 2.2 * span else None
+
+
+def _pins(
+    run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], radius: float
+) -> tuple[Pin, ...]:
+    """A pin at the second frame of each joint that turns about one axis, along z of that frame."""
+    bodies, frames, contacts = _names(run, "body"), _names(run, "frame"), _names(run, "contact")
+    found = []
+    for name, joint in told.get("joint", {}).items():
+        frame = joint["between"][1]
+        if "revolute" not in joint["type"] or frame not in frames:
+            continue
+        body = frame.partition(".")[0]
+        axis = _axes(told, bundles, frame)[:, 2]
+        own = float(joint.get("pin_radius", radius))
+        drawn = pv.Cylinder(
+            center=(0, 0, 0),
+            direction=axis,
+            radius=min(max(own, radius), 2.0 * radius),
+            height=float(min(max(joint.get("length", 0.0), 3.2 * radius), 4.0 * radius)),
+            resolution=40,
+        )
+        mesh = drawn.triangulate().compute_normals(split_vertices=True, feature_angle=40.0)
+        owner = bodies.index(body) if body in bodies else None
+        found.append(Pin(frames.index(frame), owner, mesh, contacts.index(name) if name in contacts else None))
+    return tuple(found)
+
+
+def _axes(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str) -> np.ndarray:
+    """Axes of a named frame in those of its body, columns, shape (3, 3)."""
+    body, _, name = frame.partition(".")
+    if body in bundles:
+        rotation: np.ndarray = bundles[body]["frame_rotation"].sel(frame=name).values
+        return rotation
+    pose = told.get("body", {}).get(body, {}).get("frames", {}).get(name, {})
+    return quaternion_to_matrix(Pose.model_validate(pose).as_quaternion())
 
 
 def _frames(run: xr.Dataset, index: int, body: str) -> dict[str, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,8 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from pipeline.post.models import PLATFORM
+from pipeline.post.overview.figures import orbit
 from pipeline.post.plotting import style
+
+#: a body that turns by less does not turn [degrees]
+STILL = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,17 +40,27 @@ class Panel:
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int]) -> Panel:
-    """Plots of one run: the watched body's motion, the reaction, and the ball in its socket where there is one."""
+def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Sequence[str] = ()) -> Panel:
+    """Plots of one run: the watched body's motion, a reaction, and a ball or pin in its socket where there is one.
+
+    watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves
+    farthest, the first contact, the first joint.
+    """
     contact = "contact" in run.sizes
     canvas = FigureCanvasAgg(
         Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.1))
     )
     figure = canvas.figure
     axes = figure.subplots(3 if contact else 2, 1, height_ratios=[1, 1, 1.7] if contact else [1, 1])
-    cursors = [_motion(axes[0], run, post), (_reaction if post.sizes["joint"] else _energy)(axes[1], run, post)]
+    cursors = [_motion(axes[0], run, post, _body(run, watch))]
+    if post.sizes["joint"]:
+        cursors.append(_reaction(axes[1], run, post, watch))
+    else:
+        cursors.append(_energy(axes[1], run, post))
     if contact:
-        cursors.append(_socket(axes[2], run, post))
+        number = _first(run["contact"].values, watch) or 0
+        x, y = orbit(axes[2], run, float(post.clearance[number]), number)
+        cursors.append((_dot(axes[2], 7), x, y))
     figure.suptitle(" ", fontsize=13)  # keeps the place of the clock
     clock = figure.text(
         0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
@@ -55,34 +69,47 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int]) -> Panel:
     return Panel(canvas, canvas.copy_from_bbox(figure.bbox), tuple(cursors), clock, run.time.values)
 
 
-def watched(run: xr.Dataset) -> int:
-    """The platform where there is one, else the body that moves farthest."""
-    names = [str(body) for body in run.body.values]
-    if PLATFORM in names:
-        return names.index(PLATFORM)
+def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
+    """Index of the first watched one among names; None where none is watched."""
+    known = [str(name) for name in names]
+    return next((known.index(name) for name in watch if name in known), None)
+
+
+def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
+    """The first watched body; else the one that moves farthest."""
+    found = _first(run.body.values, watch)
+    if found is not None:
+        return found
     way = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
     return int(np.argmax(way.max(axis=0)))
 
 
-def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
-    body = watched(run)
-    angle = np.degrees(post.rotation.values[:, body])
-    axes.set_title(f"{run.body.values[body]}: rotation (°)")
-    return _curve(axes, run, angle, "#0072B2")
+def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> tuple[Any, np.ndarray, np.ndarray]:
+    """How far the body has turned, or, where it does not turn, how far it has gone along the axis of its way."""
+    angle, moved = np.degrees(post.rotation.values[:, body]), post.displacement.values[:, body]
+    if angle.max() > STILL:
+        axes.set_title(f"{run.body.values[body]}: rotation (°)")
+        return _curve(axes, run, angle, "#0072B2")
+    axis = int(np.argmax(np.ptp(moved, axis=0)))
+    axes.set_title(f"{run.body.values[body]}: displacement along {'xyz'[axis]} (mm)")
+    return _curve(axes, run, 1e3 * moved[:, axis], "#0072B2")
 
 
-def _reaction(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
-    name = str(run.contact.values[0]) if "contact" in run.sizes else str(post.joint.values[0])
-    force = post.reaction.sel(joint=name).values
-    kind = "contact force" if "contact" in run.sizes else "reaction"
-    axes.set_title(f"{name}: {kind} (N)")
-    return _curve(axes, run, force, "#D55E00", 0.8)
+def _reaction(
+    axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]
+) -> tuple[Any, np.ndarray, np.ndarray]:
+    contacts = [str(name) for name in run.contact.values] if "contact" in run.sizes else []
+    joints = [str(name) for name in post.joint.values]
+    name = next((name for name in watch if name in contacts or (name in joints and not contacts)), None)
+    name = name or (contacts or joints)[0]
+    axes.set_title(f"{name}: {'contact force' if name in contacts else 'reaction'} (N)")
+    return _curve(axes, run, post.reaction.sel(joint=name).values, "#D55E00", 0.8)
 
 
 def _energy(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
     """Instead of a reaction, where there is no joint."""
     axes.set_title("kinetic energy (J)")
-    return _curve(axes, run, run.kinetic.values, "#D55E00")
+    return _curve(axes, run, run.kinetic.values, "#0072B2")
 
 
 def _curve(
@@ -91,23 +118,10 @@ def _curve(
     time = 1e3 * run.time.values
     axes.plot(time, values, color=color, lw=width)
     axes.set(xlabel="time (ms)", xlim=(time[0], time[-1]))
-    (dot,) = axes.plot([], [], "o", color=style.INK, ms=6, animated=True)
-    return dot, time, values
+    return _dot(axes, 6), time, values
 
 
-def _socket(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
-    x, y = 1e3 * run.contact_offset.values[:, 0, 0], 1e3 * run.contact_offset.values[:, 0, 2]
-    radius = 1e3 * float(post.clearance[0])
-    turn = np.linspace(0.0, 2.0 * np.pi, 181)
-    axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
-    axes.plot(x, y, color="#009E73", lw=0.5, alpha=0.7)
-    axes.set_title("ball centre in the socket (mm)")
-    axes.set(
-        xlabel="x",
-        ylabel="z",
-        aspect="equal",
-        xlim=(-1.15 * radius, 1.15 * radius),
-        ylim=(-1.15 * radius, 1.15 * radius),
-    )
-    (dot,) = axes.plot([], [], "o", color=style.INK, ms=7, animated=True)
-    return dot, x, y
+def _dot(axes: style.Axes, size: float) -> Any:
+    """The mark that moves along a curve."""
+    (dot,) = axes.plot([], [], "o", color=style.INK, ms=size, animated=True)
+    return dot

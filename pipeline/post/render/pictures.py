@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -16,23 +16,30 @@ from pipeline.post.series import derive
 
 
 def pictures(
-    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], post: xr.Dataset | None = None, progress: Progress = silent
+    run: xr.Dataset,
+    bundles: Mapping[str, xr.Dataset],
+    post: xr.Dataset | None = None,
+    progress: Progress = silent,
+    *,
+    watched: Sequence[str] = (),
+    direction: Sequence[float] | None = None,
 ) -> dict[str, bytes]:
     """File contents by name: ``mechanism.png``, ``film.mp4`` (or gif), ``mode_<body>.html``, ``modes_<body>.vtu``.
 
-    run: schema RUN.  bundles: schema BUNDLE by name of the flexible body.  Without GL libraries the
+    run: schema RUN.  bundles: schema BUNDLE by name of the flexible body.  watched: as of `film.film`.
+    direction: from the mechanism to the eye, instead of what suits it.  Without GL libraries the
     result is empty, and one line on stderr says what to install.
     """
     if not gl.works():
-        print(f"flexclear: no pictures; {gl.REMEDY}", file=sys.stderr)
+        print(f"flexclear: no pictures; {gl.remedy()}", file=sys.stderr)
         return {}
     # pyvista is imported only where it can draw
     from pipeline.post.render import film, mechanism
 
     post = derive(run) if post is None else post
-    drawn = mechanism.mechanism(run, bundles)
+    drawn = mechanism.mechanism(run, bundles, direction)
     result = {"mechanism.png": png(film.still(drawn, _farthest(run)))}
-    suffix, content = film.film(drawn, post, progress)
+    suffix, content = film.film(drawn, post, watched, progress)
     result[f"film.{suffix}"] = content
     for body, bundle in bundles.items():
         result |= shape_files(body, bundle)

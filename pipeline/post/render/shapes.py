@@ -1,4 +1,4 @@
-"""Mode shapes of a body: still pictures, a page to turn in the browser, and a file for ParaView."""
+"""Mode shapes of a body: a page to turn in the browser, and a file for ParaView."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import xarray as xr
 
 from pipeline.post.body_shape import box, faces, is_rod, scale_to, surface
 from pipeline.post.render import offline
-from pipeline.post.render.stage import image, plotter, shading, skin
+from pipeline.post.render.stage import plotter, shading, skin
 from pipeline.post.rod_shape import AROUND
 
 #: drawn size of the largest displacement, as a share of the body's length
@@ -22,21 +22,11 @@ COLORS: Literal["viridis"] = "viridis"
 CELLS = {1: pv.CellType.VERTEX, 2: pv.CellType.LINE, 3: pv.CellType.TRIANGLE, 4: pv.CellType.QUAD}
 
 
-def picture(bundle: xr.Dataset, mode: int, size: tuple[int, int] = (900, 430)) -> np.ndarray:
-    """Deformed body coloured by displacement over its undeformed ghost, shape (height, width, 3)."""
-    scene = plotter(size)
-    _draw(scene, bundle, mode)
-    _look(scene, bundle)
-    result = image(scene)
-    scene.close()
-    return result
-
-
 def page(bundle: xr.Dataset, mode: int) -> bytes:
     """A self-contained HTML page with one mode shape that can be turned in the browser."""
     scene = plotter((900, 600))
     _draw(scene, bundle, mode)
-    _look(scene, bundle, parallel=False)
+    _look(scene, bundle)
     content = offline.page(scene)
     scene.close()
     return content
@@ -73,14 +63,15 @@ def _draw(scene: pv.Plotter, bundle: xr.Dataset, mode: int) -> None:
     scene.add_mesh(
         body, scalars="displacement", cmap=COLORS, clim=(0.0, 1.0), specular=0.25, show_scalar_bar=False, **look
     )
-    if is_rod(bundle):
+    if is_rod(bundle) and size.max() < 1e-9:
+        # lines along the rod show its twist; where it bends they would be drawn in and out of its skin
         rings = points.reshape(-1, AROUND + 1, 3)
         for k in range(0, AROUND, 6):
             scene.add_mesh(pv.lines_from_points(rings[1:-1, k]), color="#ffffff", opacity=0.55, line_width=1.5)
 
 
-def _look(scene: pv.Plotter, bundle: xr.Dataset, *, parallel: bool = True) -> None:
-    """From above and in front, the body's length across the picture; the browser's view knows perspective only."""
+def _look(scene: pv.Plotter, bundle: xr.Dataset) -> None:
+    """From above and in front, the body's length across the picture, in perspective as the browser's view has it."""
     x = bundle.node_position.values
     (axis, *_), (length, *others) = box(bundle)
     axis = axis * (1.0 if axis @ (x[-1] - x[0]) >= 0.0 else -1.0)
@@ -90,7 +81,4 @@ def _look(scene: pv.Plotter, bundle: xr.Dataset, *, parallel: bool = True) -> No
     centre = 0.5 * (x.min(axis=0) + x.max(axis=0))
     # half the picture's height; the length of a slender body fills its width
     half = 0.30 * length + 0.5 * float(np.linalg.norm(others))
-    reach = (3.0 if parallel else 1.7) * half / 0.30
-    scene.camera_position = [tuple(centre + reach * direction), tuple(centre), tuple(up)]
-    scene.camera.parallel_projection = parallel
-    scene.camera.parallel_scale = half
+    scene.camera_position = [tuple(centre + 1.7 * half / 0.30 * direction), tuple(centre), tuple(up)]

@@ -25,7 +25,11 @@ def _shares(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-ShearCoefficient = Annotated[tuple[Number, Number], BeforeValidator(_pair), AfterValidator(_shares)]
+ShearCoefficient = Annotated[
+    tuple[Number, Number],
+    BeforeValidator(_pair, json_schema_input_type=Number | tuple[Number, Number]),
+    AfterValidator(_shares),
+]
 
 
 class CircleSection(Part):

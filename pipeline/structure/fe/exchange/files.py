@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,10 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from pipeline.core.errors import InputError
+from pipeline.core import machine
+from pipeline.core.errors import FlexclearError, InputError, shown
+from pipeline.structure.fe.exchange import market
+from pipeline.structure.fe.exchange.market import COPIES, SMALLER
 from pipeline.structure.fe.model import Model
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz", "internal")
@@ -99,6 +103,9 @@ def moments(model: Model) -> dict[str, Any]:
 def read_npz(path: Path, where: str) -> Contents:
     """A file as `write_npz` makes it; InputError when something is missing."""
     try:
+        with zipfile.ZipFile(path) as packed:
+            need = sum(entry.file_size for entry in packed.infolist())
+        machine.require_memory(COPIES * need, f"{where}: '{path.name}' unpacked", SMALLER)
         with np.load(path, allow_pickle=False) as file:
             data = {name: file[name] for name in file.files}
         found = Table(data.pop("node"), data.pop("component"), data.pop("position"))
@@ -107,8 +114,11 @@ def read_npz(path: Path, where: str) -> Contents:
         for name in ("stiffness", "mass"):
             row, column, value = (data.pop(f"{name}_{part}") for part in ("row", "column", "value"))
             matrices.append(sp.coo_array((value, (row, column)), shape=(n, n)))
-    except (OSError, ValueError, KeyError) as error:
-        raise InputError(where, f"'{path.name}' holds no matrices: {error}", "write it with exchange.files") from None
+    except FlexclearError:
+        raise
+    except Exception as error:  # damaged, it makes readers of zip, zlib and NumPy fail in ways of their own
+        reason = shown(str(error) or type(error).__name__)
+        raise InputError(where, f"'{path.name}' holds no matrices: {reason}", "write it with exchange.files") from None
     return Contents(matrices[0], matrices[1], found, data)
 
 
@@ -126,9 +136,12 @@ def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:
     try:
-        return sp.coo_array(scipy.io.mmread(path))
-    except (OSError, ValueError) as error:
-        raise InputError(where, f"'{path.name}' is no MatrixMarket file: {error}") from None
+        return market.read(path, where)
+    except FlexclearError:
+        raise
+    except Exception as error:  # damaged, it makes readers of text and archives fail in ways of their own
+        reason = shown(str(error) or type(error).__name__)
+        raise InputError(where, f"'{path.name}' is no MatrixMarket file: {reason}") from None
 
 
 def _component(text: str) -> int:
@@ -145,7 +158,7 @@ def _table(path: Path, where: str) -> Table:
         node = np.array([int(row["node"]) for row in rows])
         position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
         component = np.array([_component(row["component"]) for row in rows])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, csv.Error, OverflowError) as error:
         hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
         raise InputError(where, f"'{path.name}' is no table of unknowns: {error}", hint) from None
     return Table(node, component, position.reshape(-1, 3))

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pipeline.core import machine
 from pipeline.core.errors import InputError
 from pipeline.core.units import UNITS
+from pipeline.core.workflow import opened
 from pipeline.structure.fe.solid.elements import ELEMENTS
 from pipeline.structure.fe.solid.geometry import Geometry
 from pipeline.structure.fe.solid.recipe import MeshFile
@@ -47,6 +50,9 @@ def _read(path: Path, where: str) -> Any:
 
     if not path.is_file():
         raise InputError(where, f"there is no file {path}", "paths are relative to the recipe")
+    # text of 20 bytes becomes a number of 8, but meshes are in memory several times while they are read
+    machine.require_memory(5.0 * path.stat().st_size, f"{where}: '{path.name}'", "use a coarser mesh")
+    _note_companions(path)
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
@@ -58,6 +64,13 @@ def _read(path: Path, where: str) -> Any:
     except Exception as error:
         reason = str(error) or type(error).__name__
         raise InputError(where, f"meshio cannot read '{path.name}': {reason}", REWRITE) from None
+
+
+def _note_companions(path: Path) -> None:
+    """XDMF keeps its numbers in HDF5 files, which a library in C opens."""
+    if path.suffix in (".xdmf", ".xmf"):
+        for name in set(re.findall(r"([^\s<>]+\.h5):", path.read_text(errors="replace"))):
+            opened.note(path.parent / name)
 
 
 def _cell_type(mesh: Any, where: str) -> str:

@@ -1,0 +1,1 @@
+"""The mechanism's geometry, as far as the paper's Table 8 tells it: a family of layouts, and what it predicts."""

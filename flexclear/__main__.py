@@ -1,0 +1,8 @@
+"""``python -m flexclear``: the command."""
+
+import sys
+
+from stages.__main__ import main
+
+if __name__ == "__main__":
+    sys.exit(main())

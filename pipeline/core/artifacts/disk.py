@@ -1,0 +1,217 @@
+"""Files that are there in full or not at all, that carry their own digest, that are shown as copies; locks; sweeping.
+
+Temporary files and locks of a process that died are left behind, whatever it died of; `sweep` knows them by the name
+of their owner, or by nobody holding them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import fcntl
+import hashlib
+import json
+import os
+import platform
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pipeline.core.errors import ResourceError
+
+#: what a full or limited disk answers
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+#: temporary files of other machines that share the disk are swept when they are so old [s]
+FORGOTTEN = 7 * 86400.0
+#: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
+FICLONE = 0x40049409
+_TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\.[0-9a-f]{8}\.tmp")
+
+
+def sha256(content: bytes) -> str:
+    """Hexadecimal digest."""
+    return hashlib.sha256(content).hexdigest()
+
+
+def publish(path: Path, content: bytes) -> str:
+    """Write a file so that it is either there in full or not at all; returns its sha256."""
+    with temporary(path) as made:
+        made.write_bytes(content)
+        if made.read_bytes() != content:
+            raise OSError(errno.EIO, "what was written does not read back", str(path))
+        settle(made, path)
+    return sha256(content)
+
+
+def checked(table: Mapping[str, Any]) -> bytes:
+    """A table as a file that carries its own digest: ``{"content": ..., "sha256": ...}``."""
+    whole = {"content": table, "sha256": _digest(table)}
+    return json.dumps(whole, indent=1, sort_keys=True, ensure_ascii=False).encode() + b"\n"
+
+
+def read_checked(path: Path) -> dict[str, Any] | None:
+    """The table in a file that `checked` made; None when there is none or one bit of it has changed."""
+    try:
+        whole = json.loads(path.read_bytes())
+        table = whole["content"]
+        return dict(table) if whole["sha256"] == _digest(table) else None
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+
+
+def _digest(table: Mapping[str, Any]) -> str:
+    return sha256(json.dumps(table, sort_keys=True, ensure_ascii=False).encode())
+
+
+def copy(source: Path, target: Path) -> None:
+    """Let `target` be a read-only copy with the time of `source`; it takes no space where the disk can share bytes."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with temporary(target) as made:
+        with source.open("rb") as old, made.open("wb") as new:
+            try:
+                fcntl.ioctl(new.fileno(), FICLONE, old.fileno())
+            except OSError:
+                shutil.copyfileobj(old, new, 1 << 20)
+        status = source.stat()
+        os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
+        made.chmod(0o444)
+        os.replace(made, target)
+
+
+def is_copy(source: Path, target: Path) -> bool:
+    """Whether `target` is as `copy` left it: of its own, of equal size and time."""
+    try:
+        old, new = source.stat(), target.stat()
+    except OSError:
+        return False
+    apart = (old.st_dev, old.st_ino) != (new.st_dev, new.st_ino)
+    return apart and (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
+
+
+@contextlib.contextmanager
+def temporary(path: Path) -> Iterator[Path]:
+    """A name beside `path` that no other process uses; gone afterwards, however it ends."""
+    stem = path.name.lstrip(".").partition(".")[0]
+    made = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
+    try:
+        yield made
+    finally:
+        made.unlink(missing_ok=True)
+
+
+def settle(made: Path, path: Path) -> None:
+    """Force the bytes to the disk, give the file its name, and force that to the disk."""
+    with made.open("rb") as file:
+        os.fsync(file.fileno())
+    os.replace(made, path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        with contextlib.suppress(OSError):  # some file systems know no such thing
+            os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+@contextlib.contextmanager
+def disk_limits(folder: Path) -> Iterator[None]:
+    """OSError on the way to disk, as a limit of the machine, in words."""
+    try:
+        yield
+    except OSError as error:
+        why = "the disk is full or a file size limit was reached" if error.errno in FULL else str(error.strerror)
+        raise ResourceError(f"cannot write below {folder}: {why}; nothing half-written was left") from None
+
+
+@contextlib.contextmanager
+def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambda: None) -> Iterator[bool]:
+    """Whether this process has the lock of a file, which is gone afterwards; `waiting` is called before it waits.
+
+    The system drops the lock of a process that dies, whatever it dies of.
+    """
+    handle = _locked(path, wait, waiting)
+    try:
+        yield handle is not None
+    finally:
+        if handle is not None:
+            path.unlink(missing_ok=True)  # while it is held: who waits for it will look for the file again
+            os.close(handle)
+
+
+def _locked(path: Path, wait: bool, waiting: Callable[[], None]) -> int | None:
+    while True:
+        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            if not _try_lock(handle):
+                if not wait:
+                    os.close(handle)
+                    return None
+                waiting()
+                fcntl.flock(handle, fcntl.LOCK_EX)
+        except BaseException:
+            os.close(handle)
+            raise
+        if _is(path, handle):
+            return handle
+        os.close(handle)
+
+
+def _is(path: Path, handle: int) -> bool:
+    """Whether a name still belongs to an open file."""
+    try:
+        return os.path.samestat(os.stat(path), os.fstat(handle))
+    except OSError:
+        return False
+
+
+def _try_lock(handle: int) -> bool:
+    """False when another process holds it. A file system without locks counts as free: unique
+    temporary names and atomic replacement keep results right, work may then be done twice."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+    return True
+
+
+def sweep(root: Path) -> int:
+    """Remove temporary files and locks below `root` that processes left which are no more; how many."""
+    removed = 0
+    for folder, _, names in os.walk(root):
+        for name in names:
+            path = Path(folder, name)
+            if name.endswith(".tmp") and _abandoned(path):
+                with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps
+                    path.unlink()
+                    removed += 1
+            elif name.endswith(".lock"):
+                with contextlib.suppress(OSError), locked(path, wait=False) as mine:
+                    removed += mine  # gone when it is released
+    return removed
+
+
+def _abandoned(path: Path) -> bool:
+    found = _TEMPORARY.fullmatch(path.name)
+    if found is None:
+        return False  # none of ours
+    if found["host"] != _host():
+        with contextlib.suppress(OSError):
+            return time.time() - path.stat().st_mtime > FORGOTTEN
+        return False
+    try:
+        os.kill(int(found["pid"]), 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
+
+
+@cache
+def _host() -> str:
+    return sha256(platform.node().encode())[:8]

@@ -1,0 +1,123 @@
+"""The cache as a whole: what is in it, whether it is whole, what nobody needs any more."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.core.artifacts.disk import read_checked
+from pipeline.core.artifacts.store import Record, Store, read_record
+
+#: what stands beside artifacts and is none of their files
+BESIDE = (".json", ".lock", ".names", ".tmp")
+DAY = 86400.0
+#: a file of an artifact may be so long without its record [s]
+YOUNG = 3600.0
+
+
+@dataclass(frozen=True, slots=True)
+class Artifact:
+    """A record that can be read, bytes of its files and of itself, and seconds since it was made."""
+
+    record: Record
+    size: int
+    age: float
+
+
+@dataclass(frozen=True, slots=True)
+class Inventory:
+    """What is in a store. damaged: sentences.  unreadable: records.  orphans: files that no record names."""
+
+    artifacts: tuple[Artifact, ...]
+    damaged: tuple[str, ...]
+    unreadable: tuple[Path, ...]
+    orphans: tuple[Path, ...]
+
+
+def inventory(store: Store, *, whole: bool) -> Inventory:
+    """Everything below the cache folder; with `whole` every file is read and compared with its digest."""
+    artifacts, damaged, unreadable, known = [], [], [], set()
+    for path in _records(store):
+        record = read_record(path)
+        if record is None or store.path(record.stage, record.key, "json") != path:
+            unreadable.append(path)
+            continue
+        files = [path, *(store.path(record.stage, record.key, name) for name in record.files)]
+        known |= set(files)
+        fault = store.fault(record) if whole else None
+        if fault is not None:
+            damaged.append(fault)
+        there = [file.stat() for file in files if file.is_file()]
+        artifacts.append(Artifact(record, sum(s.st_size for s in there), time.time() - path.stat().st_mtime))
+    unreadable += [path for path in (store.root / "cache").glob("*/*.names") if read_checked(path) is None]
+    damaged += [f"{_below(store, path)} is no record, or damaged" for path in unreadable]
+    return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
+
+
+def prunable(store: Store, found: Inventory, older: float) -> list[Artifact]:
+    """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
+
+    What the shown ones were made from stays as well: without it they would be made again.
+    """
+    made = {artifact.record.digest: artifact.record for artifact in found.artifacts}
+    kept, waiting = set(), list(_shown(store))
+    while waiting:
+        record = waiting.pop()
+        if (record.stage, record.key) not in kept:
+            kept.add((record.stage, record.key))
+            above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
+            waiting += [made[digest] for digest in above if digest in made]
+    return [a for a in found.artifacts if a.age > older and (a.record.stage, a.record.key) not in kept]
+
+
+def remove(store: Store, artifact: Artifact) -> None:
+    """Its record first, so that at no moment there is a record of files that are gone."""
+    record = artifact.record
+    with store.lock(record.stage, record.key):
+        for name in ("json", *record.files):
+            store.path(record.stage, record.key, name).unlink(missing_ok=True)
+
+
+def find(store: Store, what: str) -> Record | None:
+    """The record behind a key or its beginning, or behind a shown file."""
+    path = Path(what)
+    if path.is_file():
+        for facts in (path.parent / ".facts").glob("*.json"):
+            record = read_record(facts)
+            if record is not None and any(_same(path, store.path(record.stage, record.key, f)) for f in record.files):
+                return record
+    found = [path for path in _records(store) if path.stem.startswith(what)]
+    return read_record(found[0]) if len(found) == 1 else None
+
+
+def _same(path: Path, other: Path) -> bool:
+    try:
+        return path.read_bytes() == other.read_bytes()
+    except OSError:
+        return False
+
+
+def _records(store: Store) -> list[Path]:
+    return sorted((store.root / "cache").glob("*/*.json"))
+
+
+def _shown(store: Store) -> Iterator[Record]:
+    for folder, _, names in os.walk(store.root):
+        if Path(folder).name == ".facts":
+            records = (read_record(Path(folder, name)) for name in names if name.endswith(".json"))
+            yield from (record for record in records if record is not None)
+
+
+def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
+    """Files of artifacts whose record is gone: a process died between them. Young ones may be about to get one."""
+    for path in sorted((store.root / "cache").glob("*/*")):
+        ours = path.is_file() and path not in known and not path.name.endswith(BESIDE)
+        if ours and time.time() - path.stat().st_mtime > YOUNG:
+            yield path
+
+
+def _below(store: Store, path: Path) -> str:
+    return str(path.relative_to(store.root.parent))

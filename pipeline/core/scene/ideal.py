@@ -1,0 +1,71 @@
+"""The ideal twin of a scene: clearance or flexibility taken away, everything else as it is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import edited
+from pipeline.core.scene.schema import Scene
+from pipeline.core.scene.wanted import parse
+
+#: effects that can be taken away, and how a scene without them is called
+EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}
+#: joint with clearance -> the joint that holds the same places together without
+WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
+#: keys of a flexible body that a rigid one from the same recipe has, too
+KEPT = ("mesh", "pose", "velocity", "angular_velocity")
+
+
+def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
+    """The scene without these effects; quantities that it then no longer has are not asked for.
+
+    Raises InputError when the scene has none of them.
+    """
+    changes: dict[str, Any] = {}
+    if "clearance" in effects:
+        for name, joint in scene.contacts().items():
+            changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[joint.type], "between": list(joint.between)}
+    if "flexibility" in effects:
+        for name, body in scene.flexible().items():
+            kept = body.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            changes[f"body.{name}"] = {"type": "rigid", **kept}
+    if not changes:
+        raise InputError(
+            str(scene.path or scene.name),
+            f"has nothing to take away: no {' and no '.join(effects)}",
+            "compare it with another scene: flexclear compare A B",
+        )
+    return edited(scene, changes | _without_owners(scene, effects))
+
+
+def _without_owners(scene: Scene, effects: tuple[str, ...]) -> dict[str, Any]:
+    """Edits of what is asked for, where what it is asked of is taken away."""
+    found: dict[str, Any] = {}
+    owners = scene.owners()
+    if "clearance" in effects and scene.contacts():
+        owners = {**owners, "contact": ()}
+        found["ensemble"] = None
+        if scene.accuracy is not None:
+            wanted = {
+                n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
+            }
+            rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
+            found["accuracy"] = {**rest, "quantities": wanted} if wanted else None
+        if scene.view is not None and scene.view.watch is not None:
+            watched = [name for name in scene.view.watch if _has(name, owners)]
+            found["view.watch"] = watched or None
+            if not watched:
+                found["view"] = None
+                del found["view.watch"]
+    if "flexibility" in effects and scene.output.stress is not None:
+        found["output"] = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
+    return found
+
+
+def _has(name: str, owners: dict[str, tuple[str, ...]]) -> bool:
+    try:
+        parse(name, owners)
+    except ValueError:
+        return False
+    return True

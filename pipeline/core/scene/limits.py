@@ -1,0 +1,73 @@
+"""What a scene may ask of the machine; what its run would ask is estimated in `demand`."""
+
+from __future__ import annotations
+
+import re
+from math import prod
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field, WithJsonSchema
+
+from pipeline.core.errors import ResourceError
+from pipeline.core.scene.fields import Part
+
+_UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
+_SIZE = re.compile(r"(\d{1,15}(?:\.\d{1,15})?) ?([kMGT]?B)")
+
+
+def _bytes(value: Any) -> Any:
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        return value
+    found = _SIZE.fullmatch(value.strip()) if isinstance(value, str) else None
+    if found is None:
+        raise ValueError(f"expected a size such as '4 GB', in {', '.join(_UNITS)}")
+    return float(found[1]) * _UNITS[found[2]]
+
+
+_TEXT = {"type": "string", "description": "size such as '4 GB'"}
+Bytes = Annotated[float, BeforeValidator(_bytes), Field(gt=0.0), WithJsonSchema(_TEXT)]
+
+
+class Limits(Part):
+    """What the work may take at most; it is estimated first, and refused at once (exit code 4).
+
+    memory, disk: default: four fifths of what is free.
+    parts: bodies, joints, drives and loads, of each at most so many.
+    cells: elements or cells of one mesh.  modes: elastic coordinates of one body.
+    """
+
+    memory: Bytes | None = None
+    disk: Bytes | None = None
+    parts: Annotated[int, Field(ge=1)] = 2000
+    cells: Annotated[int, Field(ge=1)] = 500_000
+    modes: Annotated[int, Field(ge=1)] = 2000
+
+    def written(self) -> dict[str, Any]:
+        """As a table that can be read again."""
+        return self.model_dump(exclude={"source"}, exclude_none=True)
+
+
+def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:
+    """ResourceError when a scene, not yet checked otherwise, has more parts of a family than it may."""
+    asked = table.get("limits")
+    most = asked.get("parts") if isinstance(asked, dict) else None
+    most = most if isinstance(most, int) else Limits().parts
+    for family in families:
+        count = len(table[family]) if isinstance(table.get(family), dict) else 0
+        if count > most:
+            raise ResourceError(
+                f"{path} [{family}]: there are {count}, more than the {most} that limits.parts allows; "
+                "the work grows with the square of their number and more"
+            )
+
+
+def check_cells(shape: Any, elements: Any, limits: Limits, recipe: Path) -> None:
+    """ResourceError when a recipe, not yet checked otherwise, asks for more elements or cells than it may."""
+    given = [elements] if isinstance(elements, int) else []
+    if isinstance(shape, dict):
+        cells = shape.get("cells")
+        given = cells if isinstance(cells, list) else list(cells.values()) if isinstance(cells, dict) else given
+    count = prod(max(n, 1) for n in given if isinstance(n, int)) if given else 0
+    if count > limits.cells:
+        raise ResourceError(f"{recipe}: {count:.3g} cells are more than the {limits.cells} that limits.cells allows")

@@ -1,0 +1,100 @@
+"""Names in a scene that lead nowhere: frames, bodies and joints that are not there, found before anything is computed.
+
+It looks at the plain table, so that a scene with other mistakes is searched, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from typing import Any
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import suggestion
+
+#: names of the frames in the mesh recipe of this path; None where that cannot be told
+Recipe = Callable[[str], Collection[str] | None]
+
+
+def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
+    """Every name in a composed scene table that leads nowhere; `path` opens each place."""
+    frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
+    joints = [name for name, _ in _tables(table.get("joint"))]
+    found: list[InputError] = []
+    for place, name in _named_frames(table):
+        found += _frame(f"{path} [{place}]", name, frames)
+    for place, name in _named_joints(table):
+        if name not in joints:
+            found.append(InputError(f"{path} [{place}]", f"there is no joint '{name}'", suggestion(name, joints)))
+    for place, name in _named_bodies(table):
+        if name not in frames:
+            found.append(InputError(f"{path} [{place}]", f"there is no body '{name}'", suggestion(name, frames)))
+    for name, body in _tables(table.get("body")):
+        found += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
+    return found
+
+
+def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
+    if isinstance(family, dict):
+        yield from ((name, part) for name, part in family.items() if isinstance(part, dict))
+
+
+def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
+    """Names of a body's frames; None where they cannot be told, which is another mistake than this module's."""
+    if isinstance(body.get("mesh"), str):
+        return recipe(body["mesh"])
+    frames = body.get("frames", {})
+    return list(frames) if isinstance(frames, dict) else None
+
+
+def _frame(place: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
+    body, _, frame = name.partition(".")
+    if not frame:
+        return []  # it is said elsewhere that a frame is named with its body
+    if body not in frames:
+        return [InputError(place, f"'{name}': there is no body '{body}'", suggestion(body, frames))]
+    known = frames[body]
+    if known is None or frame in known:
+        return []
+    return [InputError(place, f"'{name}': body '{body}' has no frame '{frame}'", suggestion(frame, list(known)))]
+
+
+def _interfaces(place: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
+    modes = body.get("modes")
+    if frames is None or not isinstance(modes, dict):
+        return []
+    named = [("interfaces", name) for name in _texts(modes.get("interfaces"))]
+    named += [("held", name.partition(".")[0]) for name in _texts(modes.get("held"))]
+    return [
+        InputError(f"{place}.{key}]", f"the recipe has no frame '{name}'", suggestion(name, list(frames)))
+        for key, name in named
+        if name not in frames
+    ]
+
+
+def _texts(value: object) -> list[str]:
+    return [name for name in value if isinstance(name, str)] if isinstance(value, (list, tuple)) else []
+
+
+def _named_frames(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for family in ("joint", "load"):
+        for name, part in _tables(table.get(family)):
+            yield from ((f"{family}.{name}.between", frame) for frame in _texts(part.get("between")))
+    for family in ("drive", "load"):
+        for name, part in _tables(table.get(family)):
+            if isinstance(part.get("frame"), str):
+                yield f"{family}.{name}.frame", part["frame"]
+
+
+def _named_joints(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    for family in ("drive", "load"):
+        for name, part in _tables(table.get(family)):
+            if isinstance(part.get("joint"), str):
+                yield f"{family}.{name}.joint", part["joint"]
+            for actuator in _texts(part.get("actuators")):
+                yield f"{family}.{name}.actuators", actuator.partition(".")[0]
+
+
+def _named_bodies(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    ensemble = table.get("ensemble")
+    if isinstance(ensemble, dict):
+        yield from (("ensemble.bodies", name) for name in _texts(ensemble.get("bodies")))

@@ -1,0 +1,46 @@
+"""Stops at the ends of joint coordinates."""
+
+from __future__ import annotations
+
+from pydantic import model_validator
+
+from pipeline.core.scene.clearance import NormalLaw
+from pipeline.core.scene.fields import Part
+from pipeline.core.scene.laws import Value
+
+
+class Stop(Part):
+    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint.
+
+    lower, upper: the ends, one or both; angles go on beyond half a turn, from within half a turn of zero at the start.
+    normal: a normal law of contacts with its stiffness, of angles in N m and rad.  floor: least approach speed used as
+    impact rate.  initial_approach_speed: of an end that the scene's start has passed; without it, such a start is
+    refused.
+    """
+
+    joint: str
+    coordinate: str | None = None
+    lower: Value | None = None
+    upper: Value | None = None
+    normal: NormalLaw
+    floor: Value = 1e-6
+    initial_approach_speed: Value | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Stop:
+        if self.lower is None and self.upper is None:
+            raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
+        if self.normal.stiffness is None:
+            raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
+        mass = (self.normal.restitution, self.normal.delivered_restitution) != (None, None)
+        if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
+            raise ValueError(
+                "what meets a stop depends on the pose: a linear stop takes a damping, "
+                "or a restitution with the effective_mass [kg or kg m^2] that is to rebound with it"
+            )
+        return self
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Which ends there are."""
+        return tuple(end for end in ("lower", "upper") if getattr(self, end) is not None)

@@ -1,0 +1,16 @@
+"""The version of the program, as its distribution says it."""
+
+from __future__ import annotations
+
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed
+
+DISTRIBUTION = "flexclear"
+
+
+def version() -> str:
+    """Such as ``0.1.0``; ``not installed`` where only the sources are there."""
+    try:
+        return installed(DISTRIBUTION)
+    except PackageNotFoundError:
+        return "not installed"

@@ -1,0 +1,149 @@
+"""Which files a task opens: what they hold decides its result, so it is among the facts of its key.
+
+Taken from what was opened, not from a list: formats have companions (`b.node` beside `b.ele`) that only their reader
+knows. Python tells of every file that it opens; what a library in C opens is noted by whoever calls that
+library (`note`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import sys
+import sysconfig
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pipeline.core.artifacts.paths import kernel_root
+from pipeline.core.errors import ResourceError
+
+#: what stands in the facts for a file that is not there, and for what is no file
+ABSENT, SPECIAL = "absent", "no file"
+#: code counts by module and by library, see `fingerprint`
+CODE = (".py", ".pyc", ".so", ".pyd", ".pth")
+WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+
+
+@dataclass
+class Opened:
+    """Absolute path -> digest of what was there when it was first opened; paths that the task wrote itself."""
+
+    outside: tuple[str, ...]
+    read: dict[str, str] = field(default_factory=dict)
+    written: set[str] = field(default_factory=set)
+    busy: bool = False
+
+    def see(self, path: Any, writing: bool) -> None:
+        """Note a file, unless it is the task's own or belongs to the system or the program."""
+        if self.busy or isinstance(path, int):
+            return
+        name = os.path.abspath(os.fsdecode(path))
+        if writing:
+            self.written.add(name)
+        elif name not in self.read and name not in self.written and not self._left_out(name):
+            self.busy = True  # opens the file, too
+            try:
+                self.read[name] = digest(name)
+            finally:
+                self.busy = False
+
+    def _left_out(self, name: str) -> bool:
+        return name.endswith(CODE) or name.startswith(self.outside) or "/flexclear_kernels_" in name
+
+
+_current: Opened | None = None
+
+
+def note(path: Path) -> None:
+    """A file is about to be read in a way that Python does not tell of."""
+    if _current is not None:
+        _current.see(path, writing=False)
+
+
+@contextmanager
+def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]]:
+    """Filled at the end: place relative to `base` -> digest, of every file that was opened to be read meanwhile.
+
+    outside: folders whose files do not count, beside those of the system, of libraries and of programs' own state.
+    Raises ResourceError when a file changed meanwhile.
+    """
+    global _current
+    _listen()
+    places = (*_system(), str(kernel_root()), *(str(folder) for folder in outside))
+    found: dict[str, str] = {}
+    before, _current = _current, Opened(tuple(f"{place.rstrip('/')}/" for place in places))
+    seen = _current
+    try:
+        yield found
+    finally:
+        _current = before
+    temporary = tempfile.gettempdir()
+    for name, then in seen.read.items():
+        now = digest(name)
+        if now == ABSENT and name.startswith(temporary):
+            continue  # the task's own, made by a library
+        if now != then:
+            raise ResourceError(f"{name} changed while it was read; run again")
+        found[os.path.relpath(name, base)] = then
+
+
+def digests(names: Iterable[str], base: Path) -> dict[str, str]:
+    """What the files of these places hold now, as `watched` tells it."""
+    return {name: digest(os.path.normpath(base / name)) for name in names}
+
+
+def digest(path: str) -> str:
+    """The sha256 of a file; what is no file, or is not there, has a word instead."""
+    try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            return SPECIAL
+        with open(path, "rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except (OSError, ValueError):
+        return ABSENT
+
+
+def facts(found: Mapping[str, str]) -> dict[str, str]:
+    """As facts of a key."""
+    return {f"file {name}": value for name, value in sorted(found.items())}
+
+
+@cache
+def _listen() -> None:
+    """From now on Python tells of what it opens; a hook cannot be taken away again."""
+
+    def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open" and _current is not None:
+            _current.see(arguments[0], writing=bool((arguments[2] or 0) & WRITING))
+
+    sys.addaudithook(hook)
+
+
+@cache
+def _system() -> tuple[str, ...]:
+    """Folders of the system, of Python and its libraries, and of programs' own state in the home folder."""
+    home = os.path.expanduser("~")
+    state = os.environ.get("XDG_CACHE_HOME"), os.environ.get("XDG_CONFIG_HOME")
+    paths = sysconfig.get_paths()  # not its prefix: an environment may be the folder of a project itself
+    own = {paths[name] for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")}
+    own |= {os.path.realpath(place) for place in own}
+    system = (
+        "/proc",
+        "/sys",
+        "/dev",
+        "/etc",
+        "/lib",
+        "/lib64",
+        "/usr/lib",
+        "/usr/lib64",
+        "/usr/local/lib",
+        "/usr/share",
+    )
+    programs = [f"{home}/{name}" for name in (".cache", ".config", ".local")] if home != "~" else []
+    return (*system, *programs, *filter(None, state), *sorted(own))

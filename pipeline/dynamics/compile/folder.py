@@ -1,0 +1,103 @@
+"""The folder of compiled kernels: whose it is, for which processor, and how it is kept small.
+
+To load a kernel is to run code, so a folder in which anybody else could write is refused.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+import time
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import llvmlite.binding
+from numba import config
+
+from pipeline.core.artifacts.disk import sweep
+from pipeline.core.errors import InputError
+from pipeline.dynamics.compile.files import claimed, set_aside
+
+#: kernels that nobody fetched for so long are removed [s], and the oldest ones beyond so many bytes
+UNUSED, LARGEST = 90 * 86400.0, 2 << 30
+
+
+def writable(root: Path, tell: Callable[[str], None]) -> Path:
+    """The folder for this processor below `root`; where it cannot be written, one that lasts as long as this process.
+
+    Raises InputError when others could write there.
+    """
+    folder = root / processor()
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        (folder / "__pycache__").mkdir(exist_ok=True, mode=0o700)
+        problem = "" if os.access(folder, os.W_OK) else "not writable"
+    except OSError as error:
+        problem = error.strerror or str(error)
+    if problem:
+        tell(f"compiled kernels cannot be kept in {folder} ({problem}); every process will compile its own")
+        return Path(_temporary().name)
+    refuse_shared(folder)
+    return folder
+
+
+def refuse_shared(folder: Path) -> None:
+    """InputError when anybody but this user (and the system's) can write to a folder of kernels, or replace it."""
+    for place in (folder / "__pycache__", folder, *folder.parents):
+        status = place.stat()
+        inside = place.name == "__pycache__" or place == folder
+        open_to_all = bool(status.st_mode & stat.S_IWOTH) and not (status.st_mode & stat.S_ISVTX and not inside)
+        if open_to_all or (inside and status.st_mode & stat.S_IWGRP) or status.st_uid not in (0, os.geteuid()):
+            raise InputError(
+                str(folder),
+                f"compiled kernels are not loaded from there, since others can write to {place}",
+                f"chmod go-w {place}, or name another folder with FLEXCLEAR_KERNELS",
+            )
+
+
+@cache
+def processor() -> str:
+    """A name for what code is compiled for: processor, its features and what the compiler was told of them."""
+    features = llvmlite.binding.get_host_cpu_features().flatten()
+    told = (llvmlite.binding.get_host_cpu_name(), features, config.CPU_NAME, config.CPU_FEATURES, config.OPT)
+    return hashlib.sha256(repr(tuple(map(str, told))).encode()).hexdigest()[:12]
+
+
+def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
+    """Remove kernels that nobody has fetched for `unused` seconds, then the oldest beyond `largest` bytes; how many."""
+    sweep(folder)
+    kernels = [(_used(path), path) for path in folder.glob("flexclear_*.py")]
+    total, removed = 0, 0
+    for used, path in sorted(kernels, reverse=True):
+        total += size(path)
+        if (total > largest or time.time() - used > unused) and _removed(path):
+            removed += 1
+    return removed
+
+
+def size(path: Path) -> int:
+    """Bytes of a generated file and of what was compiled of it."""
+    return sum(found.stat().st_size for found in (path, *(path.parent / "__pycache__").glob(f"{path.stem}.*")))
+
+
+def _used(path: Path) -> float:
+    """When a kernel was fetched last; one that is being made has no sum yet."""
+    noted = path.with_suffix(".sum")
+    return (noted if noted.is_file() else path).stat().st_mtime
+
+
+def _removed(path: Path) -> bool:
+    """Remove a kernel, unless another process is compiling it."""
+    with claimed(path, wait=False) as mine:
+        if mine:
+            set_aside(path)
+            path.unlink(missing_ok=True)
+    return mine
+
+
+@cache
+def _temporary() -> TemporaryDirectory[str]:
+    return TemporaryDirectory(prefix="flexclear_kernels_")

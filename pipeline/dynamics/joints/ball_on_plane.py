@@ -1,0 +1,21 @@
+"""Ball above a plane, which is that of x and y of the outer frame; z points out of the ground towards the ball."""
+
+from __future__ import annotations
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.vectors import ZERO, at9, axis, dot, scale
+
+
+@kernel
+def separation(f, w, outer, numbers, p, v):
+    """As `clearance_spherical.separation`; the normal points into the plane."""
+    z = axis(at9(w, outer + m.FRAME.axes), 2)
+    height = dot(z, p)
+    return height - f[numbers + m.CONTACT_NUMBERS.radius], -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
+
+
+class BallOnPlane:
+    """See the module's text."""
+
+    separation = staticmethod(separation)

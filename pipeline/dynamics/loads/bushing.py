@@ -1,0 +1,109 @@
+r"""Elastic mount between two frames F and G: stiffness and damping on six displacements.
+
+.. math:: s = (x, \theta), \quad x = R_{WF}^T(p_G - p_F), \quad R_{FG} = \exp\tilde\theta, \quad
+          U = \tfrac12 s^TKs, \quad P_{lost} = \dot s^TC\dot s
+
+The force on G is -(K s + C ds/dt) along x; the torque along theta becomes one about the axes of F by the inverse
+tangent, :math:`T^{-T} = 1 + \tfrac12\tilde\theta + e\,\tilde\theta\tilde\theta`,
+:math:`e = (1 - \tfrac\theta2\cot\tfrac\theta2)/\theta^2`, so that power and energy agree for finite rotations. They act
+at the origin of G. The rotation vector is the shortest one: at half a turn its sign, and the torque's, changes.
+
+Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3 (rotation vector and tangent).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.core.scene.loads import Bushing as Declared
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.kernels import kernel
+from pipeline.dynamics.loads.fields import act, number
+from pipeline.dynamics.loads.row import Row
+from pipeline.dynamics.vectors import add, at, at9, cross, dot, product, scale, sub, transpose, turn, turn_back
+
+#: angle^2 below which e is taken from its series; the next term is 1e-13 there
+SMALL = 1e-3
+#: where the damping matrix begins among the numbers, and the blocks of a 6x6 matrix
+DAMPING, MIXED, SECOND = 36, 3, 18
+
+
+@kernel
+def rotation_vector(R):
+    """The shortest rotation vector [rad] of a rotation matrix, by its quaternion."""
+    trace, x, y, z = R[0] + R[4] + R[8], R[0], R[4], R[8]
+    if trace >= max(x, max(y, z)):
+        q = (1.0 + trace, R[7] - R[5], R[2] - R[6], R[3] - R[1])
+    elif x >= max(y, z):
+        q = (R[7] - R[5], 1.0 + x - y - z, R[1] + R[3], R[2] + R[6])
+    elif y >= z:
+        q = (R[2] - R[6], R[1] + R[3], 1.0 + y - x - z, R[5] + R[7])
+    else:
+        q = (R[3] - R[1], R[2] + R[6], R[5] + R[7], 1.0 + z - x - y)
+    axis = (q[1], q[2], q[3]) if q[0] >= 0.0 else (-q[1], -q[2], -q[3])
+    size, cosine = np.sqrt(dot(axis, axis)), abs(q[0])
+    return scale(2.0 * np.arctan2(size, cosine) / size if size > 0.0 else 2.0, axis)
+
+
+@kernel
+def tangent_part(v):
+    """Factor e of the inverse tangent."""
+    s = dot(v, v)
+    if s < SMALL:
+        return (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0
+    half = 0.5 * np.sqrt(s)
+    return (1.0 - half * np.cos(half) / np.sin(half)) / s
+
+
+@kernel
+def times(h, f, k, first, v):
+    """A 3x3 block of a matrix of load k, its first entry at `first`, times v."""
+    return (
+        number(h, f, k, first) * v[0] + number(h, f, k, first + 1) * v[1] + number(h, f, k, first + 2) * v[2],
+        number(h, f, k, first + 6) * v[0] + number(h, f, k, first + 7) * v[1] + number(h, f, k, first + 8) * v[2],
+        number(h, f, k, first + 12) * v[0] + number(h, f, k, first + 13) * v[1] + number(h, f, k, first + 14) * v[2],
+    )
+
+
+@kernel
+def product6(h, f, k, first, x, v):
+    """Both halves of a 6x6 matrix of load k times (x, v)."""
+    upper = add(times(h, f, k, first, x), times(h, f, k, first + MIXED, v))
+    lower = add(times(h, f, k, first + SECOND, x), times(h, f, k, first + SECOND + MIXED, v))
+    return upper, lower
+
+
+@kernel
+def apply(h, f, w, k):
+    """Apply load k."""
+    a, b = m.SITE_FRAMES.row(h, m.LOADS.a(h, k)), m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
+    F, G, p = at9(w, a + m.FRAME.axes), at9(w, b + m.FRAME.axes), at(w, b + m.FRAME.origin)
+    r, omega = sub(p, at(w, a + m.FRAME.origin)), at(w, a + m.FRAME.omega)
+    slide = sub(at(w, b + m.FRAME.velocity), add(at(w, a + m.FRAME.velocity), cross(omega, r)))
+    spin = turn_back(F, sub(at(w, b + m.FRAME.omega), omega))
+    x, x_rate, v = turn_back(F, r), turn_back(F, slide), rotation_vector(product(transpose(F), G))
+    e = tangent_part(v)
+    crossed = cross(v, spin)
+    v_rate = add(spin, add(scale(-0.5, crossed), scale(e, cross(v, crossed))))
+    pull, twist = product6(h, f, k, 0, x, v)
+    damped_pull, damped_twist = product6(h, f, k, DAMPING, x_rate, v_rate)
+    stored, lost = 0.5 * (dot(pull, x) + dot(twist, v)), dot(damped_pull, x_rate) + dot(damped_twist, v_rate)
+    force = turn(F, scale(-1.0, add(pull, damped_pull)))
+    along = scale(-1.0, add(twist, damped_twist))
+    swung = cross(v, along)
+    torque = turn(F, add(along, add(scale(0.5, swung), scale(e, cross(v, swung)))))
+    length = np.sqrt(dot(r, r))
+    rate = dot(r, slide) / length if length > 0.0 else 0.0
+    act(h, w, k, add(torque, cross(p, force)), force, length, rate, stored, 0.0, lost)
+
+
+class Bushing:
+    """See the module's text."""
+
+    apply = staticmethod(apply)
+
+    @staticmethod
+    def row(load: Declared, place: str) -> Row:
+        """Stiffness, then damping, row by row [SI]."""
+        numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
+        return Row(frames=load.between, numbers=tuple(numbers))

@@ -1,0 +1,113 @@
+"""Gears and racks as couplings of two joint coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import atan2
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.core.errors import InputError
+from pipeline.core.units import quantity
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.model.driving import named_coordinate
+from pipeline.dynamics.model.gauges import Gauges
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.numbering import Numbering
+
+if TYPE_CHECKING:
+    from pipeline.dynamics.model.mechanism import Mechanism, Site
+
+
+@dataclass(frozen=True)
+class Side:
+    """One of the two coordinates of a coupling: of which joint, and the sites of its first and second frame."""
+
+    joint: str
+    coordinate: Coordinate
+    a: Site
+    b: Site
+
+    def value(self, poses: Sequence[Placement]) -> float:
+        """The coordinate [rad in (-pi, pi], or m] at poses of the links."""
+        F, G = (poses[site.link].of(site.place) for site in (self.a, self.b))
+        if self.coordinate.turning:
+            R = F.R.T @ G.R
+            return atan2(R[self.coordinate.sine], R[self.coordinate.cosine])
+        return float(self.along(poses) @ (G.p - F.p))
+
+    def along(self, poses: Sequence[Placement]) -> np.ndarray:
+        """Its axis, shape (3,)."""
+        site = self.b if self.coordinate.side else self.a
+        axis: np.ndarray = poses[site.link].of(site.place).R[:, self.coordinate.axis]
+        return axis
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A gear of the scene: second = ratio * first + offset, the offset being that of the start."""
+
+    gear: str
+    ratio: float
+    second: Side
+    first: Side
+
+    @property
+    def name(self) -> str:
+        """What it is called among joints that close loops."""
+        return f"gear {self.gear}"
+
+    @property
+    def parts(self) -> tuple[tuple[Side, float], tuple[Side, float]]:
+        """Both sides and how much of them is in the row that the coupling is: second - ratio * first."""
+        return (self.second, 1.0), (self.first, -self.ratio)
+
+    def offset(self, poses: Sequence[Placement]) -> float:
+        """Of the row, at poses of the links."""
+        return sum(factor * side.value(poses) for side, factor in self.parts)
+
+
+def couplings(mechanism: Mechanism) -> list[Coupling]:
+    """All gears of a scene; InputError for what cannot be."""
+    return [_coupling(mechanism, name) for name in mechanism.scene.gear]
+
+
+def _coupling(mechanism: Mechanism, name: str) -> Coupling:
+    gear, place = mechanism.scene.gear[name], f"[gear.{name}]"
+    first, second = (_side(mechanism, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second"))
+    dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
+    try:
+        kinds = (first.coordinate.turning, second.coordinate.turning)
+        ratio = quantity(gear.ratio, dimensions.get(kinds, "angle per length"))
+    except ValueError as error:
+        raise InputError(f"[gear.{name}.ratio]", str(error)) from None
+    if ratio == 0.0:
+        raise InputError(place, "its ratio is 0: the second coordinate would be held", "give a ratio, or drive it")
+    return Coupling(name, ratio, second, first)
+
+
+def _side(mechanism: Mechanism, text: str, place: str) -> Side:
+    scene = mechanism.scene
+    joint, found = named_coordinate(scene, text, place)
+    frames = scene.joint[joint].between
+    sites = [mechanism.site(frame) for frame in frames]
+    if sites[0].link == sites[1].link:
+        raise InputError(place, f"the bodies of joint '{joint}' move as one", "name another joint")
+    return Side(joint, found, *sites)
+
+
+def tables(
+    coupled: Sequence[Coupling], numbering: Numbering, gauges: Gauges, poses: Sequence[Placement]
+) -> dict[Any, Any]:
+    """The tables COUPLINGS and COUPLING_NUMBERS; gauges: take those of both sides; poses: of the links at the start."""
+
+    def gauge(side: Side) -> int:
+        return gauges.add(numbering.site(side.a), numbering.site(side.b), side.coordinate, counts=True)
+
+    return {
+        m.COUPLINGS: [(gauge(one.first), gauge(one.second)) for one in coupled],
+        m.COUPLING_NUMBERS: [(one.ratio, one.offset(poses)) for one in coupled],
+    }

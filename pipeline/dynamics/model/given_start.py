@@ -1,0 +1,155 @@
+"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.algebra import matrix_to_quaternion, rotation_between, rotation_vector_to_matrix
+from pipeline.core.errors import InputError
+from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model.chain import path_positions
+from pipeline.dynamics.model.constraints import Constraint, prescribed
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.laws import drive_laws
+from pipeline.dynamics.model.mechanism import Mechanism
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.tree import PATH, Edge
+
+#: a start further from its drive's law than this, as share of the mechanism's size or in rad, is a contradiction
+FAR, FAR_ANGLE = 0.05, 0.1
+#: what is moved by less than this, as share of the mechanism's size or in rad, was given as well as it was written
+WRITTEN = 1e-6
+#: most bodies of which a mend is told one by one
+MOST = 8
+
+
+@dataclass(frozen=True)
+class Miss:
+    """A driven coordinate whose start, in the poses given, is not where its law starts [m or rad].
+
+    of_path: the coordinate is one of a path, not of a joint.
+    """
+
+    drive: str
+    place: str
+    what: str
+    now: float
+    value: float
+    turning: bool
+    of_path: bool = False
+
+    @property
+    def size(self) -> float:
+        """How far apart the two are; angles that differ by whole turns are one."""
+        apart = self.now - self.value
+        return abs((apart + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(apart)
+
+    def text(self) -> str:
+        """What is given, and what the law says."""
+        unit = "rad" if self.turning else "m"
+        return (
+            f"{self.what} starts at {self.now:.6g} {unit} in the poses given, and at {self.value:.6g} {unit} by the "
+            f"law of drive '{self.drive}': {self.size:.3g} {unit} apart"
+        )
+
+
+def misses(
+    mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement], given: Mapping[str, Pieces]
+) -> list[Miss]:
+    """Drives against the poses that the scene gives; a body without a pose contradicts nothing.
+
+    given: laws that replace the scene's; they were made for these poses and are not looked at.
+    """
+    placed = given_links(mechanism)
+    driven = [joint for joint in joints if joint.values and {joint.link_a, joint.link_b} <= placed]
+    found = [miss for joint in driven for miss in _of_joint(joint, poses)]
+    for link in mechanism.links:
+        edge = link.branch.edge
+        if edge is None or edge.kind != PATH or link.massless:
+            continue
+        site = mechanism.site(edge.frame_b)
+        if site.link in placed:
+            found += _of_path(mechanism, edge, poses[site.link].of(site.place), given)
+    return [miss for miss in found if miss.drive not in given]
+
+
+def given_links(mechanism: Mechanism) -> set[int]:
+    """Links whose pose the scene gives, the ground among them."""
+    bodies = mechanism.scene.body
+    return {0} | {
+        i
+        for i, link in enumerate(mechanism.links)
+        if any(getattr(bodies[name], "pose", None) is not None for name in link.group.places)
+    }
+
+
+def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
+    A, B = joint.frames(poses)
+    relative, declared = A.inverse().of(B), joint_class(joint.edge.kind)
+    now = declared.coordinates(relative.R, relative.p)
+    for (k, value), apart in zip(joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True):
+        drive, coordinate = str(joint.edge.drives[k]), declared.COORDINATES[k]
+        what = f"joint '{joint.name}'" if len(declared.COORDINATES) == 1 else f"'{joint.name}.{coordinate.name}'"
+        # the angle nearest to the law's, where turns are counted
+        start = value + float(apart) if coordinate.turning else float(now[k])
+        yield Miss(drive, f"[drive.{drive}.law]", what, start, value, coordinate.turning)
+
+
+def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Miss]:
+    t = mechanism.scene.time.start
+    laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
+    now = path_positions(edge, G.R, G.p + mechanism.origin)
+    wanted = [None if name is None else laws[name].value(t) for name in edge.drives]
+    if edge.vector:
+        turn = rotation_vector_to_matrix(np.array(wanted[3:6], dtype=float))
+        apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
+        drive = str(edge.drives[3]).partition(".")[0]
+        yield Miss(
+            str(edge.drives[3]), f"[drive.{drive}.rotation]", f"the turn of '{edge.frame_b}'", apart, 0.0, True, True
+        )
+    for k, (name, value) in enumerate(zip(edge.drives, wanted, strict=True)):
+        if name is None or value is None or (edge.vector and k >= 3):
+            continue
+        yield Miss(name, f"[drive.{name}]", f"'{edge.frame_b}'", float(now[k]), value, k >= 3, True)
+
+
+def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
+    """InputError for poses given that contradict a joint's drive by more than a mend may move them.
+
+    What a path leads is put where the path begins, however far that is, and told: the path says where the body is.
+    """
+    for miss in found:
+        if miss.of_path:
+            continue
+        limit = FAR_ANGLE if miss.turning else FAR * mechanism.length
+        if miss.size > limit:
+            unit = "rad" if miss.turning else "m"
+            raise InputError(
+                miss.place,
+                f"{miss.text()} (more than {limit:.3g} {unit})",
+                "correct the poses or where the law starts, or leave out the poses of the bodies that the drive places",
+            )
+
+
+def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
+    """A sentence about the bodies that do not start where the scene gives them, with amounts; else nothing.
+
+    now: frames of all links at the start.
+    """
+    found = []
+    for i in sorted(given_links(mechanism) - {0}):
+        before, after = mechanism.placed[i], now[i]
+        apart = float(np.linalg.norm(after.p - before.p)) / mechanism.length
+        turned = float(rotation_between(matrix_to_quaternion(before.R), matrix_to_quaternion(after.R)))
+        amounts = [f"moved by {apart * mechanism.length:.3g} m"] if apart > WRITTEN else []
+        amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > WRITTEN else []
+        if amounts:
+            found.append((apart + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}"))
+    if not found:
+        return []
+    told = [text for _, text in sorted(found, reverse=True)]
+    more = [f"and {len(told) - MOST} more bodies"] if len(told) > MOST else []
+    return [f"the start was mended so that joints and drives fit: {'; '.join([*told[:MOST], *more])}"]

@@ -1,0 +1,82 @@
+"""Ends of joint coordinates as contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.clearance import NormalLaw
+from pipeline.core.scene.schema import Scene
+from pipeline.core.scene.stops import Stop
+from pipeline.core.units import quantity
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.model.driving import coordinate_of
+
+#: type of a contact that is an end of a stop
+STOP = "stop"
+
+
+@dataclass(frozen=True)
+class End:
+    """One end of a stop, as contacts are asked.
+
+    limit: coordinate where it begins [m or rad].  sense: 1 of an upper end, -1 of a lower one.
+    clearance: way to the other end, or what counts as far [m or rad].  floor, initial_approach_speed [m/s or rad/s].
+    """
+
+    stop: str
+    between: tuple[str, str]
+    coordinate: Coordinate
+    limit: float
+    sense: float
+    clearance: float
+    normal: NormalLaw
+    floor: float
+    initial_approach_speed: float | None
+    radius: float = 0.0
+    friction: None = None
+    type: str = STOP
+
+
+def ends(scene: Scene, length: float) -> list[tuple[str, End]]:
+    """The ends of all stops by name, ``stop.lower`` and ``stop.upper``; InputError for what cannot be.
+
+    length: size of the mechanism [m].
+    """
+    found = []
+    for name, stop in scene.stop.items():
+        found += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, length).items()]
+    return found
+
+
+def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
+    place = f"[stop.{name}]"
+    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, place)
+
+    def read(key: str, dimension: str) -> float:
+        try:
+            return quantity(getattr(stop, key), dimension)
+        except ValueError as error:
+            raise InputError(f"[stop.{name}.{key}]", str(error)) from None
+
+    limits = {end: read(end, coordinate.dimension) for end in stop.ends}
+    if len(limits) == 2 and not limits["lower"] < limits["upper"]:
+        raise InputError(
+            place,
+            f"its lower end must lie below its upper one; lower = {limits['lower']:.6g}, upper = {limits['upper']:.6g}",
+            "exchange them, or leave one out",
+        )
+    far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else length)
+    speed = "angular velocity" if coordinate.turning else "velocity"
+    speeds: dict[str, float] = {
+        key: read(key, speed) for key in ("floor", "initial_approach_speed") if getattr(stop, key) is not None
+    }
+    for key, value in speeds.items():
+        if not value > 0.0:
+            raise InputError(f"[stop.{name}.{key}]", f"must be positive, not {value:.6g}")
+    between, sides = scene.joint[joint].between, {"lower": -1.0, "upper": 1.0}
+    told = speeds.get("initial_approach_speed")
+    return {
+        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], told)
+        for end, limit in limits.items()
+    }

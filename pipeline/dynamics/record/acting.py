@@ -1,0 +1,36 @@
+"""What acts on bodies besides joints and paths: loads, stops and gears, at the frames where they do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.model import Model
+
+Acting = list[tuple[str, np.ndarray, np.ndarray]]
+
+
+def on_frames(model: Model, seen: Observed, body: str) -> Acting:
+    """Everything that acts on a body: its frame, moment about the kernels' origin, force; (time, 3) each."""
+    found: Acting = []
+    if model.loads:
+        from pipeline.dynamics.record.loads import on_loaded_frames
+
+        found += on_loaded_frames(model, seen)
+    if model.parts.stops:
+        from pipeline.dynamics.record.stops import on_stopped_frames
+
+        found += on_stopped_frames(model, seen)
+    if model.parts.couplings:
+        from pipeline.dynamics.record.gears import on_geared_frames
+
+        found += on_geared_frames(model, seen)
+    return [acting for acting in found if model.mechanism.frames[acting[0]].body == body]
+
+
+def on_body(model: Model, seen: Observed, body: str) -> tuple[np.ndarray, np.ndarray]:
+    """Sum of it: moment about the kernels' origin, force; (time, 3) each."""
+    moment, force = np.zeros((len(seen.state), 3)), np.zeros((len(seen.state), 3))
+    for _, n, f in on_frames(model, seen, body):
+        moment, force = moment + n, force + f
+    return moment, force

@@ -1,0 +1,74 @@
+"""What a run costs, part by part: its integration, and its record.
+
+A record is of as many rows whatever the integration took; for a smooth motion it costs far more than that. Times of
+both together say little of either.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import xarray as xr
+
+from pipeline.core.progress import Progress, silent
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.record.dataset import dataset
+from pipeline.dynamics.run.ledger import require_closed
+from pipeline.dynamics.run.run import Run, engines, follow, observed, twin_of
+from pipeline.dynamics.run.start import consistent_start
+
+#: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
+#: that: a disturbance of a millisecond is a tenth of some. What has taken LONG is an average by itself [s]
+REPEATS, ENOUGH, MOST, LONG = 3, 0.05, 15, 1.5
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Processor times [s] of warm repeats, each one's integration and of some its record; and what was run.
+
+    run: the same dataset as every run's (schema RUN).  length: size of the mechanism [m].  The twin of a run with
+    contacts is in no time, nor are setting up and the look at the ledger.
+    """
+
+    run: xr.Dataset
+    integration: tuple[float, ...]
+    recording: tuple[float, ...]
+    length: float
+
+
+def measure(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress = silent, *, checked: bool = True
+) -> Cost:
+    """The cost of a scene's run, its code fetched before; the scene's `[accuracy]` is not looked at.
+
+    checked: whether a run whose energy ledger does not close is refused, as every run is.
+    Raises InputError and SolverError as a run does.
+    """
+    engine, other = engines(scene, bundles, progress)
+    start = consistent_start(engine)
+    last, trajectory, switched = follow(engine, start, progress, other)
+    seen = observed(last, trajectory)
+    if checked:
+        require_closed(last.model, trajectory, seen)
+    recording = _repeated(lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched)), 0)
+    run = dataset(Run(scene, last, trajectory, seen, twin_of(last, start, trajectory), switched))
+    integration = _repeated(lambda: follow(engine, start, silent, other), MOST)
+    return Cost(run, integration, recording, engine.model.length)
+
+
+def _repeated(task: Callable[[], object], most: int) -> tuple[float, ...]:
+    """Processor times [s] of a task: REPEATS, or up to `most` of a short one."""
+    seconds: list[float] = []
+    while not seconds or (sum(seconds) < LONG and len(seconds) < REPEATS):
+        seconds.append(_once(task))
+    while len(seconds) < most and sum(seconds) < ENOUGH:
+        seconds.append(_once(task))
+    return tuple(seconds)
+
+
+def _once(task: Callable[[], object]) -> float:
+    begun = time.process_time()
+    task()
+    return time.process_time() - begun

@@ -1,0 +1,51 @@
+"""What gears do: force along their second coordinates, and wrenches on the frames of both joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.couplings import Coupling, Side
+from pipeline.dynamics.model.model import Model
+
+
+def gear_series(
+    model: Model, seen: Observed
+) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+    """Force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
+    found = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
+    names = list(model.scene.gear)
+    return {"gear_force": (("time", "gear"), np.stack([found[name] for name in names], axis=1))}, {"gear": names}
+
+
+def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Every gear on the frames of both joints: frame, moment about the kernels' origin, force; (time, 3) each."""
+    found = []
+    for c, coupling in _couplings(model):
+        size = _force(model, seen, c, coupling)
+        for side, factor in coupling.parts:
+            along, push = _along(model, seen, side), np.zeros((len(size), 3))
+            moment = (factor * size)[:, None] * along
+            if not side.coordinate.turning:
+                push = moment
+                moment = np.cross(seen.sites[:, model.numbering.site(side.b)]["origin"], push)
+            frames = model.scene.joint[side.joint].between
+            found += [(frame, sign * moment, sign * push) for frame, sign in zip(frames, (-1.0, 1.0), strict=True)]
+    return found
+
+
+def _couplings(model: Model) -> list[tuple[int, Coupling]]:
+    return [(c, closure) for c, closure in enumerate(model.closures) if isinstance(closure, Coupling)]
+
+
+def _along(model: Model, seen: Observed, side: Side) -> np.ndarray:
+    site = model.numbering.site(side.b if side.coordinate.side else side.a)
+    axis: np.ndarray = seen.sites[:, site]["axes"][:, :, side.coordinate.axis]
+    return axis
+
+
+def _force(model: Model, seen: Observed, c: int, coupling: Coupling) -> np.ndarray:
+    wrench = seen.closure_wrenches[:, c]
+    acting = wrench["moment" if coupling.second.coordinate.turning else "force"]
+    size: np.ndarray = np.einsum("ti,ti->t", _along(model, seen, coupling.second), acting)
+    return size

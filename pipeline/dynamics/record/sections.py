@@ -1,0 +1,172 @@
+"""Sections of a periodic motion (schema SECTIONS): the state once in each period, impacts, how neighbours part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.artifacts.schema import SECTIONS, conform
+from pipeline.core.errors import InputError
+from pipeline.core.progress import Progress
+from pipeline.core.quantities import IMPACT
+from pipeline.core.scene.load import edited
+from pipeline.core.scene.loads import SampledPid
+from pipeline.core.scene.schema import Scene, Sections
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.record.dataset import attributes
+from pipeline.dynamics.record.ensemble import kept_bodies, motion_series
+from pipeline.dynamics.record.motion import Motions
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.periods import APART, Period, periods, require_periodic, stretches
+from pipeline.dynamics.run.run import engines, observed
+from pipeline.dynamics.run.start import consistent_start
+from pipeline.dynamics.run.trajectory import Trajectory
+
+Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+
+
+def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """Sections of a scene whose laws repeat (schema SECTIONS).
+
+    Raises InputError for laws that do not repeat, SolverError when the run cannot go on.
+    """
+    wanted = scene.sections or Sections()
+    for name, load in scene.load.items():
+        if isinstance(load, SampledPid):
+            raise InputError(
+                f"[load.{name}]",
+                "a controller that samples counts its periods from the run's start, which sections repeat",
+                "use a continuous 'pid' here",
+            )
+    span = scene.time.end - scene.time.start
+    period = wanted.period or span
+    _require_inside(wanted, period, span)
+    # between waypoints only their states are wanted
+    engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
+    names = kept_bodies(engine.model, wanted.bodies, "[sections.bodies]")
+    start = consistent_start(engine)
+    parts = stretches(engine, period, wanted.phase)
+    require_periodic(parts, start)
+    count = wanted.transient + wanted.periods
+    followed = range(wanted.transient, min(count, wanted.transient + wanted.exponent_periods))
+    tape = _Tape(names, engine.start + wanted.phase)
+    for done in periods(parts, start, followed):
+        progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
+        if done.number >= wanted.transient:
+            tape.add(parts, done, number=done.number - wanted.transient)
+        if done.number + 1 == count:
+            tape.orbit = tape.motion_at_waypoints(parts, done)
+            break
+    growth = np.array(tape.growth[: len(followed)])
+    told = {"period": period, "phase": wanted.phase, "transient": wanted.transient, "neighbour_lost": tape.lost}
+    variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
+    coordinates = {"section": np.arange(wanted.periods), "body": names, "followed": np.arange(len(followed))}
+    coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
+    if engine.model.contacts:
+        coordinates["contact"] = [contact.name for contact in engine.model.contacts]
+    made = xr.Dataset(variables, coords=coordinates)
+    return conform(made, SECTIONS, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
+
+
+def _require_inside(wanted: Sections, period: float, span: float) -> None:
+    if period > span * (1.0 + 1e-12):
+        raise InputError(
+            "[sections.period]",
+            f"a period of {period:.6g} s is longer than the run, which tells the laws for {span:.6g} s",
+            "let the run last a period at least",
+        )
+    if not wanted.phase < period:
+        raise InputError(
+            "[sections.phase]",
+            f"{wanted.phase:.6g} s is no time within the period of {period:.6g} s",
+            "give a time from 0 to below the period",
+        )
+
+
+@dataclass
+class _Tape:
+    """What is kept, one entry per period, and per impact."""
+
+    names: list[str]
+    at: float
+    motions: list[Variables] = field(default_factory=list)
+    orbit: Variables = field(default_factory=dict)
+    growth: list[float] = field(default_factory=list)
+    lost: int = 0
+    impacts: list[dict[str, np.ndarray]] = field(default_factory=list)
+    open: dict[int, dict[str, np.ndarray]] = field(default_factory=dict)
+
+    def add(self, parts: list[Engine], done: Period, number: int) -> None:
+        """Keep of one period what is asked for."""
+        self.growth.append(done.growth)
+        self.lost += done.lost
+        for part, trajectory in zip(parts, done.parts, strict=True):
+            if part.start == self.at:
+                self.motions.append(self._motion(part, trajectory, np.array([0])))
+            if part.model.contacts:
+                self._note(part, trajectory, number, parts[0].start)
+
+    def motion_at_waypoints(self, parts: list[Engine], done: Period) -> Variables:
+        """Motion of the kept bodies where the stretches of a period begin."""
+        first = np.array([0])
+        motions = [self._motion(part, trajectory, first) for part, trajectory in zip(parts, done.parts, strict=True)]
+        return {
+            f"orbit_{name}": (("waypoint", *dims[1:]), _joined(motions, name)) for name, (dims, _) in motions[0].items()
+        }
+
+    def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> Variables:
+        """Motion of the kept bodies, and the contacts' offsets, at some rows."""
+        kept = replace(trajectory, rows=trajectory.rows[rows])
+        seen, model = observed(part, kept), part.model
+        bodies = Motions(model, seen).bodies
+        series = motion_series([bodies[n] for n in self.names], model.mechanism.origin)
+        if model.contacts:
+            series["contact_offset"] = (("time", "contact", "axis"), seen.touch["offset"].copy())
+        return series
+
+    def _note(self, part: Engine, trajectory: Trajectory, number: int, begin: float) -> None:
+        """Impacts of a stretch: those that begin in it, and of those that end in it force and duration."""
+        closings = trajectory.events[trajectory.events["kind"] == m.CLOSING]
+        new = closings[(closings["time"] >= part.start) & (closings["speed"] > IMPACT)]
+        rows = np.clip(np.searchsorted(trajectory.time, new["time"]), 0, len(trajectory.time) - 1)
+        series = self._motion(part, trajectory, rows) if len(new) else {}
+        for k, event in enumerate(new):
+            impact = {name: values[k] for name, (_, values) in series.items()}
+            impact |= {"section": np.array(number), "phase": event["time"] - begin, "contact": event["contact"]}
+            impact["approach_speed"] = event["speed"]
+            self.impacts.append(impact)
+            self.open[int(event["contact"])] = impact
+        for event in closings[np.isfinite(closings["duration"])]:
+            begun = self.open.get(int(event["contact"]))
+            if begun is not None and "duration" not in begun:
+                begun |= {"peak_force": event["peak_force"], "duration": event["duration"]}
+
+    def variables(self, model: Model) -> Variables:
+        """All of it, by the names of the schema SECTIONS."""
+        kept = {
+            name: (("section", *dims[1:]), _joined(self.motions, name)) for name, (dims, _) in self.motions[0].items()
+        }
+        kept |= {name: series for name, series in self.orbit.items() if name in SECTIONS}
+        if not model.contacts:
+            return kept
+        kept["impact_section"] = (("impact",), self._column("section", -1).astype(np.int32))
+        kept["impact_contact"] = (("impact",), self._column("contact", -1).astype(np.int32))
+        for name in ("phase", "approach_speed", "peak_force", "duration"):
+            kept[f"impact_{name}"] = (("impact",), self._column(name, np.nan))
+        for name in ("position", "quaternion", "velocity"):
+            dims, first = self.motions[0][name]
+            values = [impact[name] for impact in self.impacts]
+            made = np.array(values).reshape(len(values), *first.shape[1:])
+            kept[f"impact_{name}"] = (("impact", *dims[1:]), made)
+        return kept
+
+    def _column(self, name: str, absent: float) -> np.ndarray:
+        return np.array([float(impact.get(name, absent)) for impact in self.impacts])
+
+
+def _joined(motions: Iterable[Variables], name: str) -> np.ndarray:
+    return np.concatenate([motion[name][1] for motion in motions])

@@ -1,0 +1,24 @@
+"""What stops do to the two frames of their joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.model.stops import End
+
+
+def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Every end of a stop on both frames: frame, moment about the kernels' origin, force; (time, 3) each."""
+    found, numbering = [], model.numbering
+    for c, (_, end, outer, inner) in enumerate(model.contacts):
+        if not isinstance(end, End):
+            continue
+        a, b = (seen.sites[:, numbering.site(site)] for site in (outer, inner))
+        along = (b if end.coordinate.side else a)["axes"][:, :, end.coordinate.axis]
+        push = -end.sense * seen.touch["normal_force"][:, c, None] * along
+        force = np.zeros_like(push) if end.coordinate.turning else push
+        moment = push if end.coordinate.turning else np.cross(b["origin"], push)
+        found += [(frame, sign * moment, sign * force) for frame, sign in zip(end.between, (-1.0, 1.0), strict=True)]
+    return found

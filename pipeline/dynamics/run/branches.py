@@ -1,0 +1,281 @@
+"""The directions in which a mechanism can leave a singular pose: where the closures hold to second order.
+
+In the pose the rows of the closures that depend on each other say nothing of first order about the directions that they
+leave free; what they say of second order is a quadratic form of each. Its zeros are the tangents of the branches.
+It is taken from the residuals of states a small way off, at the time when the drives have gone as far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import initial
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.collocation import Sampler
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.start import start_motions
+
+#: way off, in units of the coordinates, and singular values below this share of the largest, which are zero
+WAY, ZERO = 1e-2, 1e-6
+#: directions in which nothing of second order is said, to this share, are not those of a branch
+SILENT = 1e-3
+#: most directions among which branches are looked for, starts of the search for each, its steps, and what is the same
+MOST, STARTS, STEPS, SAME = 6, 60, 40, 1e-3
+#: share of the time since the start over which a rate is taken
+A_LITTLE = 1e-4
+#: halvings of the time in which the drives go the way
+HALVINGS = 60
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A way out of the pose. begin: time of the start [s].  start: the state there.
+
+    way: change of the state after a unit of progress.
+    speeds: change of the state at a unit of the progress's rate.
+    progress: of the motion by time [s]; reaching: how long until it has gone so far, in units of the coordinates.
+    at_speed: whether it begins with a speed, not from rest.
+    """
+
+    begin: float
+    start: np.ndarray
+    way: np.ndarray
+    speeds: np.ndarray
+    progress: Callable[[float], float]
+    reaching: Callable[[float], float]
+    at_speed: bool
+    moves: bool = True
+
+    def state(self, t: float) -> np.ndarray:
+        """State at a time, roughly."""
+        progress = self.progress(t)
+        if self.at_speed or t == self.begin:
+            return np.asarray(self.start + progress * self.way)
+        back = A_LITTLE * (t - self.begin)
+        rate = (progress - self.progress(t - back)) / back
+        return np.asarray(self.start + progress * self.way + rate * self.speeds)
+
+
+def by_speeds(engine: Engine, y: np.ndarray) -> Direction:
+    """The direction of the state's own speeds."""
+    nq = engine.model.nq
+    engine.attempt(y, engine.start)
+    rate = engine.slope.copy()
+    rate[nq:] = 0.0
+    return _steady(engine, y, rate)
+
+
+def _steady(engine: Engine, y: np.ndarray, rate: np.ndarray) -> Direction:
+    nq = engine.model.nq
+    fastest = float(np.max(np.abs(rate[:nq]) / engine.model.state_scales[:nq], initial=0.0))
+    still = np.zeros(len(y))
+
+    def reaching(size: float) -> float:
+        return size / fastest if fastest > 0.0 else np.inf
+
+    return Direction(engine.start, y, rate, still, lambda t: t - engine.start, reaching, True, fastest > 0.0)
+
+
+def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
+    """All directions that the drives and the given velocities leave, from the state at the start; few or none."""
+    sampler = Sampler(engine)
+    seen = _Pose(engine, y)
+    found = seen.directions()
+    sampler.restore()
+    return found
+
+
+class _Pose:
+    """What there is of first and second order in the pose."""
+
+    def __init__(self, engine: Engine, y: np.ndarray) -> None:
+        self.engine, self.nv, self.units = engine, engine.model.nv, engine.model.speed_scales
+        self.rest = y.copy()
+        self.rest[engine.model.speeds] = 0.0
+        engine.keep(np.ones(len(engine.kept), dtype=bool))
+        self.asked = initial.velocity_equations(engine.model, start_motions(engine), self.rest)
+        self.J = self.asked.matrix[self.asked.told :]
+        U, values, _ = np.linalg.svd(self.J)
+        rank = int(np.sum(values > ZERO * values[0])) if len(values) else 0
+        self.left = U[:, rank:]
+        self.rates = np.array([self._rate(k) for k in range(self.nv)]).reshape(self.nv, engine.model.nq)
+
+    def _rate(self, k: int) -> np.ndarray:
+        """Rates of the positions at a unit of speed k."""
+        speeds = np.zeros(self.nv)
+        speeds[k] = 1.0
+        self.engine.attempt(self._with(speeds), self.engine.start)
+        return self.engine.slope[: self.engine.model.nq].copy()
+
+    def moved(self, step: np.ndarray) -> np.ndarray:
+        """The state in the pose displaced by coordinates, in their units."""
+        y = self.rest.copy()
+        y[: self.engine.model.nq] += step @ self.rates
+        return y
+
+    def residual(self, step: np.ndarray, t: float) -> np.ndarray:
+        """Residuals of all closures after a displacement, at a time; lengths in units of the mechanism's size."""
+        model = self.engine.model
+        self.engine.attempt(self.moved(step), t)
+        along = model.arrays.table(m.CLOSURE_ROWS, self.engine.h)["kind"] == 0
+        return np.asarray(self.engine.view(m.RESIDUAL) * np.where(along, 1.0 / model.length, 1.0))
+
+    def directions(self) -> list[Direction]:
+        """By speeds that are asked for, by where the drives go from rest, or by forces from rest."""
+        rows, target = self.asked.matrix, self.asked.target
+        speeds, *_ = np.linalg.lstsq(rows, target, rcond=ZERO)
+        fastest = float(np.max(np.abs(speeds), initial=0.0))
+        if fastest > ZERO * float(np.max(np.abs(target), initial=0.0)) > 0.0:
+            span = WAY / fastest
+            steps = self._tangents(span * speeds, _null(rows), self.engine.start + span)
+            return [_steady(self.engine, self._with(step / span), self._slope(step / span)) for step in steps]
+        until = self._drives_go()
+        if until is None:
+            return [d for step in self._tangents(np.zeros(self.nv), _null(self.J), None) for d in self._fall(step)]
+        t = self.engine.start + until
+        went = self.residual(np.zeros(self.nv), t)
+        base, *_ = np.linalg.lstsq(self.J, -went, rcond=ZERO)
+        return [self._driven(step, float(np.linalg.norm(went))) for step in self._tangents(base, _null(self.J), t)]
+
+    def _with(self, speeds: np.ndarray) -> np.ndarray:
+        """The pose with speeds, in units of the coordinates."""
+        y = self.rest.copy()
+        y[self.engine.model.speeds] = speeds * self.units
+        return y
+
+    def _slope(self, step: np.ndarray) -> np.ndarray:
+        """Change of the state that a displacement is."""
+        return self.moved(step) - self.rest
+
+    def _drives_go(self) -> float | None:
+        """How long until the drives have opened the loops by about WAY; None when they do not move them."""
+        begin, end = self.engine.start, float(self.engine.breaks[1])
+
+        def opened(span: float) -> float:
+            return float(np.linalg.norm(self.residual(np.zeros(self.nv), begin + span)))
+
+        span = end - begin
+        if opened(span) < ZERO and opened(0.5 * span) < ZERO:
+            return None
+        for _ in range(HALVINGS):
+            if opened(span) <= WAY:
+                break
+            span *= 0.5
+        return span
+
+    def _driven(self, step: np.ndarray, went: float) -> Direction:
+        """From rest, as far as the drives have opened the loops."""
+        size = float(np.max(np.abs(step)))
+
+        def progress(t: float) -> float:
+            return float(np.linalg.norm(self.residual(np.zeros(self.nv), t))) / went
+
+        def reaching(wanted: float) -> float:
+            span = float(self.engine.breaks[1]) - self.engine.start
+            for _ in range(HALVINGS):
+                if progress(self.engine.start + span) * size <= wanted:
+                    break
+                span *= 0.8
+            return span
+
+        return Direction(
+            self.engine.start, self.rest, self._slope(step), self._with(step) - self.rest, progress, reaching, False
+        )
+
+    def _fall(self, step: np.ndarray) -> list[Direction]:
+        """From rest under the forces, if they push this way along the branch."""
+        t, y = self.engine.start, self.moved(step)
+        singular.select_rows(self.engine, y, t)
+        if not self.engine.attempt(y, t):
+            return []
+        push = self.engine.slope[self.engine.model.speeds] / self.units @ step / (step @ step)
+        if not push * (self.engine.end - t) ** 2 > WAY:
+            return []
+        size = float(np.max(np.abs(step)))
+        return [
+            Direction(
+                t, self.rest, self._slope(step), self._with(step) - self.rest, lambda at: 0.5 * push * (at - t) ** 2,
+                lambda wanted: float(np.sqrt(2.0 * wanted / (push * size))), False,
+            )
+        ]  # fmt: skip
+
+    def _tangents(self, base: np.ndarray, free: np.ndarray, t: float | None) -> list[np.ndarray]:
+        """Displacements by about WAY with which the closures hold to second order; from rest both ways of a line."""
+        homogeneous, at = t is None, self.engine.start if t is None else t
+
+        def open_by(alpha: np.ndarray) -> np.ndarray:
+            return self.left.T @ self.residual(base + WAY * alpha @ free, at)
+
+        forms = _quadratic(open_by, len(free))
+        heard = _heard(forms, free)
+        if not len(heard) or len(heard) > MOST:
+            return []
+        forms = _quadratic(lambda beta: open_by(beta @ heard), len(heard))
+        roots = _roots(forms, homogeneous)
+        return [base + WAY * root @ heard @ free for root in roots]
+
+
+def _null(rows: np.ndarray) -> np.ndarray:
+    """Directions (k, nv) in which rows say nothing, orthonormal."""
+    _, values, Vt = np.linalg.svd(rows)
+    rank = int(np.sum(values > ZERO * values[0])) if len(values) and values[0] > 0.0 else 0
+    return np.asarray(Vt[rank:])
+
+
+@dataclass(frozen=True)
+class _Forms:
+    """Quadratic functions c + B a + a A a of k variables: (l,), (l, k), (l, k, k)."""
+
+    c: np.ndarray
+    B: np.ndarray
+    A: np.ndarray
+
+    def value(self, a: np.ndarray) -> np.ndarray:
+        return np.asarray(self.c + self.B @ a + np.einsum("lij,i,j->l", self.A, a, a))
+
+    def gradient(self, a: np.ndarray) -> np.ndarray:
+        return np.asarray(self.B + 2.0 * np.einsum("lij,j->li", self.A, a))
+
+
+def _quadratic(function: Callable[[np.ndarray], np.ndarray], k: int) -> _Forms:
+    """The function's values at unit steps, as a quadratic function."""
+    e, c = np.eye(k), function(np.zeros(k))
+    plus, minus = [function(e[i]) for i in range(k)], [function(-e[i]) for i in range(k)]
+    B = 0.5 * np.array([p - q for p, q in zip(plus, minus, strict=True)]).reshape(k, len(c)).T
+    A = np.zeros((len(c), k, k))
+    for i in range(k):
+        A[:, i, i] = 0.5 * (plus[i] + minus[i]) - c
+        for j in range(i):
+            A[:, i, j] = A[:, j, i] = 0.5 * (function(e[i] + e[j]) - plus[i] - plus[j] + c)
+    return _Forms(c, B, A)
+
+
+def _heard(forms: _Forms, free: np.ndarray) -> np.ndarray:
+    """Combinations of the free directions of which the forms say something, (k', k)."""
+    rows = np.concatenate([forms.A.reshape(-1, len(free)), forms.B]) if len(free) else np.zeros((0, 0))
+    if not rows.size or not np.any(rows):
+        return np.zeros((0, len(free)))
+    _, values, Vt = np.linalg.svd(rows)
+    return np.asarray(Vt[: int(np.sum(values > SILENT * values[0]))])
+
+
+def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
+    """Zeros of the forms; of homogeneous ones those of unit length.  Gauss-Newton from starts of a fixed seed."""
+    k, found = forms.B.shape[1], list[np.ndarray]()
+    size = max(float(np.max(np.abs(forms.A), initial=0.0)), float(np.max(np.abs(forms.B), initial=0.0)))
+    for start in np.random.default_rng(0).normal(size=(STARTS * k, k)):
+        a = start / (np.linalg.norm(start) if homogeneous else 1.0)
+        for _ in range(STEPS):
+            value, gradient = forms.value(a), forms.gradient(a)
+            if homogeneous:
+                value, gradient = np.append(value, size * (a @ a - 1.0)), np.vstack([gradient, 2.0 * size * a])
+            step, *_ = np.linalg.lstsq(gradient, -value, rcond=1e-10)
+            a = a + step
+        left = np.linalg.norm(np.append(forms.value(a), size * (a @ a - 1.0) if homogeneous else 0.0))
+        if left <= SAME * size and not any(np.linalg.norm(a - b) <= SAME * (1.0 + np.linalg.norm(b)) for b in found):
+            found.append(a)
+    return found

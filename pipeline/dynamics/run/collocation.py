@@ -1,0 +1,295 @@
+"""The motion over a singular pose, or out of one: a polynomial with the slopes of the equations at closed states.
+
+In the pose the equations have no unique solution, and beside it what a method errs is blown up, so that no method's
+stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
+well, with the slopes of the equations at points each of which is closed first (collocation, by Picard's iteration);
+points too near to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
+its branch. That there is one shows: the iteration converges, closing changes nothing, the loops are closed between the
+points as well, and one point less gives the same end. It depends on no method and on no tolerance.
+
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (collocation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations import observation
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.observation import ROUNDING as CLOSED
+from pipeline.dynamics.run.observation import observe_with
+
+#: points of the polynomial; the end is one of them, the start is not
+POINTS = m.COLLOCATION_ROWS - 1
+NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
+#: points where a closure row has less than this share of the independence that it has at the best one are left out; or
+#: less than the second where the first would leave out more than MANY: a slow motion is long near the pose
+LEAST, SLOW_LEAST, MANY = 0.05, 0.005, 2
+#: so many must be left
+FEWEST = 6
+#: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
+LED, TURNS = 2, 4
+#: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
+ROUNDS, HELPS, ROUNDING, NOISE = 40, 0.3, 1e-13, 1e-10
+#: iterations are given up when one is so much worse than the last, and, after so many, when what the points leave
+#: unresolved does not fall
+WORSE, EARLY = 10.0, 6
+#: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size; and how much its
+#: end may change without one of the points, which is at least ten times what it is off
+EXACT, SENSITIVE = 1e-10, 1e-9
+#: all of that may be so much more out of a pose in which the motion begins at rest: it is long near the pose then
+SLOWLY = 100.0
+#: and where the polynomial is so short that a row has less than this share left at its ends, by the square of that
+NEAR = 0.03
+
+
+@dataclass(frozen=True)
+class Collocation:
+    """A polynomial motion. start, span [s]; series: Chebyshev coefficients of the state, (COLLOCATION_ROWS, n).
+
+    independence: of the closure rows at its end.  evaluations: what it took.
+    """
+
+    start: float
+    span: float
+    series: np.ndarray
+    independence: np.ndarray
+    evaluations: int
+
+    @property
+    def end(self) -> float:
+        """Time up to which it holds [s]."""
+        return self.start + self.span
+
+    def states(self, times: np.ndarray) -> np.ndarray:
+        """States at times [s], shape (len(times), n)."""
+        return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, self.series).T)
+
+
+@dataclass(frozen=True)
+class Lead:
+    """What leads out of a singular pose. state: by time [s], roughly.
+
+    turn: by what share of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
+    """
+
+    state: Callable[[float], np.ndarray]
+    turn: float
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A state, closed, at a point: its slope, and the independence of the closure rows; sound: whether it has these."""
+
+    y: np.ndarray
+    slope: np.ndarray
+    independence: np.ndarray
+    sound: bool
+
+
+class Sampler:
+    """Evaluates closed states with the laws and contacts in force; `restore` leaves the engine as it was."""
+
+    def __init__(self, engine: Engine) -> None:
+        self.engine, self.evaluations, contacts = engine, 0, len(engine.model.contacts)
+        laws = engine.model.arrays.size(m.N_LAWS)
+        self._pieces = engine.n[engine.n[m.ACTIVE] :][:laws].copy()
+        self._row = m.empty_record(1, contacts, engine.model.ny)
+        record = m.record(self._row, contacts)
+        record.modes[:], record.latched[:] = engine.modes, engine.latched
+        self._kept = engine.w.copy(), engine.n.copy()
+
+    def restore(self) -> None:
+        """Put the engine's memory back."""
+        self.engine.w[:], self.engine.n[:] = self._kept
+
+    def closed(self, t: float, y: np.ndarray) -> tuple[np.ndarray, bool]:
+        """The state nearest to y with its loops closed, and whether there is one."""
+        record = m.record(self._row, len(self.engine.model.contacts))
+        record.time[:], record.state[:] = t, y
+        out = observe_with(self.engine, self._row, self._pieces[None, :], CLOSED)
+        seen = observation.by_name(out, self.engine.model.arrays.size)
+        self.evaluations += 2
+        return seen.state[0].copy(), bool(seen.status[0] == m.OK)
+
+    def sample(self, t: float, y: np.ndarray) -> Sample:
+        """What there is at a state after closing it."""
+        there, sound = self.closed(t, y)
+        sound &= self.attempt(t, there)
+        return Sample(there, self.slope(), self.engine.independence(), sound)
+
+    def attempt(self, t: float, y: np.ndarray) -> bool:
+        """Evaluate a state as it is."""
+        self.evaluations += 1
+        return self.engine.attempt(y, t)
+
+    def slope(self) -> np.ndarray:
+        """Slope of the state evaluated last."""
+        return self.engine.slope.copy()
+
+
+def collocate(
+    sampler: Sampler,
+    t: float,
+    y: np.ndarray,
+    span: float,
+    slope: np.ndarray | None,
+    lead: Lead | None = None,
+    share: float = 1.0,
+) -> Collocation | None:
+    """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
+
+    slope: at the start; None in a singular pose, where there is none.  lead: what to begin with there; without it the
+    state's own speeds lead.  share: what a closure row has left of its most at the ends; rounding follows its square.
+    """
+    began = sampler.evaluations
+    samples = _march(sampler, t, y, span, slope, lead)
+    used = _far_from_singular(samples, LEAST)
+    if slope is not None and used.sum() < POINTS - MANY:
+        used = _far_from_singular(samples, SLOW_LEAST)
+    if used.sum() < FEWEST:
+        return None
+    found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
+    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / share) ** 2)
+    for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
+        size = _sizes(sampler.engine, y, [s.slope for s in found])
+        iterated = _iterate(sampler, t, y, span, nodes, found, blur * size)
+        if iterated is None:
+            return None
+        found, slopes, left = iterated
+        if lead is None or lead.turn == 0.0:
+            break
+        better = _speeds_at_start(sampler.engine, y, nodes, [s.y for s in found])
+        if not np.max(np.abs(better - y) / size) <= lead.turn:
+            return None
+        y = better
+    series = _series(nodes, slopes, y, span)
+    made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
+    unresolved = _sensitivity(nodes, slopes, span, blur * size)
+    sound = left <= EXACT and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * EXACT
+    return made if sound else None
+
+
+def _iterate(
+    sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, found: list[Sample], size: np.ndarray
+) -> tuple[list[Sample], np.ndarray, float] | None:
+    """Picard's iteration from the slopes at the nodes: what is there at last, its slopes, what closing changed."""
+    slopes = np.array([s.slope for s in found])
+    weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
+    states = y + span * weights @ slopes
+    for k in range(ROUNDS):
+        found = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
+        if not all(s.sound for s in found):
+            return None
+        slopes = np.array([s.slope for s in found])
+        left = float(np.max(np.abs([s.y for s in found] - states) / size))
+        before, states = states, y + span * weights @ slopes
+        change = float(np.max(np.abs(states - before) / size))
+        if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
+            return found, slopes, left
+        unresolved = _sensitivity(nodes, slopes, span, size)
+        if not change <= WORSE * last or (k >= EARLY and unresolved > SENSITIVE and unresolved > HELPS * rough):
+            return None
+        last, rough = change, unresolved
+    return None
+
+
+def _speeds_at_start(engine: Engine, y: np.ndarray, nodes: np.ndarray, closed: list[np.ndarray]) -> np.ndarray:
+    """The state with the speeds that the branch itself has at the start, from those of closed states on it."""
+    speeds, better = engine.model.speeds, y.copy()
+    polynomial = np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, len(nodes) - 1), np.array(closed)[:, speeds])
+    better[speeds] = chebyshev.chebval(-1.0, polynomial)
+    return better
+
+
+def _march(
+    sampler: Sampler,
+    t: float,
+    y: np.ndarray,
+    span: float,
+    slope: np.ndarray | None,
+    lead: Lead | None,
+) -> list[Sample]:
+    """What there is at the nodes, each state predicted by the polynomial through the slopes before it."""
+    nq, flat = sampler.engine.model.nq, np.zeros(len(y))
+    if slope is None:
+        sampler.attempt(t, y)
+        flat[:nq] = sampler.slope()[:nq]
+    nodes, slopes = ([0.0], [slope]) if slope is not None else ([], [])
+    samples = list[Sample]()
+    for x in NODES:
+        if slope is None and len(nodes) < LED:
+            state = lead.state(t + x * span) if lead is not None else y + x * span * flat
+        else:
+            state = y + span * (_integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes))
+        samples.append(sampler.sample(t + x * span, state))
+        if samples[-1].sound and _share(samples[-1], samples) >= LEAST:
+            nodes.append(x)
+            slopes.append(samples[-1].slope)
+    return samples
+
+
+def _share(sample: Sample, samples: list[Sample]) -> float:
+    """Least share that a row has of the most independence that it has at any sample."""
+    if not len(sample.independence):
+        return 1.0
+    best = np.max([s.independence for s in samples if s.sound], axis=0)
+    return float(np.min(sample.independence / best))
+
+
+def _far_from_singular(samples: list[Sample], least: float) -> np.ndarray:
+    """Which samples may be used."""
+    if not any(s.sound for s in samples):
+        return np.zeros(len(samples), dtype=bool)
+    return np.array([s.sound and _share(s, samples) >= least for s in samples])
+
+
+def _sizes(engine: Engine, y: np.ndarray, slopes: list[np.ndarray]) -> np.ndarray:
+    """What errors of positions and speeds are compared with; the rest of the state follows from them."""
+    nq, unit = engine.model.nq, engine.model.state_scales
+    fastest = float(np.max(np.abs(np.array(slopes)[:, :nq]) / unit[:nq], initial=0.0))
+    size = np.where(np.arange(len(y)) < nq, 1.0, fastest) * unit
+    size[engine.model.speeds.stop :] = np.inf
+    return size
+
+
+def _integrals(nodes: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Weights (ends, nodes) of values at the nodes in the integral of their polynomial from 0 to each end."""
+    degree = len(nodes) - 1
+    basis = [chebyshev.chebint(row, lbnd=-1.0) for row in np.eye(degree + 1)]
+    integrals = 0.5 * np.array([chebyshev.chebval(2.0 * ends - 1.0, c) for c in basis]).T
+    return np.asarray(np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, degree).T, integrals.T).T)
+
+
+def _series(nodes: np.ndarray, slopes: np.ndarray, y: np.ndarray, span: float) -> np.ndarray:
+    """Chebyshev coefficients of the state, filled up to COLLOCATION_ROWS."""
+    derivative = np.linalg.solve(chebyshev.chebvander(2.0 * nodes - 1.0, len(nodes) - 1), slopes)
+    series = np.zeros((m.COLLOCATION_ROWS, len(y)))
+    series[: len(nodes) + 1] = 0.5 * span * chebyshev.chebint(derivative, lbnd=-1.0)
+    series[0] += y
+    return series
+
+
+def _sensitivity(nodes: np.ndarray, slopes: np.ndarray, span: float, size: np.ndarray) -> float:
+    """Change of the end when one of the points in the middle is left out."""
+    middle, end = len(nodes) // 2, np.ones(1)
+    fewer = _integrals(np.delete(nodes, middle), end) @ np.delete(slopes, middle, axis=0)
+    return float(np.max(np.abs(_integrals(nodes, end) @ slopes - fewer) * span / size))
+
+
+def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
+    """Largest violation of a closure between the points, in shares of the mechanism's size or as sines."""
+    model = sampler.engine.model
+    along = model.arrays.table(m.CLOSURE_ROWS, sampler.engine.h)["kind"] == 0
+    scale, worst = np.where(along, model.length, 1.0), 0.0
+    ends = np.concatenate([[0.0], nodes])
+    times = made.start + made.span * 0.5 * (ends[1:] + ends[:-1])
+    for t, y in zip(times, made.states(times), strict=True):
+        sampler.attempt(float(t), y)
+        worst = max(worst, float(np.max(np.abs(sampler.engine.view(m.RESIDUAL)) / scale, initial=0.0)))
+    return worst

@@ -1,0 +1,240 @@
+"""A motion followed period after period, and a neighbour that shows at what rate such motions part.
+
+The laws of one period hold in each, so that the run's time starts over while its state goes on: memory does not grow
+with the number of periods, and neither does the rounding of the time. The neighbour starts a small distance away and is
+brought back to that distance, in its own direction, at every waypoint; the mean of the logarithms of what it went
+astray in between is the largest Lyapunov exponent. It is a motion like any other, so that what impacts do to it, which
+begin earlier or later in it, needs no equations of its own.
+
+Source: Benettin, Galgani, Giorgilli & Strelcyn (1980), Lyapunov characteristic exponents for smooth dynamical systems,
+Meccanica 15, 9-30 (rescaled neighbours); Mueller (1995), Calculation of Lyapunov exponents for dynamic systems with
+discontinuities, Chaos, Solitons & Fractals 5, 1671-1681 (what a neighbour does at an impact).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import silent
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.driving import prescribed
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.start import project
+from pipeline.dynamics.run.trajectory import LASTING, Handover, Trajectory, integrate
+
+#: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
+WAYPOINTS = 16
+#: the neighbour's distance in units of the relative tolerance: what steps differ by is then a thousandth of it
+APART = 1e3
+#: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is told
+FAR = 1e4
+#: laws repeat when they end a period as they began it, but for this share
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All that goes on from one stretch of time to the next.
+
+    y: state.  modes, latched, watched: of the contacts, as in the work space.  begun: events of the contacts that are
+    closed, as rows of the event table.
+    """
+
+    y: np.ndarray
+    modes: np.ndarray
+    latched: np.ndarray
+    watched: np.ndarray
+    begun: np.ndarray
+
+
+@dataclass(frozen=True)
+class Period:
+    """One period of the motion, and by how much the neighbour's distance grew.
+
+    parts: the stretches between waypoints; times start over with each period.
+    growth: logarithm of the distance's growth, 0 where no neighbour is followed.  lost: how often the neighbour was
+    beyond what is linear.
+    """
+
+    number: int
+    parts: tuple[Trajectory, ...]
+    growth: float
+    lost: int
+
+
+def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
+    """InputError unless there are laws, and all end the period with the values that they begin it with, drives with
+    the rates, too.
+
+    Whole turns of a driven angle are no difference.
+    """
+    if not len(parts[0].table(m.LAW)):
+        raise InputError(
+            "[sections]", "nothing repeats: no drive and no load has a law of time", "drive a joint, or vary a load"
+        )
+    values = list[np.ndarray]()
+    for part, t in ((parts[0], parts[0].start), (parts[-1], parts[-1].end)):
+        part.select_pieces_after(t)
+        part.attempt(y, t)
+        laws = part.table(m.LAW)
+        values.append(np.stack([laws["value"], laws["rate"]], axis=1))
+    period = parts[-1].end - parts[0].start
+    driven = prescribed(parts[0].model.scene)
+    for k, (begin, end) in enumerate(zip(*values, strict=True)):
+        drive = driven[k] if k < len(driven) else None
+        change = end - begin
+        if drive is None:
+            change[1] = 0.0  # a load's rate may jump
+        elif drive.dimension == "angle":
+            change[0] = (change[0] + np.pi) % (2.0 * np.pi) - np.pi
+        size = np.abs([begin, end]).max(axis=0) + np.array([1.0, 1.0 / period]) * (1.0 if drive is None else SAME)
+        if np.any(np.abs(change) > SAME * size):
+            what = f"[drive.{drive.name}]" if drive is not None else "[load]"
+            which = "value" if abs(change[0]) > SAME * size[0] else "rate"
+            raise InputError(
+                what,
+                f"its law does not repeat after a period of {period:.6g} s: its {which} has changed by "
+                f"{change[0 if which == 'value' else 1]:.3g}",
+                "give the laws' period as sections.period, or choose laws that end as they begin",
+            )
+
+
+def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
+    """The engine between the waypoints of a period, one of which is at `phase`; they share its work space."""
+    regular = period * np.linspace(0.0, 1.0, WAYPOINTS + 1)
+    # where a regular one is next to the phase, the phase takes its place
+    inner = regular[1:-1][np.abs(regular[1:-1] - phase) > 0.25 * period / WAYPOINTS]
+    times = engine.start + np.unique([0.0, *inner, phase, period])
+    return [replace(engine, start=float(a), end=float(b)) for a, b in pairwise(times)]
+
+
+def periods(parts: list[Engine], y: np.ndarray, followed: range) -> Iterator[Period]:
+    """Period after period from a consistent start y, for ever.
+
+    parts: stretches of a period.  followed: numbers of the periods in which a neighbour is followed.
+    Raises SolverError where the run cannot go on.
+    """
+    period = parts[-1].end - parts[0].start
+    scales = state_scales(parts[0], period)
+    apart = APART * parts[0].rtol
+    here: Moment | None = None
+    beside: Moment | None = None
+    number = 0
+    while True:
+        done, growth, lost = list[Trajectory](), 0.0, 0
+        if number not in followed:
+            beside = None
+        for part in parts:
+            trajectory, there = _go(part, y, here)
+            if beside is not None:
+                after = _follow(part, beside)
+                beside, grown = brought_back(part, scales, there, after, apart)
+                growth, lost = growth + grown[0], lost + grown[1]
+            elif number in followed:
+                beside = _set_beside(part, scales, there, apart)
+            done.append(trajectory)
+            here = there
+        yield Period(number, tuple(done), growth, lost)
+        here, beside = (None if moment is None else _earlier(moment, period) for moment in (here, beside))
+        number += 1
+
+
+def state_scales(engine: Engine, period: float) -> np.ndarray:
+    """Size of each state variable: the mechanism's size or a radian, for speeds in a period; infinite where nothing
+    feeds back (energies of the ledger)."""
+    groups = engine.model.arrays.table(m.GROUPS)["group"]
+    floors = np.asarray(engine.model.arrays.table(m.FLOORS)["magnitude"])[groups].astype(float)
+    floors[engine.model.speeds] /= period
+    floors[engine.model.speeds.stop :] = np.inf
+    return floors
+
+
+def _go(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
+    """Over one stretch; from the start of the run where there is no moment yet."""
+    left = None if here is None else _handed(part, here)
+    trajectory = integrate(part, y, silent, left=left)
+    return trajectory, _moment(part, trajectory)
+
+
+def _follow(part: Engine, here: Moment) -> Moment | None:
+    """Where the neighbour comes to; None where it cannot be followed."""
+    try:
+        return _go(part, here.y, here)[1]
+    except SolverError:
+        return None
+
+
+def _handed(part: Engine, here: Moment) -> Handover:
+    """A moment as what another method would have left of this stretch: one row, and the contacts' open events."""
+    counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
+    for place, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
+        counters[place - m.STATUS] = value
+    lasting = np.zeros(len(LASTING))
+    lasting[0] = part.start
+    rows = m.empty_record(1, len(part.model.contacts), len(here.y))
+    first = m.record(rows, len(part.model.contacts))
+    first.time[:], first.state[:] = part.start, here.y
+    first.modes[:], first.latched[:] = here.modes[: len(part.model.contacts)], here.latched[: len(part.model.contacts)]
+    kept = ((part.start, part.kept.copy()),)
+    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, kept)
+
+
+def _moment(part: Engine, trajectory: Trajectory) -> Moment:
+    """What the work space holds at the end of a stretch."""
+    watched, events = part.view(m.WATCH.place).copy(), list[np.ndarray]()
+    table = m.named(m.WATCH, watched)
+    for c in range(len(part.model.contacts)):
+        if part.modes[c]:
+            mine = (trajectory.events["contact"] == c) & (trajectory.events["kind"] == m.CLOSING)
+            begun = trajectory.events[np.flatnonzero(mine)[-1]]
+            table["event_row"][c] = len(events)
+            events.append(np.array([float(begun[name]) for name in begun.dtype.names]))
+    begun_events = np.array(events).reshape(len(events), m.EVENT.size)
+    return Moment(trajectory.state[-1].copy(), part.modes.copy(), part.latched.copy(), watched, begun_events)
+
+
+def _earlier(moment: Moment, period: float) -> Moment:
+    """The moment when time has started over: its contacts began a period earlier."""
+    begun = moment.begun.copy()
+    m.named(m.EVENT, begun)["time"] -= period
+    return replace(moment, begun=begun)
+
+
+def _set_beside(part: Engine, scales: np.ndarray, here: Moment, apart: float) -> Moment:
+    """A neighbour in a direction that no symmetry of a mechanism has."""
+    direction = np.where(np.isfinite(scales), np.sin(1.0 + np.arange(len(scales)) * 2.399963), 0.0)
+    unit = direction / np.linalg.norm(direction)
+    moved = here.y + apart * unit * np.where(np.isfinite(scales), scales, 0.0)
+    return replace(here, y=_closed(part, moved))
+
+
+def brought_back(
+    part: Engine, scales: np.ndarray, here: Moment, beside: Moment | None, apart: float
+) -> tuple[Moment, tuple[float, int]]:
+    """The neighbour at its distance again; by how much that had grown (its logarithm), and 1 if it was lost.
+
+    Where one of both has a contact closed and the other has not, they are left as they are until both have: a state
+    between them would have surfaces that overlap without having met.
+    """
+    if beside is None:
+        return _set_beside(part, scales, here, apart), (0.0, 1)
+    if not np.array_equal(here.modes, beside.modes):
+        return beside, (0.0, 0)
+    difference = beside.y - here.y
+    distance = float(np.linalg.norm(difference / scales))
+    if distance == 0.0:
+        return _set_beside(part, scales, here, apart), (0.0, 1)
+    share = apart / distance
+    y = _closed(part, here.y + share * difference)
+    latched = here.latched + share * (beside.latched - here.latched)
+    return replace(beside, y=y, latched=latched), (-float(np.log(share)), int(distance > FAR * apart))
+
+
+def _closed(part: Engine, y: np.ndarray) -> np.ndarray:
+    """The state at the end of a stretch, its loops closed."""
+    return project(replace(part, start=part.end), y)

@@ -1,0 +1,108 @@
+"""Ends of a motion at a singular pose: a drive that pulls a loop further than it reaches, a rest in the pose, and what
+moves too fast there for a branch to be followed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model import selection
+from pipeline.dynamics.run import singular
+from pipeline.dynamics.run.engine import Engine
+
+#: least singular value of the closures, as share of the largest, above which a pose is not yet at the end of reach; and
+#: above which it is not singular
+NEAR, SINGULAR = 0.1, 1e-3
+#: a rest: share of a row in what depends, and speeds as share of the largest before
+SHARE, DYING = 0.1, 0.1
+#: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
+FASTER = 40.0
+
+
+def beyond_reach(engine: Engine) -> str:
+    """When, which drive, and at which joint, in words; nothing where reach is not what ends at the stepper's state.
+
+    In a singular pose that a motion passes, the combination of closures that becomes dependent asks nothing of the
+    drives; at the end of a loop's reach it asks them not to move.  Of loops with flexible
+    bodies, whose modes give way, this says nothing.  The memory stays as it is.
+    """
+    model, kept = engine.model, (engine.w.copy(), engine.n.copy())
+    if not model.drives or not model.closures or not model.mechanism.all_rigid:
+        return ""
+    told = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
+    engine.w[:], engine.n[:] = kept
+    return told
+
+
+def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
+    """Why the motion ends in a singular pose at the stepper's state, in words; nothing where there is none.
+
+    rows: recorded so far, whose speeds those at the stepper's state are compared with.
+    """
+    model, kept = engine.model, (engine.w.copy(), engine.n.copy())
+    t, y = float(engine.control[m.TIME]), engine.view(m.Y).copy()
+    engine.attempt(y, t)
+    J = singular.natural(model, engine.h, engine.rows(m.JACOBIAN))
+    where = singular.diagnosis(engine) if J.size else ""
+    U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
+    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > SHARE)
+    engine.w[:], engine.n[:] = kept
+    if not J.size or values[-1] > SINGULAR * values[0]:
+        return ""
+    states = m.record(rows, len(model.contacts)).state
+    before, now = (np.abs(s[..., model.speeds] / model.speed_scales)[..., moving] for s in (states, y))
+    if np.max(now, initial=0.0) > DYING * np.max(before, initial=0.0):
+        return _too_fast(engine, t, where)
+    return rest(t, where)
+
+
+def rest(t: float, where: str) -> str:
+    """A rest in a singular pose, in words."""
+    return (
+        f"at t = {t:.6g} s: the mechanism comes to rest in a singular pose ({where}), where it can go on in several "
+        "ways and no motion chooses one: let it pass the pose at speed, or stop elsewhere"
+    )
+
+
+def _too_fast(engine: Engine, t: float, where: str) -> str:
+    """What keeps a pass at speed from being smooth, in words; nothing where there is nothing of the kind."""
+    model = engine.model
+    closed = [contact.name for contact, mode in zip(model.contacts, engine.modes, strict=True) if mode]
+    flexible = [name for link in model.links if link.flexible for name in link.places]
+    causes, remedies = list[str](), list[str]()
+    if closed:
+        causes.append(f"the closed contact of {', '.join(closed)}")
+        remedies.append("soften or damp the contact")
+    if flexible:
+        causes.append(f"the vibration of {', '.join(flexible)}")
+        remedies.append(
+            "take fewer modes, or such as let the body become longer (craig-bampton), with which the pose is passed"
+        )
+    if not causes:
+        return ""
+    return (
+        f"at t = {t:.6g} s: the mechanism passes a singular pose ({where}), where it can go on in several ways, and "
+        f"{' and '.join(causes)} is too fast there for its branch to be told: {', or '.join(remedies)}"
+    )
+
+
+def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
+    model, still = engine.model, y.copy()
+    engine.attempt(y, t)
+    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
+    still[model.speeds] = 0.0
+    engine.attempt(still, t)
+    U, values, _ = np.linalg.svd(singular.natural(model, engine.h, engine.rows(m.JACOBIAN)))
+    along = singular.built_rows(model, engine.h) == 0
+    pulled = engine.view(m.RESIDUAL_RATE)[selection.kept_places(model, engine.h)]
+    pulled = np.where(along, pulled / model.length, pulled)
+    if values[-1] > NEAR * values[0]:
+        return ""
+    if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:
+        return ""
+    drive = model.drives[int(np.argmax(powers))]
+    joint = singular.worst_joint(engine, U[:, len(values) - 1])
+    return (
+        f"at t = {t:.6g} s: drive {drive} leads out of reach: the loop closed at joint {joint} is stretched or folded "
+        f"as far as it goes; shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
+    )

@@ -1,0 +1,141 @@
+"""Whether flexible bodies stay within what linear modes carry: how far they bend, how fast they turn.
+
+Limits are those at which the terms left out reach some per cent: the tip of a cantilever that bends by a tenth of its
+length is one per cent off the elastica, and the centrifugal stiffening of a turning beam is to its stiffness about as
+the square of its speed to the square of its first frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.model.model import Model
+from pipeline.dynamics.run.engine import Engine
+
+#: displacement of a point in its body frame, as share of the body's length, above which linear modes are doubted
+BENT = 0.05
+#: rotation of a section in the body frame [rad] above which they are doubted
+TURNED = 0.15
+#: speed of turning, as share of the first frequency, above which a body without stiffening is doubted
+SPIN = 0.2
+#: rows whose shapes are added up at a time
+ROWS = 16
+
+
+@dataclass(frozen=True)
+class Flexible:
+    """What a flexible link is judged by.
+
+    axis: unit vector along its longest extent, `length` [m], in the body frame.
+    first: its lowest frequency [rad/s] in the modes that it keeps; 0 for a body whose turning is not judged.
+    """
+
+    name: str
+    link: int
+    coordinates: range
+    shapes: np.ndarray
+    rotations: np.ndarray
+    axis: np.ndarray
+    length: float
+    first: float
+
+
+def flexibles(model: Model) -> list[Flexible]:
+    """The flexible links of a model, and by what each is judged."""
+    found = []
+    for i, coordinates in sorted(model.numbering.modal_positions.items()):
+        name, bundle = str(model.links[i].flexible), model.links[i].bundle
+        assert bundle is not None
+        places = bundle["node_position"].values
+        offsets = places - places.mean(axis=0)
+        axis = np.linalg.svd(offsets, full_matrices=False)[2][0]
+        along = offsets @ axis
+        stiffened = getattr(model.scene.body[name], "stiffening", None) is not None
+        least = 0.0 if stiffened else float(np.linalg.eigvalsh(bundle["modal_stiffness"].values)[0])
+        found.append(
+            Flexible(
+                name,
+                i,
+                coordinates,
+                bundle["shape_translation"].values,
+                bundle["shape_rotation"].values,
+                axis,
+                float(along.max() - along.min()),
+                float(np.sqrt(max(least, 0.0))),
+            )
+        )
+    return found
+
+
+def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
+    """Sentences about flexible bodies that left the range of linear modes in the observed rows of a run."""
+    return [text for body in flexibles(model) for text in _judged(body, time, seen.positions, seen.links)]
+
+
+def doubts(engine: Engine) -> list[str]:
+    """The same of the state that the engine evaluated last."""
+    coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
+    finite = np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.place)))
+    if not finite:
+        return []
+    time = engine.control[m.TIME : m.TIME + 1]
+    return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]
+
+
+def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> Iterator[str]:
+    """Sentences about one body; shapes (rows, coordinate) and (rows, link), the latter named fields of LINK_FRAMES."""
+    yield from _spun(body, time, frames[:, body.link])
+    q = coordinates[:, body.coordinates]
+    if body.length > 0.0:
+        row, bent = largest(body.shapes, q, BENT * body.length)
+        if bent > BENT * body.length:
+            yield (
+                f"{body.name}: at t = {time[row]:.6g} s a point of it is {bent:.3g} m from its undeformed place, "
+                f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
+                "bodies joined by fixed joints, or make it stiffer"
+            )
+    row, turned = largest(body.rotations, q, TURNED)
+    if turned > TURNED:
+        yield (
+            f"{body.name}: at t = {time[row]:.6g} s a section of it is turned by {turned:.3g} rad by its deformation; "
+            f"linear modes hold below {TURNED:g} rad: divide it into several bodies joined by fixed joints, or make it "
+            "stiffer"
+        )
+
+
+def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
+    """A sentence about turning across its length: turning about it neither stiffens nor softens bending."""
+    if body.first <= 0.0:
+        return
+    speeds = np.linalg.norm(np.cross(frame["omega"], frame["axes"] @ body.axis), axis=1)
+    row = int(np.argmax(speeds))
+    if speeds[row] > SPIN * body.first:
+        yield (
+            f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, "
+            f"{speeds[row] / body.first:.2g} of its first frequency ({body.first:.4g} rad/s), and nothing stiffens it; "
+            f"linear modes hold below {SPIN:g} and diverge near 1: give a beam stiffening = {{}}"
+        )
+
+
+def largest(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float]:
+    """Row and size of the largest displacement or rotation of any node; rows that cannot exceed `floor` are left out.
+
+    shapes: (node, axis, mode).  q: modal coordinates, (rows, mode).
+    """
+    bound = np.abs(q) @ np.linalg.norm(shapes, axis=1).max(axis=0, initial=0.0)
+    order = np.argsort(-bound, kind="stable")
+    found = (0, 0.0)
+    for first in range(0, len(order), ROWS):
+        rows = order[first : first + ROWS]
+        if not bound[rows[0]] > max(floor, found[1]):
+            break
+        sizes = np.linalg.norm(np.einsum("nam,tm->tna", shapes, q[rows]), axis=2).max(axis=1)
+        best = int(np.argmax(sizes))
+        if sizes[best] > found[1]:
+            found = int(rows[best]), float(sizes[best])
+    return found

@@ -1,0 +1,181 @@
+"""Runs beside each other: what they differ by, and by how much each may be wrong itself.
+
+Differences are taken at the output times that all runs have, never interpolated. The first run is the reference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import reduce
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core import quantities
+from pipeline.core.errors import InputError
+from pipeline.core.scene.wanted import Quantity
+from pipeline.post.overview.curves import curves, has, scaled
+from pipeline.post.plotting.table import Table
+
+#: what a run tells of its price, by its attribute
+COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}
+
+
+def assemble(
+    runs: Mapping[str, xr.Dataset], tighter: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]
+) -> xr.Dataset:
+    """All runs on their common times as one dataset.
+
+    runs: schema RUN by label, the reference first.  tighter: the same runs at a tighter tolerance.
+    Variables over (run, quantity): `largest`, `error` (largest distance from the tighter run), `difference` (largest
+    distance from the reference); over (run, quantity, time): `value`, as it is drawn, and `distance`; all in the SI
+    units of the coordinate `unit`; NaN where a run does not have a quantity, infinite where the number of impacts
+    differs.  Raises InputError when the runs have no time in common.
+    """
+    labels = list(runs)
+    time = _common(runs)
+    shape = (len(labels), len(chosen))
+    numbers = {name: np.full(shape, np.nan) for name in ("largest", "error", "difference")}
+    series = {name: np.full((*shape, time.size), np.nan) for name in ("value", "distance")}
+    reference = runs[labels[0]]
+    for j, quantity in enumerate(chosen):
+        drawn = curves(list(runs.values()), quantity)
+        for i, (label, run) in enumerate(runs.items()):
+            curve = drawn[i]
+            if curve is not None:
+                series["value"][i, j] = curve.values[_at(curve.time, time)]
+            if not has(run, quantity):
+                continue
+            numbers["largest"][i, j] = quantities.scale(run, quantity)
+            if label in tighter:
+                numbers["error"][i, j] = quantities.error(run, tighter[label], quantity)
+            if has(reference, quantity):
+                numbers["difference"][i, j] = quantities.error(run, reference, quantity)
+                if quantities.is_series(quantity):
+                    when, distance = quantities.deviation(run, reference, quantity)
+                    series["distance"][i, j] = distance[_at(when, time)]
+    data: dict[str, tuple[tuple[str, ...], np.ndarray]]
+    data = {name: (("run", "quantity"), values) for name, values in numbers.items()}
+    data |= {name: (("run", "quantity", "time"), values) for name, values in series.items()}
+    horizon = [float(run["horizon"]) if "horizon" in run else float(run["time"].values[-1]) for run in runs.values()]
+    data["horizon"] = (("run",), np.array(horizon))
+    for name in COSTS:
+        data[name] = (("run",), np.array([float(run.attrs.get(name, np.nan)) for run in runs.values()]))
+    data |= _impacts(runs)
+    result = xr.Dataset(
+        data,
+        coords={
+            "run": labels,
+            "quantity": [quantity.name for quantity in chosen],
+            "unit": ("quantity", [quantity.unit for quantity in chosen]),
+            "time": ("time", time, {"units": "s"}),
+        },
+        attrs={"Conventions": "CF-1.11", "reference": labels[0]},
+    )
+    return result.assign_coords(contact=_contacts(runs))
+
+
+def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
+    def both(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return a[quantities.common_times(a, b)[0]]
+
+    time = reduce(both, (run["time"].values for run in runs.values()))
+    if time.size < 2:
+        raise InputError(
+            " and ".join(runs),
+            "have no output times in common",
+            "give the scenes the same [time] and [output] interval",
+        )
+    return time
+
+
+def _at(own: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Indices into a run's times of the common ones."""
+    first: np.ndarray = quantities.common_times(own, wanted)[0]
+    return first
+
+
+def _contacts(runs: Mapping[str, xr.Dataset]) -> list[str]:
+    found = [str(name) for run in runs.values() if "contact" in run.coords for name in run["contact"].values]
+    return list(dict.fromkeys(found))
+
+
+def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Impacts and largest force of each contact in each run; NaN where the joint has no clearance."""
+    names = _contacts(runs)
+    count, peak = (np.full((len(runs), len(names)), np.nan) for _ in range(2))
+    for i, run in enumerate(runs.values()):
+        for k, name in enumerate(names):
+            if "contact" in run.coords and name in run["contact"].values:
+                count[i, k] = len(quantities.events(run, Quantity(name, "impact_times")))
+                peak[i, k] = quantities.events(run, Quantity(name, "peak_force"))[0]
+    return {"impact_count": (("run", "contact"), count), "peak_force": (("run", "contact"), peak)}
+
+
+def table(compared: xr.Dataset) -> Table:
+    """Largest value, own error and largest difference from the reference, of each quantity and run."""
+    labels = [str(label) for label in compared["run"].values]
+    rows = []
+    for j, name in enumerate(compared["quantity"].values):
+        unit = str(compared["unit"].values[j])
+        for i, label in enumerate(labels):
+            part = compared.isel(run=i, quantity=j)
+            if np.isnan(part["largest"]):
+                rows.append((str(name), label, "–", "–", "–"))
+                continue
+            error = float(part["error"])
+            apart = "reference" if i == 0 else _difference(compared, i, j, unit)
+            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), apart))
+    notes = [
+        "Own error: largest distance from the same run at a tolerance a hundred times tighter (of fixed steps: at "
+        "half the step). Difference: largest distance from the reference at the output times of both; behind ± the "
+        "sum of both runs' own errors."
+    ]
+    end = float(compared["time"].values[-1])
+    notes += [
+        f"{label}: neighbouring runs part after {1e3 * float(horizon):.4g} ms; what is later holds for this run only."
+        for label, horizon in zip(labels, compared["horizon"].values, strict=True)
+        if horizon < end
+    ]
+    columns = ("quantity", "run", "largest", "own error", "difference")
+    return Table("Differences, and the error of each run", columns, tuple(rows), tuple(notes))
+
+
+def costs(compared: xr.Dataset) -> Table:
+    """What each run took, and the impacts that it had."""
+    names = [str(name) for name in compared["contact"].values]
+    columns = ("run", *COSTS.values(), *(f"{name}: impacts" for name in names), *(f"{n}: peak force" for n in names))
+    rows = []
+    for i, label in enumerate(compared["run"].values):
+        part = compared.isel(run=i)
+        cells = [_whole(float(part[name])) for name in COSTS]
+        cells += [_whole(float(value)) for value in part["impact_count"].values]
+        cells += ["–" if np.isnan(value) else _number(float(value), "N") for value in part["peak_force"].values]
+        rows.append((str(label), *cells))
+    return Table("Events and costs", columns, tuple(rows))
+
+
+def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str:
+    value = float(compared["difference"][run, quantity])
+    if np.isnan(value):
+        return "–"
+    if np.isinf(value):
+        return "other number of impacts"
+    error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
+    factor, written = scaled(value, unit)
+    return f"{factor * value:.4g} ± {factor * error:.2g} {written}"
+
+
+def _own(error: float, unit: str) -> str:
+    if np.isnan(error):
+        return "–"
+    return "other number of impacts" if np.isinf(error) else _number(error, unit, 2)
+
+
+def _number(value: float, unit: str, digits: int = 4) -> str:
+    factor, written = scaled(value, unit)
+    return f"{factor * value:.{digits}g} {written}"
+
+
+def _whole(value: float) -> str:
+    return "–" if np.isnan(value) else f"{value:,.0f}"

@@ -1,0 +1,110 @@
+"""Watched quantities as curves over time: one component, magnitude or angle of each, in a unit that reads well."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core import quantities
+from pipeline.core.algebra import rotation_between
+from pipeline.core.scene.wanted import Quantity
+
+#: factor and unit of smaller and larger values, largest first
+PREFIXES = {
+    "m": ((1.0, "m"), (1e3, "mm"), (1e6, "µm"), (1e9, "nm")),
+    "m/s": ((1.0, "m/s"), (1e3, "mm/s"), (1e6, "µm/s")),
+    "rad": ((180.0 / np.pi, "°"), (1e3, "mrad"), (1e6, "µrad")),
+    "N": ((1e-3, "kN"), (1.0, "N"), (1e3, "mN")),
+    "J": ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ"), (1e6, "µJ")),
+}
+#: kinds of which one component is drawn, that with the largest range
+BY_COMPONENT = ("position", "velocity", "angular_velocity")
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """What is drawn of a quantity in one run: `values` over `time` [s], in SI; `peaks` are (time, value) of impacts."""
+
+    title: str
+    unit: str
+    time: np.ndarray
+    values: np.ndarray
+    peaks: np.ndarray
+
+
+def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]:
+    """The curve of a quantity in each run; None where a run does not have it.
+
+    A contact's quantities are drawn as its force; where the joint has no clearance, as the joint's.
+    """
+    if not quantities.is_series(quantity):
+        return [_force(run, quantity.owner) for run in runs]
+    found = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
+    there = [values for values in found if values is not None]
+    if quantity.kind in BY_COMPONENT and there:
+        k = int(np.argmax(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
+        title = f"{quantity.owner}: {quantity.kind.replace('_', ' ')} along {'xyz'[k]}"
+        title = title.replace("angular velocity along", "angular velocity about")
+    else:
+        k, title = 0, f"{quantity.owner}: {quantity.kind.replace('_', ' ')}"
+    return [
+        None if values is None else Curve(title, quantity.unit, run["time"].values, _drawn(values, quantity, k), NONE)
+        for run, values in zip(runs, found, strict=True)
+    ]
+
+
+NONE = np.empty((0, 2))
+#: contacts are short that last less than so many outputs
+SHORT = 4.0
+
+
+def has(run: xr.Dataset, quantity: Quantity) -> bool:
+    """Whether a run holds this quantity."""
+    from pipeline.core.scene.wanted import KINDS
+
+    kind = KINDS[quantity.kind]
+    return kind.owner in run.coords and quantity.owner in run[kind.owner].values
+
+
+def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray:
+    if quantity.kind == "orientation":
+        angle: np.ndarray = rotation_between(values[:1], values)
+        return angle
+    if quantity.kind in BY_COMPONENT:
+        return values[:, component]
+    return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
+
+
+def _force(run: xr.Dataset, joint: str) -> Curve | None:
+    time = run["time"].values
+    if "contact" in run.coords and joint in run["contact"].values:
+        force = np.linalg.norm(run["contact_force"].sel(contact=joint).values, axis=-1)
+        return Curve(f"{joint}: force", "N", time, force, _peaks(run, joint))
+    if "joint" in run.coords and joint in run["joint"].values:
+        force = np.linalg.norm(run["joint_force"].sel(joint=joint).values, axis=-1)
+        return Curve(f"{joint}: force", "N", time, force, NONE)
+    return None
+
+
+def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
+    """Time and largest force of each contact so short that outputs may miss it."""
+    mine = run["event_contact"].values == list(run["contact"].values).index(contact)
+    mine &= np.isfinite(run["event_peak_force"].values) & np.isfinite(run["event_duration"].values)
+    mine &= run["event_duration"].values < SHORT * float(np.median(np.diff(run["time"].values)))
+    middle = run["event_time"].values + 0.5 * run["event_duration"].values
+    return np.column_stack([middle[mine], run["event_peak_force"].values[mine]])
+
+
+def scaled(largest: float, unit: str) -> tuple[float, str]:
+    """Factor and unit in which values up to `largest` [SI] have digits before the point."""
+    choices = PREFIXES.get(unit, ((1.0, unit),))
+    good = [pair for pair in choices if pair[0] * largest >= 1.0]
+    return good[0] if good else choices[-1] if largest > 0.0 else choices[0]
+
+
+def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:
+    """`scaled` for several series that share an axis."""
+    return scaled(max((float(np.abs(v).max(initial=0.0)) for v in values.values()), default=0.0), unit)

@@ -1,0 +1,172 @@
+"""General figures of one run: motion of its bodies, reactions, contacts, energies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from pipeline.core.scene.wanted import Quantity
+from pipeline.post.overview.curves import by_unit
+from pipeline.post.plotting import style
+from pipeline.post.series import derive
+
+#: most bodies, joints and contacts that are drawn; those that are watched come first, then those with most of it
+BODIES, JOINTS, CONTACTS = 6, 8, 4
+AXES_COLORS = {"x": "#D55E00", "y": "#009E73", "z": "#0072B2"}
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#111111", "#7d6b91")
+#: what is called energy in a run, and its label
+ENERGIES = {
+    "kinetic": "kinetic",
+    "potential": "potential",
+    "elastic": "elastic",
+    "dissipated": "dissipated",
+    "drive_work": "work of drives",
+    "load_work": "work of loads",
+}
+#: title of the picture of a ball or pin in its socket
+CENTRE = "centre in its socket (mm)"
+#: of an energy that is not drawn: its share of the largest one
+UNSEEN = 1e-6
+
+
+def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | None = None) -> dict[str, bytes]:
+    """PNG and SVG of the figures that this run has, by file name: motion, reactions, contacts, energy.
+
+    run: schema RUN.  watched: quantities whose owners are drawn first.  post: schema POST, made here when None.
+    """
+    post = derive(run) if post is None else post
+    first = [quantity.owner for quantity in watched]
+    with style.style():
+        found = _motion(run, post, first) | _energy(run)
+        if post.sizes["joint"]:
+            found |= _reactions(run, post, first)
+        if "contact" in run.sizes:
+            found |= _contacts(run, post, first)
+    return found
+
+
+def _chosen(names: Sequence[str], first: Sequence[str], size: np.ndarray, most: int) -> list[int]:
+    """Indices of what is drawn: the watched ones, then those with the largest `size`."""
+    order = sorted(range(len(names)), key=lambda k: (names[k] not in first, -size[k]))
+    return order[:most]
+
+
+def _rest(count: int, most: int) -> str:
+    return f"; {most} of {count} are shown" if count > most else ""
+
+
+def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
+    names = [str(name) for name in run["body"].values]
+    moved, speed = post["displacement"].values, run["velocity"].values
+    chosen = _chosen(names, first, np.abs(moved).max(axis=(0, 2)), BODIES)
+    figure, axes = style.grid(len(chosen), 3, (11.0, 0.9 + 1.75 * len(chosen)), sharex=True)
+    time = 1e3 * run["time"].values
+    for row, k in zip(axes, chosen, strict=True):
+        factor, unit = by_unit({"": moved[:, k]}, "m")
+        rate, rate_unit = by_unit({"": speed[:, k]}, "m/s")
+        for i, (axis, color) in enumerate(AXES_COLORS.items()):
+            row[0].plot(time, factor * moved[:, k, i], color=color, label=axis)
+            row[1].plot(time, rate * speed[:, k, i], color=color, lw=0.9)
+        row[2].plot(time, np.degrees(post["rotation"].values[:, k]), color=style.INK)
+        for panel, what in zip(
+            row, (f"displacement ({unit})", f"velocity ({rate_unit})", "rotation from the start (°)"), strict=True
+        ):
+            panel.set_title(f"{names[k]}: {what}")
+            panel.set_xlim(time[0], time[-1])
+    for panel in axes[-1]:
+        panel.set_xlabel("time (ms)")
+    style.shared_legend(figure, axes[0, 0], 3)
+    style.heading(figure, f"Motion of the bodies{_rest(len(names), BODIES)}", "centre of mass, axes of the world")
+    return style.files("motion", figure)
+
+
+def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
+    names = [str(name) for name in post["joint"].values]
+    force = post["reaction"].values
+    drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
+    chosen = _chosen(names, first, force.max(axis=0), JOINTS)
+    panels: list[tuple[str, np.ndarray]] = [(f"{names[k]}: force (N)", force[:, k]) for k in chosen]
+    panels += [(f"{name}: drive (N or N m)", run["drive_force"].values[:, k]) for k, name in enumerate(drives)]
+    rows = -(-len(panels) // 2)
+    figure, axes = style.grid(rows, 2, (11.0, 0.9 + 1.8 * rows), sharex=True)
+    time = 1e3 * run["time"].values
+    for panel, (title, values) in zip(axes.flat, panels, strict=False):
+        panel.plot(time, values, color="#D55E00" if "drive" in title else "#0072B2", lw=0.9)
+        panel.set_title(title)
+        panel.set_xlim(time[0], time[-1])
+    for panel in axes.flat[len(panels) :]:
+        panel.set_visible(False)
+    for panel in axes[-1]:
+        panel.set_xlabel("time (ms)")
+    style.heading(
+        figure, f"Reactions and drives{_rest(len(names), JOINTS)}", "magnitude of the force that a joint transmits"
+    )
+    return style.files("reactions", figure)
+
+
+def _contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
+    names = [str(name) for name in run["contact"].values]
+    chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
+    figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
+    for row, k in zip(axes, chosen, strict=True):
+        orbit(row[0], run, float(post["clearance"].values[k]), k)
+        row[0].set_title(f"{names[k]}: {CENTRE}")
+        _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap (µm)")
+        row[1].axhline(0.0, color=style.SOFT, lw=0.8)
+        count = int(post["impact_count"].values[k])
+        share = float(post["contact_time_share"].values[k])
+        peak = float(post["peak_force"].values[k])
+        told = f"normal force (N); {count} impacts, peak {peak:.4g} N, {share:.0%} in contact"
+        _over_time(row[2], run, run["contact_normal_force"].values[:, k], told)
+    style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
+    return style.files("contacts", figure)
+
+
+def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str) -> None:
+    time = 1e3 * run["time"].values
+    axes.plot(time, values, color="#D55E00", lw=0.8)
+    axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
+    axes.set_title(title)
+
+
+def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw the ball's (or pin's) centre in its socket, and return its two coordinates [mm].
+
+    The plane is that of the two axes of the socket along which the centre moves most; of a pin, x and y.
+    """
+    offset = 1e3 * run["contact_offset"].values[:, contact]
+    i, j = sorted(np.argsort(np.ptp(offset, axis=0))[-2:])
+    radius = 1e3 * clearance
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
+    axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.6, alpha=0.8)
+    reach = 1.15 * radius
+    axes.set(xlabel="xyz"[i], ylabel="xyz"[j], aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
+    axes.set_title(CENTRE)
+    return offset[:, i], offset[:, j]
+
+
+def _energy(run: xr.Dataset) -> dict[str, bytes]:
+    there: dict[str, Any] = {label: run[name].values for name, label in ENERGIES.items() if name in run}
+    largest = max(float(np.abs(values - values[0]).max()) for values in there.values()) or 1.0
+    there = {label: v for label, v in there.items() if float(np.abs(v).max(initial=0.0)) > UNSEEN * largest}
+    factor, unit = by_unit(there, "J")
+    time = 1e3 * run["time"].values
+    figure, axes = style.grid(1, 2, (11.0, 3.3), width_ratios=[1.8, 1.0])
+    for color, (label, values) in zip(COLORS, there.items(), strict=False):
+        axes[0, 0].plot(time, factor * values, color=color, label=label)
+    axes[0, 0].set_title(f"energies ({unit})")
+    error = run["energy_error"].values
+    small, small_unit = by_unit({"": error}, "J")
+    axes[0, 1].plot(time, small * error, color=style.INK, lw=0.9)
+    axes[0, 1].set_title(f"what the ledger misses ({small_unit})")
+    for panel in axes.flat:
+        panel.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
+    if there:
+        style.shared_legend(figure, axes[0, 0], 6)
+    style.heading(figure, "Energy")
+    return style.files("energy", figure)

@@ -1,0 +1,110 @@
+"""The figure of runs beside each other: each watched quantity, and how far the others are from the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core import quantities
+from pipeline.core.scene.wanted import Quantity
+from pipeline.post.overview.curves import Curve, curves, has, scaled
+from pipeline.post.overview.figures import CENTRE, CONTACTS, orbit
+from pipeline.post.plotting import style
+from pipeline.post.series import derive
+
+#: of the runs, the reference first: told apart by colour-blind readers, too
+COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+#: opacity of a curve beyond the horizon of its run
+PALE = 0.35
+
+
+def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> dict[str, bytes]:
+    """``name.png`` and ``name.svg``; runs: schema RUN by label, the reference first."""
+    drawn = _panels(runs, chosen)
+    with style.style():
+        figure, axes = style.grid(len(drawn), 2, (11.0, 1.0 + 2.3 * len(drawn)), width_ratios=[1.5, 1.0])
+        for row, (quantity, found) in zip(axes, drawn, strict=True):
+            _overlay(row[0], runs, found)
+            _apart(row[1], runs, quantity, found)
+        style.shared_legend(figure, axes[0, 0], min(len(runs), 3))
+        style.heading(figure, "Runs beside each other", f"right: distance from {next(iter(runs))}")
+        files = style.files(name, figure)
+        return files | _orbits(f"{name}_contacts", runs)
+
+
+def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[tuple[Quantity, list[Curve | None]]]:
+    """Each quantity with its curves; what a contact has several of is drawn once."""
+    found: dict[str, tuple[Quantity, list[Curve | None]]] = {}
+    for quantity in chosen:
+        mine = curves(list(runs.values()), quantity)
+        title = next((curve.title for curve in mine if curve is not None), None)
+        if title is not None:
+            found.setdefault(title, (quantity, mine))
+    return list(found.values())
+
+
+def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[Curve | None]) -> None:
+    there = [curve for curve in found if curve is not None]
+    factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in there), there[0].unit)
+    for k, ((label, run), curve) in enumerate(zip(runs.items(), found, strict=True)):
+        if curve is None:
+            continue
+        color, last = COLORS[k % len(COLORS)], _horizon(run)
+        firm = curve.time <= last
+        look: dict[str, Any] = {"color": color, "lw": 1.8 if k == 0 else 1.0, "zorder": 1.5 if k == 0 else 2.0}
+        axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
+        axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
+        axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
+    time = there[0].time
+    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)")
+    axes.set_title(f"{there[0].title} ({unit})")
+
+
+def _apart(axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, found: Sequence[Curve | None]) -> None:
+    """Distance of the whole quantity, all its components, from the reference; of a force its difference."""
+    (_, reference), *others = runs.items()
+    lines: list[tuple[int, np.ndarray, np.ndarray]] = []
+    for k, (_, run) in enumerate(others, start=1):
+        if quantities.is_series(quantity) and has(run, quantity) and has(reference, quantity):
+            lines.append((k, *quantities.deviation(run, reference, quantity)))
+        elif (mine := found[k]) is not None and (theirs := found[0]) is not None:
+            i, j = quantities.common_times(mine.time, theirs.time)
+            lines.append((k, mine.time[i], np.abs(mine.values[i] - theirs.values[j])))
+    if not lines:
+        axes.set_visible(False)
+        return
+    unit = next(curve.unit for curve in found if curve is not None)
+    factor, written = scaled(max(float(values.max(initial=0.0)) for _, _, values in lines), unit)
+    for k, time, values in lines:
+        axes.plot(1e3 * time, factor * values, color=COLORS[k % len(COLORS)], lw=0.9)
+    time = lines[0][1]
+    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)")
+    axes.set_ylim(bottom=0.0)
+    axes.set_title(f"from the reference ({written})")
+
+
+def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
+    found = [
+        (label, run, k)
+        for label, run in runs.items()
+        if "contact" in run.sizes
+        for k in range(min(run.sizes["contact"], CONTACTS))
+    ]
+    if not found:
+        return {}
+    columns = min(len(found), 4)
+    rows = -(-len(found) // columns)
+    figure, axes = style.grid(rows, columns, (max(4.0, 2.75 * columns), 0.6 + 3.0 * rows))
+    for panel, (label, run, k) in zip(axes.flat, found, strict=False):
+        orbit(panel, run, float(derive(run)["clearance"].values[k]), k)
+        panel.set_title(f"{run['contact'].values[k]}: {label}\n{CENTRE}")
+    for panel in axes.flat[len(found) :]:
+        panel.set_visible(False)
+    return style.files(name, figure)
+
+
+def _horizon(run: xr.Dataset) -> float:
+    return float(run["horizon"]) if "horizon" in run else float(run["time"].values[-1])

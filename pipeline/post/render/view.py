@@ -1,0 +1,82 @@
+"""From where a mechanism is looked at: a planar one along its normal, any other from above and in front."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+#: from a spatial mechanism to the eye, and how far the eye is from a planar mechanism's normal: depth is then seen
+SPATIAL, TILT = np.array([-0.95, 1.45, 0.68]), 0.32
+#: speeds out of the plane that are rounding, as a share of those in it
+PLANAR = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """direction: from the mechanism to the eye, not scaled, shape (3,).  up: what is up in the picture."""
+
+    direction: np.ndarray
+    up: np.ndarray
+    planar: bool
+
+
+def view(run: xr.Dataset, told: Mapping[str, Any], asked: Sequence[float] | None = None) -> View:
+    """The view of a run.
+
+    told: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
+    asked: direction to the eye that the user wants.
+    """
+    up = _up(told)
+    if asked is not None:
+        direction = np.array(asked, dtype=float)
+        return View(direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _across(up, direction), False)
+    normal = plane(run)
+    if normal is None:
+        return View(SPATIAL, np.array([0.0, 0.0, 1.0]), False)
+    above = _across(up, normal)
+    right = np.cross(above, normal)
+    if right[np.argmax(np.abs(right))] < 0.0:  # the axis across the picture runs to the right
+        normal, right = -normal, -right
+    return View(np.linalg.norm(SPATIAL) * (normal + TILT * (0.6 * above - 0.5 * right)), above, True)
+
+
+def plane(run: xr.Dataset) -> np.ndarray | None:
+    """The normal of the plane in which all bodies move, shape (3,); None where they move in space, or not at all."""
+    turning = run["angular_velocity"].values.reshape(-1, 3)
+    moving = run["velocity"].values.reshape(-1, 3)
+    spin, speed = (float(np.linalg.norm(values, axis=1).max(initial=0.0)) for values in (turning, moving))
+    if spin > 0.0:
+        normal = turning[np.argmax(np.linalg.norm(turning, axis=1))] / spin
+        if float(np.abs(turning - np.outer(turning @ normal, normal)).max()) > PLANAR * spin:
+            return None
+    elif speed > 0.0:
+        _, size, axes = np.linalg.svd(moving, full_matrices=False)
+        if size[2] > PLANAR * size[0] or size[1] < PLANAR * size[0]:
+            return None  # along one line, or in space
+        normal = axes[2]
+    else:
+        return None
+    return normal if float(np.abs(moving @ normal).max()) <= PLANAR * max(speed, 1e-300) or speed == 0.0 else None
+
+
+def _up(told: Mapping[str, Any]) -> np.ndarray:
+    """Against gravity, where there is some; else z."""
+    fields = [load["acceleration"] for load in told.get("load", {}).values() if load.get("type") == "gravity"]
+    total = np.sum(np.array(fields, dtype=float), axis=0) if fields else np.zeros(3)
+    size = float(np.linalg.norm(total))
+    return -total / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
+
+
+def _across(up: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """`up` made perpendicular to a direction; another axis where they are nearly parallel."""
+    unit = direction / np.linalg.norm(direction)
+    for candidate in (up, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])):
+        rest = candidate - (candidate @ unit) * unit
+        if np.linalg.norm(rest) > 0.2:
+            result: np.ndarray = rest / np.linalg.norm(rest)
+            return result
+    return np.array([1.0, 0.0, 0.0])

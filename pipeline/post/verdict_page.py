@@ -1,0 +1,64 @@
+"""The page on periodic, quasi-periodic and chaotic motions: the verdict on several scenes, with its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import xarray as xr
+
+from pipeline.post.plotting.table import pipe_table
+
+INTRODUCTION = """# Periodic, quasi-periodic or chaotic
+
+Made from the datasets `results/runs/<scene>/sections.nc` and `verdict.nc` by
+
+    flexclear sections {scenes} \\
+        --page {page}
+
+Nothing on this page is typed in. Each scene's laws are repeated, period after period; {transient} periods are left to
+settle, and {periods} are looked at, once each at the same phase. For {followed} of them a neighbour is followed that
+starts {distance:.0e} away, in units of the mechanism's size, and is brought back to that distance again and again: the
+mean rate at which it parts is the largest Lyapunov exponent, with the confidence interval of its batch means.
+
+- *periodic*: the states come back, and the exponent is not positive;
+- *chaotic*: all of the exponent's interval is above what {followed} periods cannot tell from zero, and the 0-1 test
+  says so (K above 0.8);
+- *quasi-periodic*: the exponent may be zero, the 0-1 test says regular (K below 0.2), few lines hold the spectrum;
+- *undecided* otherwise.
+
+A freedom on which nothing depends, such as the spin of a leg with balls at both ends, has an exponent of zero. So the
+largest exponent of a periodic motion is zero there, and the contraction tells how fast the rest settles.
+"""
+HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "comes back after", "to", "contraction", "in 16 lines")
+
+
+def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], page: str, pictures: str) -> str:
+    """The whole page. verdicts, sections: schemas VERDICT and SECTIONS, by scene; pictures: their folder."""
+    first = next(iter(sections.values()))
+    text = INTRODUCTION.format(
+        scenes=" ".join(verdicts),
+        page=page,
+        transient=first.attrs["transient"],
+        periods=first.sizes["section"],
+        followed=first.sizes["followed"],
+        distance=first.attrs["neighbour_distance"],
+    )
+    table = pipe_table(HEAD, [row(name, verdict) for name, verdict in verdicts.items()])
+    shown = [f"## {name}\n\n![Sections of {name}]({pictures}/{name.replace('/', '_')}.png)\n" for name in verdicts]
+    return "\n".join([text, table, "", *shown])
+
+
+def row(name: str, verdict: xr.Dataset) -> tuple[str, ...]:
+    """A line of the table."""
+    after = int(verdict.returns_after)
+    return (
+        f"`{name}`",
+        str(verdict.attrs["verdict"]),
+        f"{float(verdict.exponent):.3g}",
+        f"{float(verdict.exponent_low):.3g} to {float(verdict.exponent_high):.3g}",
+        f"{float(verdict.zero_one):.2f}" if "zero_one" in verdict else "",
+        str(after) if after else "not",
+        f"{float(verdict.return_distance):.1e}",
+        f"{float(verdict.contraction):.2f}" if "contraction" in verdict and after else "",
+        f"{100 * float(verdict.few_lines):.0f} %" if "few_lines" in verdict else "",
+    )

@@ -1,0 +1,116 @@
+"""``flexclear cache``: how large the caches are, whether they are whole, what an artifact was made from; pruning."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from pipeline.core.artifacts import upkeep
+from pipeline.core.artifacts.paths import kernel_root
+from pipeline.core.errors import InputError, ResourceError
+from stages import run
+
+ACTIONS = {
+    "size": "how much is kept, by stage",
+    "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
+    "explain": "what an artifact was made from",
+    "prune": "remove what is damaged and what nothing shows any more",
+}
+#: artifacts that nothing shows are kept for so many days: going back to an earlier value costs nothing then
+KEPT = 30.0
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    for name, text in ACTIONS.items():
+        below = actions.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        if name == "explain":
+            below.add_argument("what", metavar="FILE|KEY", help="a shown file, or a key or its beginning")
+        if name == "prune":
+            below.add_argument("--days", type=float, default=KEPT, help=f"keep what is younger (default {KEPT:g})")
+            below.add_argument("--dry-run", action="store_true", help="only say what would be removed")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Do it."""
+    {"size": _size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
+
+
+def _size(options: argparse.Namespace) -> None:
+    store = run.workplace().store
+    found = upkeep.inventory(store, whole=False)
+    sizes: dict[str, list[int]] = {}
+    for artifact in found.artifacts:
+        sizes.setdefault(artifact.record.stage, []).append(artifact.size)
+    for stage, each in sorted(sizes.items()):
+        print(f"{stage:<12} {len(each):>6} artifacts {_megabytes(sum(each))}")
+    kernels = [path for path in kernel_root().rglob("*") if path.is_file()]
+    shown = [p for p in store.root.rglob("*") if p.is_file() and (store.root / "cache") not in p.parents]
+    for name, paths in (("kernels", kernels), ("shown", shown), ("orphans", list(found.orphans))):
+        print(f"{name:<12} {len(paths):>6} files     {_megabytes(sum(path.stat().st_size for path in paths))}")
+    print(f"results in {store.root}, kernels in {kernel_root()}")
+
+
+def _check(options: argparse.Namespace) -> None:
+    store = run.workplace().store
+    found = upkeep.inventory(store, whole=True)
+    broken = [path for path in kernel_root().glob("*/flexclear_*.py") if not _kernel_whole(path)]
+    faults = [*found.damaged, *(f"{path} is damaged or half written" for path in broken)]
+    print(*faults, sep="\n", end="\n" if faults else "")
+    print(f"{len(found.artifacts)} artifacts, {len(faults)} faults, {len(found.orphans)} files without a record")
+    if faults:
+        raise ResourceError(
+            "damaged files are never used: what needs them makes them again; `cache prune` removes them"
+        )
+
+
+def _kernel_whole(path: Path) -> bool:
+    from pipeline.dynamics.compile.files import compiled
+
+    return compiled(path)
+
+
+def _explain(options: argparse.Namespace) -> None:
+    store = run.workplace().store
+    record = upkeep.find(store, options.what)
+    if record is None:
+        raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
+    print(f"{record.stage} {record.key}")
+    for name, digest in record.files.items():
+        print(f"  holds {name}: sha256 {digest}")
+    for fact, value in record.facts.items():
+        print(f"  {fact}: {value}")
+
+
+def _prune(options: argparse.Namespace) -> None:
+    if not options.days >= 0.0:
+        raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
+    store = run.workplace().store
+    found = upkeep.inventory(store, whole=True)
+    chosen = upkeep.prunable(store, found, options.days * upkeep.DAY)
+    broken = [a for a in found.artifacts if store.fault(a.record) is not None]
+    chosen += [artifact for artifact in broken if artifact not in chosen]
+    size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in found.orphans)
+    kernels = 0
+    if not options.dry_run:
+        store.sweep()
+        for artifact in chosen:
+            upkeep.remove(store, artifact)
+        for path in (*found.orphans, *found.unreadable):
+            path.unlink(missing_ok=True)
+        kernels = _prune_kernels()
+    verb = "would remove" if options.dry_run else "removed"
+    print(f"{verb} {len(chosen)} artifacts and {len(found.orphans)} files without a record,{_megabytes(size)}")
+    if kernels:
+        print(f"removed {kernels} compiled kernels")
+
+
+def _prune_kernels() -> int:
+    from pipeline.dynamics.compile.folder import prune
+
+    return sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:>10.1f} MB"

@@ -1,0 +1,137 @@
+"""``flexclear check``: every mistake of scenes and their recipes at once, with file and line; nothing is run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core.errors import InputError, InputErrors
+from pipeline.core.scene import lines
+from pipeline.core.scene.load import compose, load_scene
+from pipeline.core.scene.references import dangling
+from stages import run, s1_mesh
+from stages.graph import Graph
+
+if TYPE_CHECKING:
+    from pipeline.core.scene.schema import Scene
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    parser.add_argument("--json", action="store_true", help="print the mistakes as JSON")
+
+
+def command(options: argparse.Namespace) -> int:
+    """Tell all mistakes of all scenes; exit code 2 where there are some."""
+    found: dict[str, InputError] = {}
+    for name in options.scenes:
+        mistakes, scene = examined(name)
+        found |= {str(mistake): mistake for mistake in mistakes}
+        if not mistakes and scene is not None and not options.json:
+            print(f"{scene.path}: {scene.summary()}; no mistake found")
+    if options.json:
+        print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
+    else:
+        for mistake in found.values():
+            print(f"flexclear: {lines.located(mistake)}", file=sys.stderr)
+        if len(found) > 1:
+            print(f"flexclear: {len(found)} mistakes", file=sys.stderr)
+    return InputError.exit_code if found else 0
+
+
+def examined(name: str) -> tuple[list[InputError], Scene | None]:
+    """All mistakes of a scene, and the scene where it can be read."""
+    found: list[InputError] = []
+    try:
+        path = run.find_scene(name)
+        found += dangling(compose(path), run.recipe_frames, str(path))
+    except InputError as error:
+        return _each(error), None
+    scene = None
+    try:
+        scene = load_scene(path)
+    except InputError as error:
+        found += _each(error)
+    found += _collect(_recipes(path))
+    if scene is not None:
+        found += _collect([lambda: Graph(scene).up_to("post")], path)
+        found += _collect(_laws(scene), path)
+        if not found and not scene.recipes():
+            found += _collect([lambda: _assembled(scene)], path)
+    return list({str(error): error for error in found}.values()), scene
+
+
+def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
+    """A check for each mesh recipe that a scene names."""
+    bodies = compose(path).get("body", {})
+    meshes = dict.fromkeys(body["mesh"] for body in bodies.values() if isinstance(body.get("mesh"), str))
+    yield from (partial(_recipe, Path(mesh)) for mesh in meshes)
+
+
+def _recipe(path: Path) -> None:
+    """Read a mesh recipe; of a beam, the nodes at which frames and masses have to lie are laid out, too."""
+    from pipeline.structure.fe.recipe import read_recipe
+
+    table = read_recipe(path)
+    if s1_mesh.kind_of(path) == "beam":
+        from pipeline.structure.fe import mesh
+
+        mesh.build(table, place=str(path))
+
+
+def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
+    """A check for each prescribed coordinate: whether there is such a one, and its values fit."""
+    from pipeline.dynamics.model.driving import prescribed
+    from pipeline.dynamics.model.laws import checked_law
+
+    for name, drive in scene.drive.items():
+        if getattr(drive, "joint", None) in (None, *scene.joint):
+            alone = scene.model_copy(update={"drive": {name: drive}})
+
+            def check(alone: Scene = alone) -> None:
+                for one in prescribed(alone):
+                    checked_law(alone, one.law, one.dimension, one.place)
+
+            yield check
+
+
+def _assembled(scene: Scene) -> None:
+    """Build the mechanism of a scene of rigid bodies: poses, axes and loads are then checked against the joints."""
+    from pipeline.dynamics.model.mechanism import build
+    from pipeline.dynamics.model.model import tabulate
+
+    tabulate(build(scene, {}))
+
+
+def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[InputError]:
+    """What the checks raise; errors without a file are placed in that of `path`."""
+    found: list[InputError] = []
+    for check in checks:
+        try:
+            with run.in_file(path):
+                check()
+        except InputError as error:
+            found += _each(error)
+    return found
+
+
+def _each(error: InputError) -> list[InputError]:
+    return list(error.errors) if isinstance(error, InputErrors) else [error]
+
+
+def _record(mistake: InputError) -> dict[str, Any]:
+    found = lines.where(mistake)
+    file, line = (str(found[0]), found[1]) if found else (None, None)
+    return {
+        "file": file,
+        "line": line,
+        "place": mistake.place,
+        "problem": mistake.problem,
+        "remedy": mistake.remedy,
+    }

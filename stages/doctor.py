@@ -1,0 +1,140 @@
+"""``flexclear doctor``: versions, graphics, caches, space, and a small run with a known answer."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from pipeline.core import machine
+from pipeline.core.artifacts.paths import kernel_root, results_root
+from pipeline.core.errors import FlexclearError
+from pipeline.core.workflow.fingerprint import TREE, library_version
+
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "xarray",
+    "netCDF4",
+    "skfem",
+    "meshio",
+    "matplotlib",
+    "pyvista",
+    "vtk",
+)
+#: least space that is no reason to worry [B]
+LITTLE_MEMORY, LITTLE_DISK = 1e9, 2e9
+#: a body in free fall: after the time T [s] it has fallen by g T^2/2
+GRAVITY, T = 9.81, 0.1
+SCENE = f"""
+title = "Free fall"
+[time]
+end = {T}
+[output]
+interval = {T}
+[load.gravity]
+type = "gravity"
+acceleration = [0.0, 0.0, {-GRAVITY}]
+[body.ball]
+type = "rigid"
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+pose = {{}}
+"""
+#: run apart, where nothing is compiled: that would take longer than all else
+RUN = """import sys
+import pipeline
+found = pipeline.run(sys.argv[1])
+print(float(found.position.sel(body="ball", axis="z")[-1]))
+"""
+#: integration is exact to its tolerance, 1e-10 of metres
+CLOSE = 1e-9
+
+
+class UnwellError(FlexclearError):
+    """Something that this program needs is missing or wrong."""
+
+    exit_code = 4
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """It takes nothing."""
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print what was found, line by line; UnwellError at the end when something is wrong."""
+    wrong = []
+    for name, text, fine in findings():
+        print(f"{'ok   ' if fine else 'WRONG'}  {name:<10} {text}", flush=True)
+        wrong += [] if fine else [name]
+    if wrong:
+        raise UnwellError(f"not well: {', '.join(wrong)}")
+
+
+def findings() -> Iterator[tuple[str, str, bool]]:
+    """Name, what was found, and whether that is well."""
+    yield (
+        "python",
+        f"{platform.python_version()} on {platform.system()} {platform.machine()}",
+        sys.version_info >= (3, 11),
+    )
+    versions = {name: library_version(name) for name in LIBRARIES}
+    yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), "absent" not in versions.values()
+    yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
+    root = results_root()
+    yield (
+        "results",
+        f"{root}, {machine.size(machine.disk(root))} free",
+        machine.disk(root) > LITTLE_DISK and _writable(root),
+    )
+    yield "kernels", *_kernels()
+    yield "graphics", *_graphics()
+    yield "self-test", *_self_test()
+
+
+def _writable(folder: Path) -> bool:
+    return os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK)
+
+
+def _kernels() -> tuple[str, bool]:
+    from pipeline.dynamics.compile.folder import writable
+
+    said: list[str] = []
+    try:
+        folder = writable(kernel_root(), said.append)
+    except FlexclearError as error:
+        return str(error), False
+    return said[0] if said else f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled", not said
+
+
+def _graphics() -> tuple[str, bool]:
+    """Without the system's GL libraries only pictures of shapes are missing: that is no fault."""
+    from pipeline.post.render import gl
+
+    state = gl.state()
+    return (f"{state}; {gl.REMEDY}" if state.endswith("none") else state), True
+
+
+def _self_test() -> tuple[str, bool]:
+    expected = -0.5 * GRAVITY * T**2
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "fall.toml").write_text(SCENE)
+        done = subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
+            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "FLEXCLEAR_RESULTS": folder, "PYTHONPATH": str(TREE)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+    lines = done.stdout.split()
+    if done.returncode or not lines:
+        return f"a free fall cannot be computed: {done.stderr.strip().splitlines()[-1:]}", False
+    fine = abs(float(lines[-1]) - expected) < CLOSE
+    return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine

@@ -1,0 +1,48 @@
+"""Beside stage 3: mesh -> mass, inertia and frames of the body as a rigid one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.progress import Progress
+
+#: how inputs are called that hold such bodies, before the body's name
+PREFIX = "rigid/"
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """The rigid body (schema RIGID)."""
+    from pipeline.structure.modes import rigid
+
+    progress(None, "mass and inertia")
+    return {"nc": rigid.build(inputs["mesh"])}
+
+
+def filled(bodies: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> dict[str, Any]:
+    """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe in place of their recipes."""
+    from pipeline.core.algebra import matrix_to_quaternion
+
+    result = dict(bodies)
+    for name, data in inputs.items():
+        if not name.startswith(PREFIX):
+            continue
+        body = name.removeprefix(PREFIX)
+        frames = {
+            str(frame): {
+                "position": data["frame_position"].values[k].tolist(),
+                "quaternion": matrix_to_quaternion(data["frame_rotation"].values[k]).tolist(),
+            }
+            for k, frame in enumerate(data["frame"].values)
+        }
+        numbers = {
+            "mass": float(data["mass"]),
+            "com": data["com"].values.tolist(),
+            "inertia": data["inertia"].values.tolist(),
+            "frames": frames,
+        }
+        result[body] = {key: value for key, value in bodies[body].items() if key != "mesh"} | numbers
+    return result

@@ -1,0 +1,30 @@
+"""Beside stage 4: scene and bundles -> sections of its periodic motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from stages import s4_simulate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.progress import Progress
+    from pipeline.core.scene.schema import Scene
+
+#: what sections do not depend on
+LEFT_OUT = ("output", "ensemble", "accuracy")
+
+
+def params(scene: Scene) -> dict[str, Any]:
+    """The scene as the engine sees it."""
+    common = s4_simulate.params(scene, sections=True)
+    return {**common, "scene": {name: part for name, part in common["scene"].items() if name not in LEFT_OUT}}
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Sections (schema SECTIONS); inputs are ``bundle/<body>``."""
+    from pipeline import dynamics
+
+    return {"nc": dynamics.sections(s4_simulate.rebuild(params, inputs), s4_simulate.bundles(inputs), progress)}

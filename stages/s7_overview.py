@@ -1,0 +1,26 @@
+"""Stage 7: a run -> general figures of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.progress import Progress
+    from pipeline.core.scene.schema import Scene
+
+
+def params(scene: Scene) -> dict[str, Any]:
+    """What is looked at."""
+    return {"watched": [[quantity.owner, quantity.kind] for quantity in scene.watched()]}
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """PNG and SVG by file name; inputs are ``run`` and ``post``."""
+    from pipeline.core.scene.wanted import Quantity
+    from pipeline.post.overview import figures
+
+    progress(None, "figures")
+    return dict(figures.make(inputs["run"], [Quantity(*pair) for pair in params["watched"]], inputs["post"]))

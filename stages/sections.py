@@ -1,0 +1,90 @@
+"""``flexclear sections``: is a repeated motion periodic, quasi-periodic or chaotic, and by what evidence."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.core.scene.load import edited
+from stages import run
+from stages.graph import Graph
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.scene.schema import Scene
+
+#: options and the keys of `[sections]` that they replace
+COUNTS = {"periods": "periods that are kept", "transient": "periods before them that are not"}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    for name, text in COUNTS.items():
+        parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
+    parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print the verdict on each scene."""
+    asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
+    if options.page is not None:
+        run.check_target(options.page, "--page")
+    place = run.workplace()
+    scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
+    tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
+    outcome = place.bring([graph.verdict for graph in tasks.values()])
+    run.check(outcome)
+    kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
+    judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
+    verdicts = {name: place.store.load(record) for name, record in judged.items()}
+    print("\n\n".join(text(name, verdict) for name, verdict in verdicts.items()))
+    if options.page is not None:
+        pictures = {
+            name: place.store.path(record.stage, record.key, "sections.png").read_bytes()
+            for name, record in judged.items()
+        }
+        write_page(verdicts, {name: place.store.load(record) for name, record in kept.items()}, pictures, options.page)
+
+
+def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
+    """The scene with some keys of `[sections]` replaced, whether it has that table or not."""
+    present = {} if scene.sections is None else scene.sections.model_dump(mode="json", exclude_none=True)
+    return edited(scene, {"sections": {**present, **asked}}) if asked else scene
+
+
+def write_page(
+    verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
+) -> None:
+    """The verdicts as a page, with the figures (PNG) in a folder of its name beside it."""
+    from pipeline.post.verdict_page import markdown
+
+    folder = page.parent / page.stem
+    folder.mkdir(exist_ok=True)
+    for name, picture in pictures.items():
+        (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
+    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem))
+
+
+def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
+    """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
+    place = place or run.workplace()
+    graph = Graph(scene, shown=run.as_in_its_file(scene))
+    outcome = place.bring([graph.sections, graph.verdict], jobs=1)
+    run.check(outcome)
+    made = [place.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]
+    kept, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
+    return kept, judged
+
+
+def text(scene: str, verdict: xr.Dataset) -> str:
+    """The verdict in words, and the numbers behind it (schema VERDICT)."""
+    lines = [f"{scene}: {verdict.attrs['verdict']}"]
+    lines += [f"  {reason}" for reason in str(verdict.attrs["reasons"]).split("; ")]
+    if "contraction" in verdict:
+        lines.append(f"  successive returns come closer by {float(verdict.contraction):.3g} a period")
+    return "\n".join(lines)

@@ -1,0 +1,82 @@
+"""Bushings against closed forms: coupled plane motion, natural frequencies, and torque as the slope of the energy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene
+from tests.analytic.linear_runs import frequencies
+from tests.analytic.mechanism_runs import run
+
+K = np.array([[2000.0, 300.0, 10.0], [300.0, 1500.0, -20.0], [10.0, -20.0, 4.0]])
+C = np.diag([8.0, 6.0, 0.02])
+M = np.diag([2.0, 2.0, 0.03])
+
+
+def closed_form(times: np.ndarray) -> np.ndarray:
+    """x, y, angle and their rates; in a plane the equations are linear for any angle."""
+    A = np.block([[np.zeros((3, 3)), np.eye(3)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    start = np.array([0.02, -0.01, 1.8, 0.0, 0.5, 0.0])
+    return np.array([expm(t * A) @ start for t in times])
+
+
+def test_a_block_on_a_bushing_moves_as_the_linear_equations_say() -> None:
+    dataset = run("checks/bushing")
+    known = closed_form(dataset.time.values)
+    # rtol 1e-11 over some hundred steps leaves 1e-11 of a metre
+    assert dataset.position.values[:, 0, :2] == pytest.approx(known[:, :2], abs=1e-9)
+    assert dataset.bushing_displacement.values[:, 0, :2] == pytest.approx(known[:, :2], abs=1e-9)
+    assert dataset.bushing_rotation.values[:, 0, 2] == pytest.approx(known[:, 2], abs=1e-8)
+    force = -(known[:, :3] @ K + known[:, 3:] @ C)
+    assert dataset.load_force.values[:, 0, :2] == pytest.approx(force[:, :2], abs=1e-6 * np.abs(force).max())
+    assert dataset.load_moment.values[:, 0, 2] == pytest.approx(force[:, 2], abs=1e-6 * np.abs(force).max())
+    stored = 0.5 * np.einsum("ti,ij,tj->t", known[:, :3], K, known[:, :3])
+    assert dataset.elastic.values == pytest.approx(stored, abs=1e-8 * stored.max())
+    assert np.abs(dataset.energy_error).max() < 1e-8 * stored.max()
+
+
+def test_natural_frequencies_of_a_mounted_block() -> None:
+    """The undamped ones, of the eigenproblem that the full matrices pose."""
+    small = frequencies("checks/bushing", (("load.mount.damping", (0.0,) * 6),))
+    out_of_plane = np.array([[1000.0 / 2.0]]), np.linalg.solve(np.diag([0.01, 0.02]), [[5.0, 1.0], [1.0, 6.0]])
+    squares = [np.linalg.eigvals(block).real for block in (np.linalg.solve(M, K), *out_of_plane)]
+    known = np.sort(np.sqrt(np.concatenate(squares))) / (2.0 * np.pi)
+    # central differences with extrapolation reach 1e-9
+    assert np.sort(small.frequency.values) == pytest.approx(known, rel=1e-7)
+
+
+WRONG = {
+    "[1.0, 2.0]": ("[x, y, z, rx, ry, rz]",),
+    '["1 N/m", 0, 0, "1 N/m", 0, 0]': ("torsional stiffness",),
+    "[-1.0, 0, 0, 0, 0, 0]": ("must not be negative", "along x is -1"),
+    "[[1,2,0,0,0,0],[1,1,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0]]": (
+        "must be symmetric",
+        "between y and x are 1 and 2",
+    ),
+    "[[1,2,0,0,0,0],[2,1,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0]]": (
+        "positive semidefinite",
+        "source of energy",
+    ),
+    "[[1,0,2,0,0,0],[0,1,0,0,0,0],[2,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0],[0,0,0,0,0,0]]": ("z has none of its own",),
+    "[0, 0, 0, 0, 0, 0]": ("it has neither",),
+}
+
+
+@pytest.mark.parametrize("stiffness", WRONG)
+def test_a_matrix_that_is_no_stiffness_is_refused_in_words(stiffness: str, tmp_path: Path) -> None:
+    path = tmp_path / "wrong.toml"
+    path.write_text(
+        'title = "wrong"\n[time]\nend = 1.0\n[body.g]\ntype = "ground"\nframes.O = {}\n[body.b]\ntype = "rigid"\n'
+        'mass = 1.0\ninertia = [1.0, 1.0, 1.0]\nframes.O = {}\n[load.mount]\ntype = "bushing"\n'
+        f'between = ["g.O", "b.O"]\nstiffness = {stiffness}\n'
+    )
+    with pytest.raises(InputError) as error:
+        load_scene(path)
+    assert "load.mount" in str(error.value)
+    for word in WRONG[stiffness]:
+        assert word in str(error.value)

@@ -1,0 +1,250 @@
+"""Change points: poses in which another branch of the motion crosses are passed at speed, whatever the method.
+
+Compared with the smooth branch of the loop equations, and for free motion with energy and with one equation of motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.run.run import integrate
+from tests.analytic import change_points as cp
+from tests.properties.mechanisms import Table, simulate
+
+#: quick: the default and the extremes of the tolerance; all share their compiled code
+TOLERANCES = (1e-4, 1e-10, 1e-13)
+#: solver -> largest error of an angle of a driven mechanism [rad]: what the loops may be open, or rounding
+METHODS: dict[str, tuple[Table, float]] = {
+    **{f"dop853 {k}": ({"rtol": 10.0**-k}, max(10.0 ** (1 - k), 1e-11)) for k in range(4, 14)},
+    **{f"dopri5 {k}": ({"integrator": "dopri5", "rtol": 10.0**-k}, max(10.0 ** (1 - k), 1e-11)) for k in range(4, 14)},
+    **{f"radau {k}": ({"integrator": "radau", "rtol": 10.0**-k}, max(10.0 ** (1 - k), 1e-11)) for k in (4, 7, 10)},
+    **{
+        f"generalized-alpha {k}": ({"integrator": "generalized-alpha", "rtol": 10.0**-k}, 10.0 ** (1 - k))
+        for k in (4, 6, 8)
+    },
+    **{
+        f"{name} fixed": ({"integrator": name, "step": 2e-3}, 1e-8)
+        for name in ("dop853", "dopri5", "rk4", "adams-bashforth-moulton", "radau", "generalized-alpha")
+    },
+}
+STARTS = [0.3 + 0.41 * k for k in range(14)]
+
+
+def angle(dataset: xr.Dataset, body: str) -> np.ndarray:
+    """Angle of a body about z, turns not counted [rad]."""
+    q = dataset["quaternion"].sel(body=body).values
+    return np.asarray(2.0 * np.arctan2(q[:, 3], q[:, 0]))
+
+
+def apart(found: np.ndarray, known: np.ndarray) -> float:
+    """Largest difference of angles, whole turns apart."""
+    return float(np.abs(np.angle(np.exp(1j * (found - known)))).max())
+
+
+def four_bar_error(dataset: xr.Dataset, crank: np.ndarray, side: float, lengths: tuple[float, ...]) -> float:
+    """Largest error of coupler and rocker; beside the pose the closed form itself holds half the digits."""
+    clear = np.abs((crank + 2.0 * np.pi) % (2.0 * np.pi) - np.pi) > 1e-5
+    found = np.column_stack([angle(dataset, "coupler"), angle(dataset, "rocker")])
+    return apart(found[clear], cp.smooth(crank, side, lengths)[clear])
+
+
+def steady_four_bar(
+    start: float, side: float, solver: Table, lengths: tuple[float, ...] = cp.FOUR_BAR
+) -> tuple[xr.Dataset, float]:
+    """A turn and more at 4 rad/s, and its error."""
+    table = cp.four_bar(start, side, lengths, solver=solver, time={"end": 2.0})
+    dataset = simulate(cp.driven(table, "A", cp.steady(start, 4.0)))
+    return dataset, four_bar_error(dataset, start + 4.0 * dataset.time.values, side, lengths)
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+def test_a_driven_four_bar_keeps_its_branch_at_every_tolerance(rtol: float) -> None:
+    dataset, error = steady_four_bar(1.5, 1.0, {"rtol": rtol})
+    # loops are closed to rtol, which an angle magnifies by ten at most; below that some hundred roundings
+    assert error < max(100.0 * rtol, 1e-11)
+    assert dataset.pass_time.values == pytest.approx([(np.pi - 1.5) / 4.0, (3.0 * np.pi - 1.5) / 4.0], abs=1e-7)
+    assert set(dataset.pass_rank_loss.values) == {1}
+    assert set(dataset.pass_joint.values) <= {"A", "B", "C", "D"}
+
+
+@pytest.mark.parametrize("rtol", TOLERANCES)
+def test_a_free_scott_russell_mechanism_moves_as_its_one_equation_of_motion(rtol: float) -> None:
+    table = cp.scott_russell(0.7, solver={"rtol": rtol})
+    table["body"]["crank"]["angular_velocity"] = [0.0, 0.0, 8.0]
+    dataset = simulate(table)
+    known = cp.falling(0.7, 8.0, dataset.time.values)
+    # errors of the steps grow with the motion, by less than a thousand in a second; the known one is good to 1e-12
+    within = max(1e3 * rtol, 1e-10)
+    assert np.abs(dataset.position.sel(body="slider").values[:, 0] - 0.4 * np.cos(known)).max() < within
+    assert np.abs(dataset.energy_error.values).max() < max(1e4 * rtol, 1e-10) * float(dataset.kinetic.max())
+    assert len(dataset.pass_time) > 1
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e3])
+def test_a_pass_depends_on_no_unit_of_length(size: float) -> None:
+    lengths = tuple(size * length for length in cp.FOUR_BAR)
+    table = cp.four_bar(1.5, -1.0, lengths, time={"end": 2.0})
+    del table["load"]  # at a nanometre gravity is all there is
+    dataset = simulate(cp.driven(table, "A", cp.steady(1.5, 4.0)))
+    assert four_bar_error(dataset, 1.5 + 4.0 * dataset.time.values, -1.0, lengths) < 1e-9
+    assert len(dataset.pass_time) == 2
+
+
+def test_what_is_recorded_beside_a_pose_is_that_of_the_smooth_motion() -> None:
+    """Rows every tenth of a millisecond, some of which rounding would blur: accelerations go on smoothly."""
+    table = cp.scott_russell(1.5, time={"end": 0.03}, output={"interval": 1e-4})
+    dataset = simulate(cp.driven(table, "O", cp.steady(1.5, 6.0)))
+    known = -0.4 * 36.0 * np.cos(1.5 + 6.0 * dataset.time.values)
+    # rounding over the cube of the distance at which rows are no longer taken as they are
+    assert np.abs(dataset.acceleration.sel(body="slider").values[:, 0] - known).max() < 1e-5
+
+
+# Where it cannot go on -----------------------------------------------------------------------------------------------
+
+
+def stopped(change: float) -> Table:
+    """The crank turned by a step law within half a second, from 2.5 rad."""
+    step = {"type": "step", "start": [0.0], "end": [0.5], "change": [change]}
+    law = {"type": "sum", "laws": [{"type": "constant", "value": 2.5}, step]}
+    return cp.driven(cp.four_bar(2.5), "A", law)
+
+
+def test_rest_start_and_reach_are_three_sentences() -> None:
+    with pytest.raises(SolverError, match=r"at t = 0\.5 s: .*comes to rest in a singular pose .*joint") as rest:
+        simulate(stopped(np.pi - 2.5))
+    with pytest.raises(SolverError, match=r"at t = 0 s: .*starts in a singular pose.*\[start\] branch") as start:
+        simulate(cp.driven(cp.four_bar(np.pi), "A", cp.steady(np.pi, 1.0)))
+    # the crank would stretch coupler and rocker beyond 0.55 m at arccos(17 / 24) from the ground, turning outwards
+    lengths, limit = (0.3, 0.25, 0.3, 0.6), np.arccos((0.3**2 + 0.6**2 - 0.55**2) / (2 * 0.3 * 0.6))
+    table = cp.driven(cp.four_bar(limit - 0.5, 1.0, lengths), "A", cp.steady(limit - 0.5, 2.0))
+    with pytest.raises(SolverError, match=r"drive motor leads out of reach.*joint .*\[drive\.motor\]") as reach:
+        simulate(table)
+    time = float(str(reach.value).split("t = ")[1].split(" s")[0])
+    assert time == pytest.approx(0.25, abs=1e-3)  # it is told a little before speeds grow beyond bounds
+    assert {error.value.exit_code for error in (rest, start, reach)} == {3}
+
+
+def test_a_motion_that_stops_before_the_pose_is_none_of_them() -> None:
+    dataset = simulate(stopped(np.pi - 2.5 - 0.01))
+    assert len(dataset.pass_time) == 0
+    crank = np.unwrap(angle(dataset, "crank"))
+    # loops are closed to 1e-10; so near to the pose angles are ten times worse
+    assert four_bar_error(dataset, crank + 2.5 - crank[0], 1.0, cp.FOUR_BAR) < 1e-7
+
+
+# Starts --------------------------------------------------------------------------------------------------------------
+
+
+def from_rest(law: Table, **start: object) -> Table:
+    return cp.driven(cp.four_bar(np.pi, **({"start": start} if start else {})), "A", law)
+
+
+#: from rest, and at speed
+LAWS = {
+    "rest": {"type": "sum", "laws": [{"type": "constant", "value": np.pi}, {
+        "type": "step", "start": [0.0], "end": [1.0], "change": [1.0]}]},
+    "speed": cp.steady(np.pi, 1.0),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_scene_chooses_the_branch_out_of_a_change_point(law: str, sign: int) -> None:
+    """The rocker turns by 0.74 or by -0.26 of what the crank does: roots of the loop equation's second-order part."""
+    dataset = simulate(from_rest(LAWS[law], branch={"joint": "D", "sign": sign}))
+    crank = np.unwrap(angle(dataset, "crank"))
+    crank += np.pi - crank[0] % (2.0 * np.pi)
+    sides = [
+        apart(np.column_stack([angle(dataset, "coupler"), angle(dataset, "rocker")])[1:], known)
+        for known in (np.array([cp.elbow(x, side, cp.FOUR_BAR) for x in crank[1:]]) for side in (1.0, -1.0))
+    ]
+    assert min(sides) < 1e-8  # out of rest the first stretch is known to 1e-8
+    turned = np.unwrap(angle(dataset, "rocker"))
+    assert np.sign(turned[-1] - turned[0]) == sign
+
+
+def test_a_choice_that_is_none_is_refused() -> None:
+    regular = cp.four_bar(2.0, start={"branch": {"joint": "D", "sign": 1}})
+    for table, words in (
+        (cp.driven(regular, "A", cp.steady(2.0, 1.0)), "does not start in a change point"),
+        (from_rest(LAWS["speed"], branch={"joint": "E", "sign": 1}), "no joint 'E'"),
+    ):
+        with pytest.raises(InputError, match=words) as caught:
+            simulate(table)
+        assert caught.value.place.startswith("[start.branch")
+
+
+def test_an_open_choice_says_which_joint_tells_the_branches_apart() -> None:
+    with pytest.raises(SolverError, match=r"2 ways, on which joint \w+ begins to move like") as caught:
+        simulate(from_rest(LAWS["rest"]))
+    assert "[start] branch = { joint =" in str(caught.value)
+
+
+# All of them ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_passes_from_every_start(name: str) -> None:
+    """Driven: from 14 angles with both elbows; the error is that of the closures alone."""
+    solver, within = METHODS[name]
+    for start in STARTS:
+        for side in (1.0, -1.0):
+            dataset, error = steady_four_bar(start, side, solver)
+            assert error < within, (start, side)
+            assert len(dataset.pass_time) == cp.passes(start + 8.0) - cp.passes(start), (start, side)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_passes_with_scott_russell_and_the_parallelogram(name: str) -> None:
+    solver, within = METHODS[name]
+    solver = {**solver, "ledger_tolerance": 1e-2}  # of loose tolerances: branches are looked at here, not energy
+    for start in STARTS:
+        table = cp.scott_russell(start, solver=solver)
+        dataset = simulate(cp.driven(table, "O", cp.steady(start, 6.0)))
+        x = 2.0 * cp.RADIUS * np.cos(start + 6.0 * dataset.time.values)
+        assert np.abs(dataset.position.sel(body="slider").values[:, 0] - x).max() < within, start
+        _, error = steady_four_bar_parallel(start, solver)
+        assert error < within, start
+
+
+def steady_four_bar_parallel(start: float, solver: Table) -> tuple[xr.Dataset, float]:
+    """A parallelogram stays one: coupler still, rocker like the crank."""
+    coupler, _ = cp.elbow(start, 1.0, cp.PARALLELOGRAM)
+    side = 1.0 if abs(np.sin(coupler)) < 1e-6 else -1.0
+    table = cp.four_bar(start, side, cp.PARALLELOGRAM, solver=solver, time={"end": 2.0})
+    dataset = simulate(cp.driven(table, "A", cp.steady(start, 4.0)))
+    known = np.column_stack([np.zeros(len(dataset.time)), start + 4.0 * dataset.time.values])
+    return dataset, apart(np.column_stack([angle(dataset, "coupler"), angle(dataset, "rocker")]), known)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in METHODS if name.endswith((" 4", " 10", " 13", "fixed"))])
+def test_free_four_bars_keep_their_branch(name: str) -> None:
+    """Wherever the crank has come to, coupler and rocker are where the smooth branch has them."""
+    solver, within = METHODS[name]
+    for k, start in enumerate(STARTS):
+        side = (-1.0) ** k
+        table = cp.four_bar(start, side, solver={**solver, "ledger_tolerance": 0.1})
+        table["body"]["crank"]["angular_velocity"] = [0.0, 0.0, 9.0]
+        dataset = simulate(table)
+        crank = np.unwrap(angle(dataset, "crank"))
+        crank += start - crank[0]
+        assert four_bar_error(dataset, crank, side, cp.FOUR_BAR) < 10.0 * within, start
+
+
+@pytest.mark.slow
+def test_mechanisms_without_a_pose_ahead_lay_no_polynomial() -> None:
+    """A crank-rocker that comes near a change point and turns sharply there is integrated as it stands."""
+    lengths = (0.2, 0.4, 0.3, 0.499)
+    table = cp.driven(cp.four_bar(1.5, 1.0, lengths, time={"end": 2.0}), "A", cp.steady(1.5, 4.0))
+    run = integrate(Scene.model_validate(table), {}, lambda share, text: None)
+    assert not run.trajectory.passes
+    coupler = np.array([cp.elbow(x, 1.0, lengths) for x in 1.5 + 4.0 * run.trajectory.time])
+    dataset = simulate(table)
+    assert apart(np.column_stack([angle(dataset, "coupler"), angle(dataset, "rocker")]), coupler) < 1e-8

@@ -1,0 +1,92 @@
+"""Sections of mechanisms whose periodic motion is known otherwise: exponents, contraction, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline import dynamics
+from pipeline.core.errors import InputError
+from pipeline.core.progress import silent
+from pipeline.core.scene.load import edited
+from pipeline.core.scene.schema import Scene
+from pipeline.post.verdict import derive
+from stages.__main__ import main
+
+#: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
+CHAOTIC = 0.112
+
+
+@pytest.fixture(scope="module")
+def pendulum() -> Scene:
+    return pipeline.load_scene("scenes/checks/driven_pendulum.toml")
+
+
+def with_torque(scene: Scene, amplitude: float, **sections: object) -> Scene:
+    """Under another torque, which makes the motion regular when it is small."""
+    change = {"load.torque.force.amplitude": amplitude} | {f"sections.{name}": v for name, v in sections.items()}
+    return edited(scene, change)
+
+
+def test_a_pendulum_that_is_driven_hard_is_chaotic_with_the_exponent_of_its_tangent_equations(pendulum: Scene) -> None:
+    found = dynamics.sections(edited(pendulum, {"sections.exponent_periods": 400}), {}, silent)
+    verdict = derive(found)
+    assert verdict.attrs["verdict"] == "chaotic"
+    assert float(verdict.exponent_low) < CHAOTIC < float(verdict.exponent_high)
+    # batches of 2000 periods differ by 8 %
+    assert float(verdict.exponent) == pytest.approx(CHAOTIC, rel=0.3)
+
+
+def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_its_damping(pendulum: Scene) -> None:
+    # small swings: exp(-t / 4) whatever the phase, so that the torque's period leaves exp(-T / 4)
+    gentle = with_torque(pendulum, 1e-3, transient=0, periods=30, exponent_periods=30)
+    found = dynamics.sections(gentle, {}, silent)
+    verdict = derive(found)
+    period = float(found.attrs["period"])
+    assert verdict.attrs["verdict"] == "periodic"
+    assert int(verdict.returns_after) == 1
+    # a neighbour's distance swings about its decay: in 30 periods by no more than twofold over all of 283 s
+    assert float(verdict.exponent) == pytest.approx(-0.25, abs=2.0 * np.log(4.0) / (30 * period))
+
+
+def test_sections_are_states_of_the_run_whose_laws_are_written_out(pendulum: Scene) -> None:
+    # a harmonic torque goes on by itself: five periods in one run are five periods one by one
+    period = pendulum.time.end
+    one_by_one = dynamics.sections(with_torque(pendulum, 1.5, transient=0, periods=20, exponent_periods=20), {}, silent)
+    run = dynamics.simulate(edited(pendulum, {"time.end": 5.0 * period, "output.interval": period}), {}, silent)
+    strobed = run.sel(time=period * np.arange(1, 5), method="nearest")
+    # neighbours part by exp(0.112 x 47 s) = 200 of a tolerance of 1e-10, and both runs err
+    for name in ("position", "velocity", "quaternion"):
+        a, b = one_by_one[name].values[1:5], strobed[name].values
+        sign = np.sign((a * b).sum(axis=-1, keepdims=True)) if name == "quaternion" else 1.0
+        assert np.abs(a - b * sign).max() < 1e-5
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        ({"sections.period": "5 s"}, "does not repeat after a period of 5 s"),
+        ({"sections.period": "20 s"}, "longer than the run"),
+        ({"sections.phase": "20 s"}, "no time within the period"),
+        ({"sections.bodies": ["bog"]}, "there is no body 'bog'"),
+    ],
+)
+def test_what_cannot_be_looked_at_is_refused(pendulum: Scene, change: dict[str, object], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        dynamics.sections(edited(pendulum, change), {}, silent)
+
+
+def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["sections", "scenes/checks/pendulum.toml", "--transient", "0", "--periods", "20"]) == 2
+    assert "no drive and no load has a law of time" in capsys.readouterr().err
+
+
+def test_the_repeated_stroke_with_clearance_and_rigid_rods_settles_on_one_period() -> None:
+    scene = pipeline.load_scene("scenes/sps4/csj.toml")
+    short = edited(scene, {"sections.transient": 2, "sections.periods": 40, "sections.exponent_periods": 20})
+    found = dynamics.sections(short, {}, silent)
+    verdict = derive(found)
+    assert int(verdict.returns_after) == 1
+    # of runs of the written-out stroke: 0.59 a stroke
+    assert float(verdict.contraction) == pytest.approx(0.59, abs=0.06)

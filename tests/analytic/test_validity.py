@@ -1,0 +1,126 @@
+"""A run says, with amounts and remedies, when it left what its model carries; what means nothing is refused."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import dynamics, load_scene
+from pipeline.core.errors import SolverError
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.run.validity import BENT, SPIN, largest
+from tests.analytic.mechanism_runs import TREE, bundles
+
+#: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
+FIRST = 3.798
+
+
+def turning(speed: float, gravity: float, **more: Any) -> xr.Dataset:
+    """A cantilever of 10 m on a hub that turns at a constant speed [rad/s], gravity [m/s^2] along -y."""
+    override: Mapping[str, object] = {
+        "body.beam.modes": {"reference": "cantilever", "count": 2, "interfaces": ["root"]},
+        "drive.axle.law": {"type": "polynomial", "coefficients": [0.0, speed]},
+        "load": {"g": {"type": "gravity", "acceleration": [0.0, -gravity, 0.0]}},
+        "solver": {"integrator": "radau", "rtol": 1e-4} | more.pop("solver", {}),
+        "time.end": 1.0,
+    }
+    scene = load_scene(TREE / "scenes" / "checks" / "spinup_beam.toml", override | more)
+    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+
+
+def told(run: xr.Dataset) -> list[str]:
+    return [sentence for sentence in str(run.attrs.get("warnings", "")).split("\n") if sentence]
+
+
+@pytest.mark.slow
+def test_a_beam_that_bends_too_far_is_told_with_how_far() -> None:
+    run = turning(0.1, 9.81)
+    bent, turned = told(run)
+    # the tip seen from the hub, whose x axis the undeformed beam lies along
+    arm = run.frame_position.sel(frame="beam.tip").values - run.frame_position.sel(frame="beam.root").values
+    angle = 0.1 * run.time.values
+    straight = 10.0 * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+    far = np.linalg.norm(arm - straight, axis=1)
+    assert far.max() > BENT * 10.0
+    found = re.search(r"at t = (\S+) s a point of it is (\S+) m", bent)
+    assert found is not None
+    # three digits are printed
+    assert float(found[2]) == pytest.approx(far.max(), rel=5e-3)
+    assert float(found[1]) == pytest.approx(run.time.values[far.argmax()], rel=1e-5)
+    assert "linear modes hold below 0.05" in bent
+    assert "divide it" in bent
+    assert "a section of it is turned by" in turned
+
+
+@pytest.mark.slow
+def test_a_beam_that_bends_little_and_turns_slowly_has_nothing_to_say() -> None:
+    assert told(turning(0.9 * SPIN * FIRST, 0.1)) == []
+
+
+@pytest.mark.slow
+def test_a_beam_that_turns_fast_without_stiffening_is_told() -> None:
+    (said,) = told(turning(2.0, 0.1))
+    assert "turns at 2 rad/s, 0.53 of its first frequency (3.798 rad/s)" in said
+    assert "stiffening = {}" in said
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_as_its_beam_flies_apart_names_the_beam() -> None:
+    with pytest.raises(SolverError, match="evaluations is used up") as refusal:
+        turning(8.0, 9.81, solver={"evaluations": 300}, **{"time.end": 30.0})
+    assert "beam: at t =" in str(refusal.value)
+    assert "turns at 8 rad/s, 2.1 of its first frequency" in str(refusal.value)
+    assert "stiffening = {}" in str(refusal.value)
+
+
+def test_the_largest_displacement_is_that_of_all_nodes_and_rows() -> None:
+    random = np.random.default_rng(0)
+    shapes, q = random.normal(size=(30, 3, 5)), random.normal(size=(200, 5)) * np.geomspace(1e-3, 1.0, 200)[:, None]
+    every = np.linalg.norm(np.einsum("nam,tm->tna", shapes, q), axis=2).max(axis=1)
+    row, size = largest(shapes, q, 0.0)
+    assert row == int(every.argmax())
+    assert size == pytest.approx(every.max(), rel=1e-14)  # rounding of sums of five products
+    assert largest(shapes, q, 1e3) == (0, 0.0)
+
+
+def dropped(depth: float) -> xr.Dataset:
+    """A ball of 20 mm in a socket, with a contact so soft that it sinks in by about `depth` [m].
+
+    m g d = K d^2.5 / 2.5, the fall through the clearance left out.
+    """
+    table: dict[str, Any] = {
+        "title": "soft",
+        "body": {
+            "g": {"type": "ground", "frames": {"S": {}}},
+            "ball": {"type": "rigid", "mass": 1.0, "inertia": [1e-3] * 3, "pose": {}, "frames": {"B": {}}},
+        },
+        "joint": {
+            "j": {
+                "type": "clearance-spherical",
+                "between": ["g.S", "ball.B"],
+                "clearance": 1e-4,
+                "ball_radius": 0.02,
+                "normal": {"law": "hertz", "stiffness": 2.5 * 9.81 / depth**1.5},
+            }
+        },
+        "load": {"g": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
+        "time": {"end": 0.2},
+        "output": {"interval": 1e-3},
+        "solver": {"rtol": 1e-8},
+    }
+    return dynamics.simulate(Scene.model_validate(table), {}, lambda share, text: None)
+
+
+@pytest.mark.slow
+def test_a_contact_is_told_when_deep_and_refused_when_the_ball_leaves_through_the_socket() -> None:
+    assert told(dropped(1e-3)) == []
+    (said,) = told(dropped(5e-3))
+    assert "joint j: the surfaces are up to 0.005" in said
+    assert "contact laws hold below 0.1" in said
+    with pytest.raises(SolverError, match=r"joint j: the surfaces went 0\.0451 m deep .* radius \(0\.02 m\)"):
+        dropped(4.5e-2)

@@ -1,0 +1,75 @@
+"""``flexclear cache``: tells what is kept and whether it is whole, and removes nothing that is shown or needed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.artifacts.store import Record, Store
+from stages.__main__ import main
+
+
+@pytest.fixture
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "kernels"))
+    return Store(tmp_path / "results")
+
+
+def put(store: Store, letter: str, **facts: str) -> Record:
+    made = store.put("simulate", letter * 32, {"nc": letter.encode() * 1000}, {"parameter c": letter, **facts})
+    os.utime(store.path("simulate", letter * 32, "json"), (0.0, 0.0))
+    return made
+
+
+def test_damage_is_told_and_removed(store: Store, capsys: pytest.CaptureFixture[str]):
+    for letter in "abc":
+        store.show(put(store, letter), f"runs/{letter}", {}, "simulate")
+    assert main(["cache", "check"]) == 0
+    assert "3 artifacts, 0 faults" in capsys.readouterr().out
+    store.path("simulate", "a" * 32, "nc").write_bytes(b"b" * 1000)
+    path = store.path("simulate", "b" * 32, "json")
+    path.write_bytes(path.read_bytes().replace(b'"b"', b'"d"'))
+    assert main(["cache", "check"]) == 4
+    told = capsys.readouterr()
+    assert f"{'a' * 32}.nc is corrupt" in told.out
+    assert f"{'b' * 32}.json is no record, or damaged" in told.out
+    assert "never used" in told.err
+    os.utime(store.path("simulate", "b" * 32, "nc"), (0.0, 0.0))
+    assert main(["cache", "prune"]) == 0
+    assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*")) == ["c", "c"]
+    assert main(["cache", "check"]) == 0
+
+
+def test_pruning_keeps_what_is_shown_what_that_was_made_from_and_what_is_young(
+    store: Store, capsys: pytest.CaptureFixture[str]
+):
+    below = put(store, "a")
+    store.show(put(store, "b", **{"input run": below.digest}), "runs/x", {}, "post")
+    put(store, "c")
+    store.put("simulate", "d" * 32, {"nc": b"young"}, {})
+    left = store.path("simulate", "e" * 32, "nc")
+    left.write_bytes(b"its record was never written")
+    os.utime(left, (0.0, 0.0))
+    assert main(["cache", "prune", "--dry-run"]) == 0
+    assert "would remove 1 artifacts and 1 files without a record" in capsys.readouterr().out
+    assert left.exists()
+    assert main(["cache", "prune"]) == 0
+    assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*.nc")) == ["a", "b", "d"]
+    assert main(["cache", "prune", "--days", "0"]) == 0
+    assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*.nc")) == ["a", "b"]
+    assert main(["cache", "prune", "--days", "-1"]) == 2
+
+
+def test_what_an_artifact_was_made_from_is_told(store: Store, capsys: pytest.CaptureFixture[str]):
+    store.show(put(store, "a"), "runs/x", {"nc": "run.nc"}, "simulate")
+    for what in (str(store.root / "runs" / "x" / "run.nc"), "aaaa"):
+        assert main(["cache", "explain", what]) == 0
+        told = capsys.readouterr().out
+        assert f"simulate {'a' * 32}" in told
+        assert "parameter c: a" in told
+    assert main(["cache", "explain", "b"]) == 2
+    assert main(["cache", "size"]) == 0
+    assert "simulate          1 artifacts" in capsys.readouterr().out

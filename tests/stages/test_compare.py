@@ -1,0 +1,147 @@
+"""Ideal twins, rigid bodies from recipes, and runs beside each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.ideal import ideal
+from pipeline.core.scene.load import edited, load_scene
+from pipeline.core.scene.parts import MeshedRigidBody
+from pipeline.core.scene.wanted import Quantity
+from pipeline.post.overview import comparison, curves, figures, overlay, page
+from pipeline.structure.fe import mesh as meshes
+from pipeline.structure.fe.recipe import read_recipe
+from pipeline.structure.modes import rigid
+from stages import compare, s3_rigid
+from stages.graph import Graph
+from stages.new import write
+from tests.paper import synthetic
+
+
+@pytest.fixture
+def crank(tmp_path: Path) -> Path:
+    return write("slider-crank", tmp_path)[0]
+
+
+def test_a_rigid_body_from_a_recipe_has_mass_and_inertia_of_the_bar(tmp_path: Path):
+    """A uniform bar: m = rho A l, m l^2/12 across; about its length and through its depth as closed form."""
+    _, recipe = write("slider-crank", tmp_path)
+    found = rigid.build(meshes.build(read_recipe(recipe)))
+    length, b, h, density = 0.2, 0.012, 0.008, 7850.0
+    mass = density * b * h * length
+    # integrals over a beam of constant section are exact but for rounding, some 1e-15
+    assert float(found["mass"]) == pytest.approx(mass, rel=1e-12)
+    np.testing.assert_allclose(found["com"], [length / 2, 0, 0], atol=1e-13)
+    expected = mass / 12.0 * np.array([b**2 + h**2, length**2 + h**2, length**2 + b**2])
+    np.testing.assert_allclose(np.diag(found["inertia"]), expected, rtol=1e-10)
+
+
+def test_no_modes_make_a_rigid_body_and_so_does_the_recipe_alone(crank: Path):
+    none = load_scene(crank, {"body.rod.modes.count": 0, "output.stress": None})
+    alone = edited(none, {"body.rod": {"type": "rigid", "mesh": str(crank.parent / "rod.toml")}})
+    for scene in (none, alone):
+        assert isinstance(scene.body["rod"], MeshedRigidBody)
+        assert not scene.flexible()
+        graph = Graph(scene, shown=False)
+        assert set(graph.bodies()) == {"rigid/rod"}
+        assert not graph.modes
+    pose = {"position": [0.05, 0, 0]}
+    table = {"rod": {"type": "rigid", "mesh": "rod.toml", "pose": pose}}
+    data = rigid.build(meshes.build(read_recipe(crank.parent / "rod.toml")))
+    filled = s3_rigid.filled(table, {"rigid/rod": data})["rod"]
+    assert filled["mass"] == float(data["mass"])
+    assert set(filled["frames"]) == {"big_end", "middle", "small_end"}
+    assert filled["pose"] == pose
+    assert "mesh" not in filled
+
+
+def test_a_twin_differs_in_the_effect_alone(crank: Path):
+    scene = load_scene(crank)
+    without = ideal(scene, ("clearance",))
+    assert without.joint["pin"].type == "revolute"
+    assert without.joint["pin"].between == scene.joint["pin"].between
+    assert without.body == scene.body
+    stiff = ideal(scene, ("flexibility",))
+    assert stiff.joint == scene.joint
+    assert stiff.body["rod"].pose == scene.body["rod"].pose
+    both = ideal(scene)
+    assert not both.contacts()
+    assert not both.flexible()
+    assert {q.name for q in both.watched()} == {"slider.position", "slider.velocity", "motor.drive_force"}
+    assert (both.time, both.drive, both.load) == (scene.time, scene.drive, scene.load)
+
+
+def test_what_is_ideal_has_no_twin(tmp_path: Path):
+    scene = load_scene(write("pendulum", tmp_path)[0])
+    with pytest.raises(InputError, match="nothing to take away"):
+        ideal(scene)
+    with pytest.raises(InputError, match="one scene alone is compared with nothing"):
+        compare.bring([scene], compare.run.workplace())
+
+
+def test_each_twin_is_made_once(crank: Path, tmp_path: Path):
+    names = [twin.name for twin in compare.twins(load_scene(crank), "each")]
+    assert names == ["slider_crank ideal", "slider_crank without clearance", "slider_crank rigid"]
+    rigid_only = load_scene(write("four-bar", tmp_path / "other")[0])
+    assert [twin.name for twin in compare.twins(rigid_only, "each")] == ["four_bar ideal"]
+
+
+def pair() -> dict[str, xr.Dataset]:
+    """Two runs whose platforms are 1 mm apart in z from the second output on."""
+    other = synthetic.run("sps4/csj", clearance=True)
+    reference = other.drop_dims([dim for dim in ("contact", "event") if dim in other.dims])
+    reference["position"] = other["position"].copy()
+    reference["position"][1:, :, 2] -= 1e-3
+    return {"ideal": reference, "loose": other}
+
+
+QUANTITIES = (Quantity("platform", "position"), Quantity("platform", "velocity"), Quantity("A1", "peak_force"))
+
+
+def test_differences_are_those_of_the_runs():
+    runs = pair()
+    found = comparison.assemble(runs, {"loose": runs["loose"]}, QUANTITIES)
+    position = found.sel(quantity="platform.position")
+    assert float(position["difference"].sel(run="loose")) == pytest.approx(1e-3, rel=1e-9)
+    assert float(position["difference"].sel(run="ideal")) == 0.0
+    assert float(position["error"].sel(run="loose")) == 0.0
+    assert np.isnan(position["error"].sel(run="ideal"))
+    assert np.isnan(found["largest"].sel(run="ideal", quantity="A1.peak_force"))
+    np.testing.assert_allclose(position["distance"].sel(run="loose")[1:], 1e-3, rtol=1e-9)
+    rows = {(row[0], row[1]): row for row in comparison.table(found).rows}
+    assert rows["platform.position", "ideal"][4] == "reference"
+    assert rows["platform.position", "loose"][4].startswith("1 ± ")
+    assert rows["A1.peak_force", "ideal"][2] == "–"
+
+
+def test_runs_without_a_common_time_are_refused():
+    runs = pair()
+    late = runs["loose"].assign_coords(time=runs["loose"]["time"] + 3e-5)
+    with pytest.raises(InputError, match="no output times in common"):
+        comparison.assemble({**runs, "loose": late}, {}, QUANTITIES)
+
+
+def test_figures_of_any_run_and_a_page_with_all_inside():
+    runs = pair()
+    files = figures.make(runs["loose"], QUANTITIES)
+    assert {"motion.png", "reactions.png", "contacts.png", "energy.png"} <= set(files)
+    beside = overlay.make("compare", runs, QUANTITIES)
+    assert {"compare.png", "compare_contacts.png"} <= set(beside)
+    part = page.Part("a", "A", page.media("compare.png", beside["compare.png"], "side by side"))
+    text = page.page("Title", "lead", [part, page.Part("b", "Empty", "")]).decode()
+    assert "data:image/png;base64," in text
+    assert "src='http" not in text
+    assert "Empty" not in text
+
+
+@pytest.mark.parametrize(
+    "value, unit, expected",
+    [(0.02, "m", (1e3, "mm")), (3e-6, "m", (1e6, "µm")), (0.0, "m", (1.0, "m")), (2500.0, "N", (1e-3, "kN"))],
+)
+def test_units_read_well(value: float, unit: str, expected: tuple[float, str]):
+    assert curves.scaled(value, unit) == expected

@@ -1,0 +1,148 @@
+"""Compiled kernels: loaded only if every byte is as it was written, from a folder in which nobody else writes."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from numba import config
+
+from pipeline.core.artifacts.disk import checked, publish
+from pipeline.core.artifacts.paths import kernel_root, results_root
+from pipeline.core.errors import InputError
+from pipeline.dynamics.compile import files, folder
+from pipeline.dynamics.compile.files import bring, claimed, compiled
+
+#: a constant that a flipped bit of the code would change
+SOURCE = """from numba import njit, types
+
+
+@njit(types.float64(types.float64), cache=True)
+def scaled(x):
+    return 0.123456789 * x
+"""
+
+
+@pytest.fixture
+def kernel(tmp_path: Path) -> Path:
+    """A generated file whose code is on disk; named apart from those of every other test."""
+    path = tmp_path / f"flexclear_{tmp_path.name}.py"
+    path.write_text(SOURCE)
+    assert used(path)
+    return path
+
+
+def used(path: Path) -> bool:
+    """Load it as a new process would, and use it; whether it had to be compiled."""
+    sys.modules.pop(path.stem, None)
+    told: list[Path] = []
+    bring([path], told.append)
+    assert sys.modules[path.stem].scaled(2.0) == 2.0 * 0.123456789
+    assert compiled(path)
+    return bool(told)
+
+
+def parts(path: Path) -> list[Path]:
+    return [path.with_suffix(".sum"), *(path.parent / "__pycache__").glob(f"{path.stem}.*")]
+
+
+def test_what_is_whole_is_fetched(kernel: Path) -> None:
+    assert {part.suffix for part in parts(kernel)} == {".sum", ".nbi", ".nbc"}
+    assert not used(kernel)
+    assert not list(kernel.parent.rglob("*.pyc"))  # bytecode would be taken without a look at what it holds
+    assert not list(kernel.parent.rglob("*.lock"))
+
+
+def test_every_flipped_bit_and_every_cut_is_found_before_anything_is_loaded(kernel: Path) -> None:
+    """Also in the compiler's index, and in the file of digests itself; then it is compiled again, and whole."""
+    for k in range(3):
+        for name in (part.name for part in parts(kernel)):
+            part = next(found for found in parts(kernel) if found.name == name)
+            whole = part.read_bytes()
+            place = (2 * k + 1) * len(whole) // 6
+            broken = [whole[:place] + bytes([whole[place] ^ 1 << k]) + whole[place + 1 :], whole[:place], b""]
+            part.write_bytes(broken[k] if k else broken[0])
+            assert not compiled(kernel)
+            assert used(kernel)
+            assert not used(kernel)
+
+
+def test_a_source_that_differs_is_compiled_and_not_fetched(kernel: Path) -> None:
+    kernel.write_text(SOURCE + "\n# another text\n")
+    assert used(kernel)
+
+
+@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
+def test_what_cannot_be_loaded_is_compiled_again(kernel: Path, suffix: str) -> None:
+    """Its digest is right: it was written so, by whatever mistake."""
+    (part,) = (found for found in parts(kernel) if found.suffix == suffix)
+    part.write_bytes(b"no pickle")
+    publish(kernel.with_suffix(".sum"), checked(files._digests(kernel)))
+    assert compiled(kernel)
+    assert used(kernel)
+    assert not used(kernel)
+
+
+def test_what_was_interrupted_is_not_taken_for_whole(kernel: Path) -> None:
+    kernel.with_suffix(".sum").unlink()  # it is written last
+    assert used(kernel)
+
+
+def test_the_compilers_own_settings_lead_nowhere_else(
+    kernel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "elsewhere"))
+    files.set_aside(kernel)
+    assert used(kernel)
+    assert not (tmp_path / "elsewhere").exists()
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o1777])
+@pytest.mark.parametrize("inner", [".", "__pycache__"])
+def test_a_folder_that_others_can_write_is_refused(tmp_path: Path, mode: int, inner: str) -> None:
+    """To load what lies there would run their code."""
+    made = folder.writable(tmp_path / "kernels", lambda _: None)
+    (made / inner).chmod(mode)
+    with pytest.raises(InputError, match=r"others can write to .*\n.*chmod go-w") as caught:
+        folder.writable(tmp_path / "kernels", lambda _: None)
+    assert caught.value.exit_code == 2
+    (made / inner).chmod(0o755)
+    assert folder.writable(tmp_path / "kernels", lambda _: None) == made
+
+
+def test_a_folder_that_others_could_replace_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    with pytest.raises(InputError, match="others can write to"):
+        folder.writable(tmp_path / "open" / "kernels", lambda _: None)
+    (tmp_path / "open").chmod(0o1777)  # as /tmp: only owners rename
+    folder.writable(tmp_path / "open" / "kernels", lambda _: None)
+
+
+def test_results_hold_no_code(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A results folder that somebody sent is read, never run; two projects of a user share their kernels."""
+    monkeypatch.delenv("FLEXCLEAR_KERNELS", raising=False)
+    found = set()
+    for name in ("one", "two"):
+        monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / name))
+        assert not kernel_root().is_relative_to(results_root())
+        found.add(kernel_root())
+    assert len(found) == 1
+
+
+def test_what_nobody_uses_is_pruned(kernel: Path) -> None:
+    """By its last use, then by size; never what another process is compiling."""
+    assert folder.prune(kernel.parent) == 0
+    month = time.time() - 30 * 86400.0
+    os.utime(kernel.with_suffix(".sum"), (month, month))
+    with claimed(kernel, wait=True):
+        assert folder.prune(kernel.parent, unused=86400.0) == 0
+    assert compiled(kernel)
+    assert not used(kernel)  # and that is noted
+    assert folder.prune(kernel.parent, unused=86400.0) == 0
+    assert folder.prune(kernel.parent, largest=1) == 1
+    assert not parts(kernel)[1:]
+    assert not kernel.exists()

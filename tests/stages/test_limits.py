@@ -1,0 +1,128 @@
+"""What a machine cannot hold is refused before anything is computed, with exit code 4 and in words."""
+
+from __future__ import annotations
+
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.core import machine
+from pipeline.core.errors import InputError, ResourceError
+from pipeline.core.scene.demand import check_run, row
+from pipeline.core.scene.limits import check_cells
+from pipeline.core.scene.load import load_scene
+from pipeline.structure.fe.exchange import files
+from stages import s4_simulate
+from stages.__main__ import main
+from stages.graph import Graph
+from tests.stages.conftest import JOINT, SCENE
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "limited.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_run_that_memory_cannot_hold_is_refused_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """It was simulated to the end before."""
+    monkeypatch.setattr(machine, "memory", lambda: 10**9)
+    path = written(tmp_path, SCENE.replace('"0.1 ms"', '"1 us"') + JOINT)
+    begun = time.monotonic()
+    assert main(["run", str(path)]) == 4
+    # loading and estimating; a run of a million rows takes longer on any machine
+    assert time.monotonic() - begun < 60.0
+    told = capsys.readouterr().err
+    assert "a run of 1e+06 rows takes about" in told
+    assert "of memory, and 800 MB are allowed" in told
+
+
+def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(machine, "memory", lambda: 0)
+    path = written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "1 GB"\ndisk = "1 GB"\n')
+    check_run(load_scene(path), tmp_path)
+    for key in ("memory", "disk"):
+        with pytest.raises(ResourceError, match="10 kB are allowed"):
+            check_run(load_scene(path, {f"limits.{key}": "10 kB"}), tmp_path)
+    with pytest.raises(InputError, match=r"expected a size such as '4 GB'"):
+        load_scene(path, {"limits.memory": "4 stones"})
+
+
+def test_limits_are_no_facts_and_reach_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    plain = load_scene(written(tmp_path, SCENE + JOINT))
+    limited = load_scene(written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "10 kB"\n'))
+    assert s4_simulate.params(plain) == s4_simulate.params(limited)
+    task = Graph(limited).simulate
+    with pytest.raises(ResourceError, match="10 kB are allowed"):
+        s4_simulate.run({**task.params, **task.context}, {}, lambda fraction, text: None)
+
+
+@pytest.mark.parametrize("family", ["body", "joint"])
+def test_more_parts_than_can_be_worked_on_are_refused_before_they_are_checked(tmp_path: Path, family: str):
+    text = SCENE + JOINT + "".join(f"[{family}.x{k}]\n" for k in range(2001))
+    begun = time.monotonic()
+    with pytest.raises(ResourceError, match=rf"\[{family}\]: there are 200\d, more than the 2000") as caught:
+        load_scene(written(tmp_path, text))
+    assert caught.value.exit_code == 4
+    assert time.monotonic() - begun < 20.0  # reading the text takes 0.3 s here
+    with pytest.raises(InputError):  # allowed, and then wrong
+        load_scene(written(tmp_path, text.replace("[time]", "[limits]\nparts = 3000\n[time]")))
+
+
+def test_cells_are_counted_from_the_recipe():
+    limits = load_scene(Path("scenes/checks/pendulum.toml")).limits
+    for shape, elements in (
+        ({"cells": [100, 100, 100]}, None),
+        ({"cells": {"along": 10**6, "across": 1}}, 1),
+        ({}, 10**6),
+    ):
+        with pytest.raises(ResourceError, match=r"1e\+06 cells are more than the 500000"):
+            check_cells(shape, elements, limits, Path("r.toml"))
+    check_cells({"cells": [10, 10, 10]}, None, limits, Path("r.toml"))
+    check_cells("nonsense", "nonsense", limits, Path("r.toml"))
+
+
+def test_files_are_judged_by_their_headers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """A small file may hold much: an archive of zeros, a header that promises a matrix."""
+    monkeypatch.setattr(machine, "memory", lambda: 10**6)
+    np.savez_compressed(tmp_path / "zeros.npz", node=np.zeros(10**6))
+    assert (tmp_path / "zeros.npz").stat().st_size < 10**5
+    with pytest.raises(ResourceError, match=r"'zeros.npz' unpacked takes about 32 MB"):
+        files.read_npz(tmp_path / "zeros.npz", "recipe")
+    (tmp_path / "a.mtx").write_text("%%MatrixMarket matrix coordinate real general\n9 9 100000000\n1 1 1.0\n")
+    with pytest.raises(ResourceError, match=r"'a.mtx' takes about 9.6 GB"):
+        files._matrix(tmp_path / "a.mtx", "recipe")
+
+
+def test_damaged_matrices_are_refused_in_words(tmp_path: Path):
+    """Flipped bits and cuts anywhere: zip, zlib and NumPy each complain in their own way."""
+    rng = np.random.default_rng(5)
+    np.savez_compressed(tmp_path / "a.npz", node=np.arange(30), stiffness_row=rng.integers(0, 30, 30))
+    text = "%%MatrixMarket matrix coordinate real general\n3 3 2\n1 1 1.0\n3 2 2.0\n"
+    (tmp_path / "a.mtx").write_text(text)
+    for reader, path in ((files.read_npz, tmp_path / "a.npz"), (files._matrix, tmp_path / "a.mtx")):
+        whole = path.read_bytes()
+        for _ in range(150):
+            place = int(rng.integers(len(whole)))
+            broken = bytearray(whole)
+            broken[place] ^= 1 << int(rng.integers(8))
+            path.write_bytes(bytes(broken) if rng.random() < 0.7 else whole[:place])
+            try:
+                reader(path, "recipe")
+            except (InputError, ResourceError) as error:
+                assert len(str(error)) < 4000  # noqa: PT017 - many bits of a text matrix are as good as others
+        path.write_bytes(whole)
+    assert zipfile.is_zipfile(tmp_path / "a.npz")
+
+
+def test_the_estimate_of_a_row_is_what_a_run_takes(root: Path):
+    """Measured: 344 bytes a row of checks/pendulum, 6792 of sps4/ideal; the factors cover the rest within two."""
+    for name, measured in (("checks/pendulum", 344), ("sps4/ideal", 6792)):
+        estimate = row(load_scene(root / "scenes" / f"{name}.toml"))
+        # an estimate: what matters is its order of size
+        assert 0.5 * measured < estimate < 2.0 * measured

@@ -1,0 +1,216 @@
+"""What a task opens is in its key, whatever opens it and whatever it is called."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from pipeline.core.artifacts.store import Record, Store
+from pipeline.core.errors import ResourceError
+from pipeline.core.progress import silent
+from pipeline.core.scene.load import load_scene
+from pipeline.core.workflow import opened
+from pipeline.core.workflow.execute import execute, find, states
+from pipeline.core.workflow.fingerprint import TREE, Sources
+from pipeline.core.workflow.task import Task, facts
+from pipeline.structure.fe.exchange import files
+from pipeline.structure.kinds.kind import of_mesh
+from stages import s4_simulate
+from stages.graph import Graph
+from tests.analytic.solid_models import block, build
+
+SCENE = """
+title = "A body given by files"
+[time]
+end = "1 ms"
+[body.block]
+type = "flexible"
+mesh = "body.toml"
+modes = { reference = "free-free", count = 6 }
+pose = {}
+"""
+MATRICES = """
+interfaces = ["end"]
+[shape]
+type = "matrices"
+units = "m-kg-s"
+stiffness = "stiffness.mtx"
+mass = "mass.mtx"
+unknowns = "unknowns.csv"
+[frames.end]
+nodes = [1, 2, 3, 4]
+"""
+TETRAHEDRA = """
+interfaces = ["end"]
+[shape]
+type = "mesh-file"
+file = "body.ele"
+length_unit = "m"
+[material]
+density = 2700.0
+youngs_modulus = 7e10
+poisson = 0.3
+[frames.end]
+on = { plane = { point = [0.0, 0.0, 0.0], normal = [1.0, 0.0, 0.0] } }
+tie = "mean"
+"""
+
+
+@pytest.fixture(scope="module")
+def sources() -> Sources:
+    return Sources(TREE)
+
+
+def mesh_task(folder: Path) -> Task:
+    """Stage 1 of the body in a folder."""
+    (folder / "scene.toml").write_text(SCENE)
+    return Graph(load_scene(folder / "scene.toml")).mesh["block"]
+
+
+def matrices(folder: Path) -> Path:
+    folder.mkdir()
+    solid = build(block("hex8", (1, 1, 1), (0.1, 0.02, 0.03), "mean"))
+    files.write_matrix_market(of_mesh(solid).assemble(solid), folder)
+    (folder / "body.toml").write_text(MATRICES)
+    return folder
+
+
+def tetrahedra(folder: Path, length: float = 1.0) -> Path:
+    folder.mkdir()
+    points = np.array([[0.0, 0, 0], [0, 1, 0], [0, 0, 1], [length, 0, 0], [1, 1, 1]])
+    mesh = meshio.Mesh(points, [("tetra", np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))])
+    mesh.write(folder / "body.node", file_format="tetgen")
+    (folder / "body.toml").write_text(TETRAHEDRA)
+    return folder
+
+
+def made(task: Task, store: Store, sources: Sources) -> Record:
+    return execute(task, {}, store, sources, silent)
+
+
+@pytest.mark.parametrize(
+    "body, companion, old, new",
+    [(matrices, "unknowns.csv", b"0.1,", b"0.2,"), (tetrahedra, "body.node", b"1.0", b"2.0")],
+    ids=["table of unknowns", "second file of a format"],
+)
+def test_a_companion_file_counts(
+    tmp_path: Path, sources: Sources, body: object, companion: str, old: bytes, new: bytes
+) -> None:
+    """It is named in no list of the program, or was forgotten there; its reader opens it."""
+    assert callable(body)
+    folder, store = body(tmp_path / "body"), Store(tmp_path / "results")
+    task = mesh_task(folder)
+    first = made(task, store, sources)
+    assert find(task, {}, store, sources) == first
+    path = folder / companion
+    whole = path.read_bytes()
+    assert old in whole
+    path.write_bytes(whole.replace(old, new))
+    assert find(task, {}, store, sources) is None
+    (state,) = states([task], store, sources)
+    assert state.why == (f"file {companion} changed",)
+    assert made(task, store, sources).digest != first.digest
+    path.write_bytes(whole)
+    assert find(task, {}, store, sources) == first
+
+
+def test_equal_recipes_with_other_companions_are_kept_apart(tmp_path: Path, sources: Sources) -> None:
+    """As of one mesh that was morphed: the same cells, other nodes."""
+    store = Store(tmp_path / "results")
+    tasks = [mesh_task(tetrahedra(tmp_path / name, length)) for name, length in (("a", 1.0), ("b", 2.0))]
+    assert facts(tasks[0], {}, sources) == facts(tasks[1], {}, sources)
+    records = [made(task, store, sources) for task in tasks]
+    assert records[0].digest != records[1].digest
+    assert [find(task, {}, store, sources) for task in tasks] == records
+
+
+def test_a_folder_that_was_moved_stays_fresh(tmp_path: Path, sources: Sources) -> None:
+    store = Store(tmp_path / "results")
+    here = tetrahedra(tmp_path / "here")
+    record = made(mesh_task(here), store, sources)
+    assert find(mesh_task(Path(shutil.move(here, tmp_path / "there"))), {}, store, sources) == record
+
+
+def test_names_of_opened_files_are_checked(tmp_path: Path, sources: Sources) -> None:
+    """Damaged or lost, they are found again by making the artifact again; nothing stale is taken for fresh."""
+    store = Store(tmp_path / "results")
+    task = mesh_task(tetrahedra(tmp_path / "body"))
+    record = made(task, store, sources)
+    (names,) = (store.root / "cache" / "mesh").glob("*.names")
+    names.write_text(names.read_text().replace("body.node", "body.nodf"))
+    assert find(task, {}, store, sources) is None
+    assert made(task, store, sources) == record
+    assert find(task, {}, store, sources) == record
+
+
+def test_what_a_task_opens_is_noted_by_whoever_opens_it(tmp_path: Path) -> None:
+    """By name or by descriptor's call, missing ones too; not what it wrote itself, nor code, nor what is left out."""
+    for name in ("a.dat", "b.dat", "c.py"):
+        (tmp_path / name).write_text(name)
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "d.dat").touch()
+    with opened.watched(tmp_path, outside=[tmp_path / "out"]) as read:
+        (tmp_path / "a.dat").read_bytes()
+        os.close(os.open(tmp_path / "b.dat", os.O_RDONLY))
+        (tmp_path / "c.py").read_text()
+        (tmp_path / "out" / "d.dat").read_text()
+        (tmp_path / "own.dat").write_text("own")
+        (tmp_path / "own.dat").read_text()
+        np.random.default_rng(1)
+    (tmp_path / "b.dat").read_text()
+    assert read.keys() == {"a.dat", "b.dat"}
+    assert read == opened.digests(read, tmp_path)
+
+
+def test_a_project_inside_of_an_environment_is_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `python -m venv .` makes it: only the folders of libraries there are left out."""
+    monkeypatch.setattr(sys, "prefix", str(tmp_path))
+    opened._system.cache_clear()
+    (tmp_path / "a.dat").write_text("a")
+    with opened.watched(tmp_path) as read:
+        (tmp_path / "a.dat").read_text()
+    opened._system.cache_clear()
+    assert read.keys() == {"a.dat"}
+
+
+def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "a.dat"
+    path.write_text("old")
+    (tmp_path / "new").write_text("new")
+
+    def read() -> None:
+        with opened.watched(tmp_path):
+            path.read_text()
+            (tmp_path / "new").rename(path)
+
+    with pytest.raises(ResourceError, match="changed while it was read"):
+        read()
+
+
+def test_names_of_files_are_no_facts(tmp_path: Path, root: Path, sources: Sources) -> None:
+    """A scene and its recipe under other names, in other folders, have equal keys."""
+    scene = (root / "scenes" / "checks" / "clamped_rod.toml").read_text()
+    (used,) = {line.split('"')[1] for line in scene.splitlines() if line.startswith("mesh = ")}
+    other = tmp_path / "renamed.toml"
+    other.write_text(scene.replace(used, "another.toml"))
+    shutil.copy(next(p for p in (root / "scenes" / "checks" / used, root / used) if p.is_file()), tmp_path)
+    (tmp_path / Path(used).name).rename(tmp_path / "another.toml")
+    graphs = [Graph(load_scene(path)) for path in (root / "scenes" / "checks" / "clamped_rod.toml", other)]
+    for one, renamed in zip(*(graph.up_to("post") for graph in graphs), strict=True):
+        assert facts(one, {}, sources) == facts(renamed, {}, sources)
+    assert "renamed" not in str(s4_simulate.params(graphs[1].scene))
+
+
+def test_libraries_that_write_and_draw_count(sources: Sources) -> None:
+    """Also those that are chosen by a name in a call, and those that a library needs in turn."""
+    plain = facts(Task("s", "scene", "stages.s3_bundle:run", {}, ""), {}, sources)
+    assert plain["library netCDF4"][0].isdigit()
+    drawn = facts(Task("s", "scene", "stages.s6_render:run", {}, ""), {}, sources)
+    assert drawn["library vtk"][0].isdigit()
+    assert drawn["library pillow"][0].isdigit()

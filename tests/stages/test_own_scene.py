@@ -1,0 +1,182 @@
+"""A scene of one's own: what `new` writes is right, what is wrong in it is told at once, editors know its keys."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene import lines
+from pipeline.core.scene.json_schema import scene_schema
+from pipeline.core.scene.load import load_scene
+from stages import run
+from stages.__main__ import main
+from stages.new import KINDS, TEMPLATES, write
+from tests.stages.typical_mistakes import MISTAKES
+
+TOLD = dict(
+    re.findall(r"^## (.+)\n((?:.+\n?)+)", (Path(__file__).parent / "typical_mistakes.txt").read_text(), re.MULTILINE)
+)
+SCENES = sorted((Path(__file__).parents[2] / "scenes").rglob("*.toml"))
+RECIPES = sorted((Path(__file__).parents[2] / "meshes").rglob("*.toml"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_new_writes_has_no_mistake(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["new", kind, str(tmp_path / "own")]) == 0
+    scene, *_ = sorted((tmp_path / "own").glob("*.toml"), key=lambda path: "[body" not in path.read_text())
+    assert main(["check", str(scene)]) == 0
+    assert "no mistake found" in capsys.readouterr().out
+    assert main(["new", kind, str(tmp_path / "own")]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_a_hundred_typical_mistakes_are_all_in_the_table():
+    assert len(MISTAKES) >= 100
+    assert set(TOLD) == set(MISTAKES)
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    file, old, new = MISTAKES[name]
+    folder = tmp_path / "own"
+    write("slider-crank", folder)
+    text = (folder / file).read_text()
+    assert old is None or old in text
+    (folder / file).write_text(text + new if old is None else text.replace(old, new, 1))
+    assert main(["check", str(folder / "slider_crank.toml")]) == 2
+    said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
+    # lists of all names that there are grow with the program
+    assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == TOLD[name].strip()
+
+
+def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    scene, _ = write("slider-crank", tmp_path / "own")
+    scene.write_text(scene.read_text().replace('"rod.small_end"', '"rod.smal_end"'))
+    assert main(["run", str(scene)]) == 2
+    said = capsys.readouterr().err
+    assert "[joint.wrist.between], line" in said
+    assert "did you mean 'small_end'?" in said
+    assert not (tmp_path / "results").exists()
+
+
+def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene, rod = write("slider-crank", tmp_path)
+    scene.write_text(scene.read_text().replace('"0.8 kg"', "-1").replace('"crank.pin"] ', '"crank.pim"] '))
+    rod.write_text(rod.read_text().replace('"7850 kg/m^3"', '"7850 kg"'))
+    assert main(["check", str(scene), "--json"]) == 2
+    found = {(Path(m["file"]).name, m["line"], m["problem"].split()[0]) for m in json.loads(capsys.readouterr().out)}
+    text = scene.read_text().splitlines()
+    mass = 1 + next(k for k, line in enumerate(text) if line.startswith("mass = -1"))
+    between = 1 + next(k for k, line in enumerate(text) if '"crank.pim"' in line and line.startswith("between"))
+    density = 1 + next(k for k, line in enumerate(rod.read_text().splitlines()) if line.startswith("density"))
+    assert {(file, line) for file, line, _ in found} == {
+        ("slider_crank.toml", mass),
+        ("slider_crank.toml", between),
+        ("rod.toml", density),
+    }
+
+
+def test_a_mistake_in_an_extended_scene_is_told_in_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene, _ = write("slider-crank", tmp_path)
+    scene.write_text(scene.read_text().replace('mass = "0.8 kg"', "mass = -1"))
+    (tmp_path / "other.toml").write_text('extends = "slider_crank.toml"\n')
+    assert main(["check", str(tmp_path / "other.toml")]) == 2
+    said = capsys.readouterr().err
+    assert re.search(r"other.toml \[body.crank.mass\], line \d+ of .*slider_crank.toml: must be greater than 0", said)
+
+
+def test_lines_are_those_of_the_text():
+    text = '# a\n[body.rod] # b\ntype = "rigid"\nframes."a.b" = {}\ntext = """\n[joint.x]\n"""\n[[x]]\ny = 1\n'
+    found = lines.written(text)
+    assert found["body", "rod"] == 2
+    assert found["body", "rod", "type"] == 3
+    assert found["body", "rod", "frames", "a.b"] == 4
+    assert ("joint",) not in found
+    assert found["x", "y"] == 9
+
+
+@pytest.fixture(scope="module")
+def validators():
+    jsonschema = pytest.importorskip("jsonschema")
+    from pipeline.structure.fe.json_schema import recipe_schema
+
+    found = [jsonschema.Draft202012Validator(schema) for schema in (scene_schema(), recipe_schema())]
+    for one in found:
+        one.check_schema(one.schema)
+    return found
+
+
+@pytest.mark.parametrize("path", [*SCENES, *sorted(TEMPLATES.rglob("*.toml"))], ids=lambda path: path.stem)
+def test_the_schema_accepts_what_the_loader_accepts(path: Path, validators):
+    table = tomllib.loads(path.read_text())
+    recipe = "shape" in table
+    if not recipe:
+        load_scene(path)
+    assert list(validators[recipe].iter_errors(table)) == []
+
+
+@pytest.mark.parametrize("path", RECIPES, ids=lambda path: path.stem)
+def test_the_schema_accepts_every_recipe(path: Path, validators):
+    assert list(validators[1].iter_errors(tomllib.loads(path.read_text()))) == []
+
+
+def test_the_schema_refuses_what_is_no_scene(validators):
+    scene = tomllib.loads((TEMPLATES / "four_bar" / "four_bar.toml").read_text())
+    assert not validators[0].is_valid({**scene, "titel": "a"})
+    assert not validators[0].is_valid({key: value for key, value in scene.items() if key != "body"})
+    assert not validators[0].is_valid({**scene, "remove": ["joint.A"]})  # edits nothing
+    assert validators[0].is_valid({"extends": "a.toml", "remove": ["joint.A"], "set": {"body": {"rod": {"mass": 1}}}})
+
+
+@pytest.mark.parametrize("kind", ["scene", "recipe"])
+def test_schemas_say_what_they_are(kind: str, capsys: pytest.CaptureFixture[str]):
+    assert main(["schema", kind]) == 0
+    schema = json.loads(capsys.readouterr().out)
+    assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
+    assert schema["$id"] == f"urn:flexclear:schema:{kind}"
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh"])
+def test_completion_knows_every_command_and_its_options(shell: str, capsys: pytest.CaptureFixture[str]):
+    assert main(["completion", shell]) == 0
+    said = capsys.readouterr().out
+    assert 'compare) options="-h --help --set --jobs' in said
+    assert "--ideal" in said
+    assert all(verb in said for verb in ("new", "check", "report"))
+
+
+def test_a_value_is_changed_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene, _ = write("slider-crank", tmp_path)
+    graph = run.graphs([str(scene)], ["joint.pin.clearance=0.3 mm", "solver.rtol=1e-6"])[0]
+    assert graph.scene.joint["pin"].clearance == pytest.approx(3e-4, rel=1e-12)
+    assert graph.scene.solver.rtol == 1e-6
+    assert "joint.pin.clearance=0.3_mm" in graph.simulate.folder  # the results of the file stay
+    assert main(["why", str(scene), "--set", "joint.pin.clearence=1"]) == 2
+    assert "did you mean 'clearance'" in capsys.readouterr().err
+    assert main(["why", str(scene), "--set", "joint"]) == 2
+    assert "is no KEY=VALUE" in capsys.readouterr().err
+
+
+def test_a_scene_from_a_table_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    import flexclear as fc
+
+    path, _ = write("slider-crank", tmp_path)
+    monkeypatch.chdir(tmp_path)
+    scene = fc.load_scene(tomllib.loads(path.read_text()))
+    assert scene.model_dump() == fc.load_scene(path).model_dump()
+    assert repr(scene).startswith("<Scene slider-crank-with-a-flexible-rod")
+    assert len(repr(scene)) < 250
+    with pytest.raises(InputError, match="only files do"):
+        fc.load_scene({"extends": "a.toml"})
+
+
+def test_every_template_is_a_kind_that_new_knows():
+    assert {path.name.replace("_", "-") for path in TEMPLATES.iterdir()} == set(KINDS)
