@@ -154,8 +154,12 @@ def prepare(model: Model, progress: Progress) -> Engine:
         raise SolverError(mobility.start_refusal)
     _check_branch(model, mobility)
     entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
-    method = lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]")
-    space = model.arrays.work_space(method.room)
+    return assemble(model, entry, lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]"), mobility)
+
+
+def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mobility) -> Engine:
+    """The engine of a model whose functions are compiled, with a work space of its own."""
+    solver, space = model.scene.solver, model.arrays.work_space(method.room)
     entry.connect(space.h)
     kept, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
     engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol)

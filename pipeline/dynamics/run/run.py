@@ -107,7 +107,7 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
         progress(None, sentence)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)
-    _require_shallow(engine.model, trajectory, seen)
+    require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
     return Run(scene, engine, trajectory, seen, twin_of(engine, start, trajectory), switched, mended)
 
@@ -127,7 +127,7 @@ def follow(
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
 
-def _require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """SolverError for a contact so deep that its surfaces mean nothing."""
     if not model.contacts:
         return
