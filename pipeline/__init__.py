@@ -12,7 +12,7 @@ The same things that the command ``flexclear`` does, from Python::
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -40,6 +40,7 @@ __all__ = [
     "report",
     "run",
     "sections",
+    "sweep",
 ]
 
 
@@ -91,6 +92,33 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
     """
     dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").workplace())
     return dataset
+
+
+def sweep(
+    scene: Scene | str | Path,
+    vary: Mapping[str, object],
+    keep: Sequence[str],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    **more: object,
+) -> xr.Dataset:
+    """Many points of one scene, as ``flexclear sweep`` makes them; finished points come from the cache.
+
+    vary: place of the scene -> its values (a list), or what else a sweep file says of a parameter.
+    keep: what is kept of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
+    workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
+    more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
+    The result has the parameters as dimensions.  Raises FlexclearError.
+    """
+    given = {name: _plain(values) for name, values in vary.items()}
+    table = {"vary": given, "keep": list(keep), **more}
+    return _stages("sweep").of_scene(_loaded(scene), table, workers, scheduler)
+
+
+def _plain(values: Any) -> Any:
+    """Arrays as lists of Python's own numbers, which are what a sweep file can say."""
+    return values.tolist() if hasattr(values, "tolist") else values
 
 
 def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:

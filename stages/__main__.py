@@ -20,6 +20,7 @@ COMMANDS = {
     "check": "every mistake of scenes and recipes at once; nothing is run",
     "run": "bring scenes up to date",
     "why": "for each stage: fresh, or why it would run again",
+    "sweep": "many points of one scene: a dataset and a figure",
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
     "compare": "scenes beside each other or their ideal twins: differences, errors, events, costs",

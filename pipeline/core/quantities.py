@@ -6,6 +6,7 @@ Series are compared at the regular output times that both runs have, never inter
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -13,6 +14,10 @@ import xarray as xr
 from pipeline.core.algebra import rotation_between
 from pipeline.core.artifacts.event_kinds import CLOSING
 from pipeline.core.scene.wanted import KINDS, Quantity
+
+if TYPE_CHECKING:
+    from pipeline.core.scene.output import Output
+    from pipeline.core.scene.schema import TimeSpan
 
 #: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
 #: only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure would take
@@ -130,3 +135,32 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
         found["horizon"] = run["horizon"]
     kept = xr.Dataset(found)
     return kept.assign_coords(contact=run["contact"]) if "contact" in run.coords else kept
+
+
+def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
+    """What is kept of a series (`pipeline.core.scene.kept`); shape () or (components,).
+
+    time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
+    """
+    if reduction == "final":
+        return np.asarray(values[-1])
+    sizes = np.linalg.norm(values, axis=1)
+    if reduction == "largest":
+        return np.asarray(sizes.max())
+    span = time[-1] - time[0]
+    if reduction == "rms":
+        return np.asarray(np.sqrt(np.trapezoid(sizes**2, time) / span))
+    return np.asarray(np.trapezoid(values, time, axis=0) / span)
+
+
+def of_impacts(times: np.ndarray, reduction: str) -> float:
+    """Number of impacts, or time of the first or last one, nan where there is none. times: ascending [s]."""
+    if reduction == "count":
+        return float(len(times))
+    return float(times[0 if reduction == "first" else -1]) if len(times) else np.nan
+
+
+def regular_times(time: TimeSpan, output: Output) -> np.ndarray:
+    """The regular output times of a run, those of breaks and events left out, shape (n,) [s]."""
+    count = int(np.floor((time.end - time.start) / output.interval * (1 + 1e-12))) + 1
+    return np.asarray(time.start + output.interval * np.arange(count))

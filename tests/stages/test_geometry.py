@@ -32,7 +32,7 @@ def test_poses_have_the_lengths_of_the_legs() -> None:
 
 
 def test_the_answer_to_leg_1_is_that_of_finite_changes() -> None:
-    """Half of a change in legs 1 and 2 alike is the symmetric part of one in leg 1: two strokes, 2 um apart."""
+    """A change of legs 1 and 2 by halves is the symmetric part of one of leg 1: strokes 2 um apart."""
     layout, step = identify.fitted(*TAKEN), 1e-6
     for extension in (0.0, 0.03, 0.06):
         (below, above), angles = poses(layout, extension + np.array([-step, step]))

@@ -224,6 +224,8 @@ def test_library_versions_count(root: Path):
 def test_a_scene_survives_the_way_through_its_parameters(root: Path):
     """What the engine is given says the same as the file, apart from what is left out on purpose."""
     for path in sorted((root / "scenes").rglob("*.toml")):
+        if path.parent.name == "sweeps":
+            continue
         scene = load_scene(path)
         again = s4_simulate.rebuild({"name": scene.name, **s4_simulate.params(scene, ensemble=True)}, {})
         assert again.name == scene.name

@@ -7,11 +7,11 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from pipeline.core.errors import InputError, shown
 from pipeline.core.registry import suggestion
@@ -87,6 +87,44 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
         raise input_errors(Path(scene.name), error, Scene) from None
     result._name, result._path = scene._name, scene._path
     return result
+
+
+def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
+    """What `edited` gives, at a tenth of the time: only the parts and settings that change are read again.
+
+    For many edits of one scene.  Raises InputError as `edited` does.
+    """
+    changed: dict[tuple[str, str], dict[str, object]] = {}
+    for place, value in override.items():
+        family, _, rest = place.partition(".")
+        name, _, key = rest.partition(".") if family in FAMILIES else ("", "", rest)
+        if value is None or not key or (family not in FAMILIES and family not in SETTINGS):
+            return edited(scene, override)
+        changed.setdefault((family, name), {})[key] = value
+    result = scene
+    for (family, name), values in changed.items():
+        part = getattr(result, family).get(name) if name else getattr(result, family)
+        if part is None:
+            return edited(scene, override)
+        table = part.model_dump(mode="json", exclude_none=True)
+        try:
+            for key, value in values.items():
+                _put(table, key, value, "")
+            read = _reader(family).validate_python({name: table} if name else table)
+            whole = {**getattr(result, family), **read} if name else read
+            result = result.model_copy(update={family: whole})
+            result.check()
+        except (ValidationError, InputError, ValueError):
+            return edited(scene, override)  # which tells what is wrong, with its place
+    return result
+
+
+@cache
+def _reader(family: str) -> Any:
+    """Reads a setting, or parts of a family by name, as `Scene` does."""
+    info = Scene.model_fields[family]
+    kind: Any = info.annotation
+    return TypeAdapter(Annotated[kind, *info.metadata] if info.metadata else kind)
 
 
 def scene_name(path: Path) -> str:
@@ -260,29 +298,43 @@ def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path:
         there[name] = part
 
 
-def _find(table: dict[str, Any], place: object, where: str) -> tuple[dict[str, Any], str]:
+def _find(table: Any, place: object, where: str) -> tuple[Any, Any]:
+    """The table or list that holds a place, and its last key; entries of lists are numbered from 0."""
     keys = str(place).split(".")
-    for depth, key in enumerate(keys):
-        if not isinstance(table, dict) or key not in table:
+    for depth, name in enumerate(keys):
+        key = _entry(table, name)
+        if key is None:
             known = table if isinstance(table, dict) else {}
             raise InputError(
-                where, f"there is no '{'.'.join(keys[: depth + 1])}'", suggestion(key, known) if known else None
+                where, f"there is no '{'.'.join(keys[: depth + 1])}'", suggestion(name, known) if known else None
             )
         if depth < len(keys) - 1:
             table = table[key]
-    return table, keys[-1]
+    return table, key
+
+
+def _entry(table: Any, name: str) -> str | int | None:
+    """The key of a table, or the number of a list's entry; None when there is none."""
+    if isinstance(table, dict):
+        return name if name in table else None
+    return int(name) if isinstance(table, list) and name.isdecimal() and int(name) < len(table) else None
 
 
 def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
     parent, _, key = place.rpartition(".")
     if parent in SETTINGS:
         table.setdefault(parent, {})
+    owner: Any = table
     if parent:
-        owner, last = _find(table, parent, where)
-        table = owner[last]
-        if not isinstance(table, dict):
-            raise InputError(where, f"'{parent}' is a value, not a table")
-    table[key] = value
+        above, last = _find(table, parent, where)
+        owner = above[last]
+    if isinstance(owner, list):
+        owner, last = _find(table, place, where)
+        owner[last] = value
+    elif isinstance(owner, dict):
+        owner[key] = value
+    else:
+        raise InputError(where, f"'{parent}' is a value, not a table")
 
 
 def _absolute_files(table: dict[str, Any], path: Path) -> None:

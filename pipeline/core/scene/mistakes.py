@@ -158,7 +158,8 @@ def _is_model(alternative: Any) -> bool:
 
 
 def _keys(alternatives: list[Any]) -> list[str]:
-    return sorted({name for a in alternatives if _is_model(a) for name in a.model_fields})
+    fields = (item for a in alternatives if _is_model(a) for item in a.model_fields.items())
+    return sorted({info.alias or name for name, info in fields})
 
 
 def _types(alternative: Any) -> tuple[str, ...]:

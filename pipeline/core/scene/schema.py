@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core.scene.clearance import CONTACTS, Clearance
+from pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from pipeline.core.scene.gears import Gear
@@ -176,18 +176,15 @@ class Scene(Part):
     limits: Limits = Limits()
     view: View | None = None
 
-    @model_validator(mode="after")
-    def _rows_can_be_kept(self) -> Scene:
+    def _rows_can_be_kept(self) -> None:
         rows = (self.time.end - self.time.start) / self.output.interval
         if rows > MOST_ROWS:
             raise ValueError(
                 f"output.interval = {self.output.interval:g} s asks for {rows:.3g} rows, more than {MOST_ROWS:g}: "
                 "choose a longer one"
             )
-        return self
 
-    @model_validator(mode="after")
-    def _samples_can_be_made(self) -> Scene:
+    def _samples_can_be_made(self) -> None:
         for name, load in self.load.items():
             if not isinstance(load, SampledPid):
                 continue
@@ -197,10 +194,8 @@ class Scene(Part):
                     f"load.{name}.period = {load.period:g} s asks for {samples:.3g} samples, more than "
                     f"{MOST_SAMPLES:g}: choose a longer one, or a continuous 'pid'"
                 )
-        return self
 
-    @model_validator(mode="after")
-    def _quantities_are_there(self) -> Scene:
+    def _quantities_are_there(self) -> None:
         named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
         named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
         for place, name in named:
@@ -208,15 +203,24 @@ class Scene(Part):
                 parse(name, self.owners())
             except ValueError as error:
                 raise ValueError(f"{place}{name}: {error}") from None
-        return self
 
-    @model_validator(mode="after")
-    def _stressed_bodies_are_flexible(self) -> Scene:
+    def _stressed_bodies_are_flexible(self) -> None:
         for name in self.output.stress or ():
             if name not in self.flexible():
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Scene:
+        self.check()
         return self
+
+    def check(self) -> None:
+        """ValueError where parts and settings that are right by themselves do not go together."""
+        self._rows_can_be_kept()
+        self._samples_can_be_made()
+        self._quantities_are_there()
+        self._stressed_bodies_are_flexible()
 
     def owners(self) -> dict[str, tuple[str, ...]]:
         """Names of the parts that may own a quantity, by what they are."""
@@ -295,13 +299,17 @@ class Scene(Part):
 
     def summary(self) -> str:
         """Which parts there are, in words."""
+        planes = sum(isinstance(joint, BallOnPlane) for joint in self.contacts().values())
         counts = {
             ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
             ("flexible body", "flexible bodies"): len(self.flexible()),
             ("joint", "joints"): len(self.joint) - len(self.contacts()),
-            ("joint with clearance", "joints with clearance"): len(self.contacts()),
+            ("joint with clearance", "joints with clearance"): len(self.contacts()) - planes,
+            ("ball on a plane", "balls on planes"): planes,
             ("drive", "drives"): len(self.drive),
             ("load", "loads"): len(self.load),
+            ("stop", "stops"): len(self.stop),
+            ("gear", "gears"): len(self.gear),
         }
         return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
 

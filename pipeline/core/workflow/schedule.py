@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pipeline.core.artifacts.store import Record, Store
 from pipeline.core.errors import FlexclearError, ResourceError
 from pipeline.core.progress import Progress
-from pipeline.core.workflow import cores
+from pipeline.core.workflow import cores, workers
 from pipeline.core.workflow.execute import execute, find, key_of
 from pipeline.core.workflow.family import follow
 from pipeline.core.workflow.fingerprint import Sources
@@ -135,10 +135,9 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
 
 
 def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
-    """In worker processes; spawned, because compiled kernels and forks do not mix."""
+    """In worker processes."""
     # imported here, because a run that finds everything fresh must start quickly
     import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor
     from multiprocessing.managers import SyncManager
 
     context = multiprocessing.get_context("spawn")
@@ -146,7 +145,7 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
     server.start(follow, (os.getpid(),))
     with server:
         reports = server.Queue()
-        pool = ProcessPoolExecutor(width, mp_context=context, initializer=follow, initargs=(os.getpid(),))
+        pool = workers.pool(width)
         running: dict[Future[Record | Failure], _Running] = {}
         try:
             while plan.waiting or running:
@@ -154,7 +153,7 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
                 _collect(plan, running, monitor)
                 _relay(reports, monitor)
         except BaseException:
-            _kill(pool)
+            workers.kill(pool)
             raise
         pool.shutdown()
 
@@ -215,13 +214,6 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
 def _relay(reports: Any, monitor: Monitor) -> None:
     while not reports.empty():
         monitor.update(*reports.get())
-
-
-def _kill(pool: ProcessPoolExecutor) -> None:
-    """End the workers at once; a compiled kernel does not listen to interrupts."""
-    for process in list((pool._processes or {}).values()):
-        process.kill()
-    pool.shutdown(wait=False, cancel_futures=True)
 
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:

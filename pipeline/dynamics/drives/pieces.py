@@ -8,6 +8,7 @@ start of a piece, where integration stops and starts anew.
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -53,9 +54,9 @@ class Pieces:
     span: tuple[float, float] = (-inf, inf)
 
     @cached_property
-    def starts(self) -> np.ndarray:
-        """Start of each piece [s], shape (n,); all but the first are breaks."""
-        return np.array([p.start for p in self.pieces])
+    def starts(self) -> list[float]:
+        """Start of each piece [s]; all but the first are breaks."""
+        return [p.start for p in self.pieces]
 
     @property
     def harmonic(self) -> bool:
@@ -64,7 +65,8 @@ class Pieces:
 
     def at(self, t: float, side: str = "right") -> Piece:
         """The piece that holds just right (or left) of t."""
-        return self.pieces[max(int(np.searchsorted(self.starts, t, side=side)) - 1, 0)]  # type: ignore[call-overload]
+        before = bisect_right if side == "right" else bisect_left
+        return self.pieces[max(before(self.starts, t) - 1, 0)]
 
     def value(self, t: float, order: int = 0, side: str = "right") -> float:
         """A derivative at t, from its right or its left."""
@@ -110,11 +112,16 @@ def covers(law: Pieces, start: float, end: float) -> bool:
 def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
     """Time of the first break between start and end where value or rate jumps, and which of them does."""
     meeting = [(p, q) for p, q in pairwise(law.pieces) if start < q.start < end]
-    grid = [float(t) for t in np.linspace(start, end, 65)]
     for order, word in ((0, "value"), (1, "rate")):
-        size = max(abs(law.value(t, order)) for t in grid)
         for left, right in meeting:
             here = left.value(right.start, order), right.value(right.start, order)
-            if abs(here[1] - here[0]) > 1e-6 * max(size, abs(here[0]), abs(here[1])):
+            step = abs(here[1] - here[0])
+            # the size of the law is asked for last: most laws meet exactly
+            if step > 1e-6 * max(abs(here[0]), abs(here[1])) and step > 1e-6 * _size(law, start, end, order):
                 return right.start, word
     return None
+
+
+def _size(law: Pieces, start: float, end: float, order: int) -> float:
+    """Largest value of a law, or of a derivative, on a grid of times."""
+    return max(abs(law.value(float(t), order)) for t in np.linspace(start, end, 65))

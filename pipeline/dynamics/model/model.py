@@ -81,7 +81,11 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     Raises InputError for what cannot be built.
     """
     mechanism = assembled(mechanism, given)
-    numbering = number(mechanism)
+    return filled(mechanism, number(mechanism), given)
+
+
+def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pieces] = laws.NONE) -> Model:
+    """The model of an assembled mechanism; `given` as of `tabulate`."""
     normals = contacting.resolve(mechanism)
     site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]

@@ -6,7 +6,7 @@ spread of such members do.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import xarray as xr
@@ -41,12 +41,9 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     jacobian = offset_jacobian(engine, start)
-    random = np.random.default_rng(wanted.seed)
     members, reasons = [], []
-    for k in range(wanted.members):
-        offsets = random.normal(size=(len(engine.model.contacts), 3))
-        offsets *= wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True)
-        moved = perturbed(engine, start, jacobian, offsets.ravel())
+    for k, offsets in enumerate(ball_offsets(engine.model, wanted, wanted.members)):
+        moved = perturbed(engine, start, jacobian, offsets)
         last, trajectory, switched = follow(engine, moved, silent, other)
         members.append(_member(last, trajectory, names))
         reasons += [switched] if switched else []
@@ -54,6 +51,14 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
     return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
+
+
+def ball_offsets(model: Model, wanted: Ensemble, members: int) -> Iterator[np.ndarray]:
+    """By which each member's start offsets the balls [m], shape (3 contacts,): random directions, equal lengths."""
+    random = np.random.default_rng(wanted.seed)
+    for _ in range(members):
+        offsets = random.normal(size=(len(model.contacts), 3))
+        yield (offsets * (wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
 def kept_bodies(model: Model, wanted: tuple[str, ...] | None, place: str) -> list[str]:

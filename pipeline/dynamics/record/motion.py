@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.core.scene.parts import RigidBody
+from pipeline.core.scene.parts import Ground, RigidBody
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.flexible_bodies import bow, shift
 from pipeline.dynamics.model.merge import Placement
@@ -84,38 +83,42 @@ class Motions:
     @cached_property
     def bodies(self) -> dict[str, Motion]:
         """Motion of each moving body's centre of mass and axes, by name."""
-        motions: dict[str, Motion] = {}
-        for name, body in self.model.scene.body.items():
-            i = self.model.mechanism.link_of[name]
-            link = self.model.links[i]
-            if isinstance(body, RigidBody):
-                place = link.places[name]
-                motions[name] = self.links[i].at(place.p + place.R @ np.array(body.com), place.R)
-            elif link.bundle is not None:
-                shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
-                arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
-                motions[name] = self.links[i].moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
-        return motions
+        return {name: self.body(name) for name, body in self.model.scene.body.items() if not isinstance(body, Ground)}
+
+    def body(self, name: str) -> Motion:
+        """Motion of one moving body's centre of mass and axes."""
+        i, body = self.model.mechanism.link_of[name], self.model.scene.body[name]
+        link = self.model.links[i]
+        if isinstance(body, RigidBody):
+            place = link.places[name]
+            return self.links[i].at(place.p + place.R @ np.array(body.com), place.R)
+        assert link.bundle is not None
+        shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
+        arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
+        return self.links[i].moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
 
     @cached_property
     def frame_positions(self) -> dict[str, np.ndarray]:
         """Origin of every named frame, kernels' origin, shape (time, 3)."""
-        positions = {}
-        for name, i, place in self._frames():
-            link, bundle = self.links[i], self.model.links[i].bundle
-            arm = np.broadcast_to(place.p, link.p.shape)
-            if bundle is not None:
-                label = name.partition(".")[2]
-                S = bundle["frame_translation_shape"].sel(frame=label).values
-                arm = arm + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
-            positions[name] = link.p + np.einsum("tij,tj->ti", link.R, arm)
-        return positions
+        return {name: self.frame_position(name) for name in self.model.mechanism.frames}
+
+    def frame_position(self, name: str) -> np.ndarray:
+        """Origin of one named frame, kernels' origin, shape (time, 3)."""
+        i, place = self._place(name)
+        link, bundle = self.links[i], self.model.links[i].bundle
+        arm = np.broadcast_to(place.p, link.p.shape)
+        if bundle is not None:
+            label = name.partition(".")[2]
+            S = bundle["frame_translation_shape"].sel(frame=label).values
+            arm = arm + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
+        return link.p + np.einsum("tij,tj->ti", link.R, arm)
 
     @cached_property
     def frame_velocities(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         """Velocity of the origin and angular velocity of every named frame, world axes, shape (time, 3) each."""
         velocities = {}
-        for name, i, place in self._frames():
+        for name in self.model.mechanism.frames:
+            i, place = self._place(name)
             link, bundle = self.links[i], self.model.links[i].bundle
             if bundle is None:
                 velocities[name] = link.at(place.p).v, link.omega
@@ -127,11 +130,11 @@ class Motions:
             velocities[name] = link.moving(place.p + arm, rate, second).v, link.omega + turning
         return velocities
 
-    def _frames(self) -> Iterator[tuple[str, int, Placement]]:
-        """Every named frame: its link, and its undeformed place there."""
-        for name, frame in self.model.mechanism.frames.items():
-            i = self.model.mechanism.link_of[frame.body]
-            yield name, i, self.model.links[i].places[frame.body].of(frame.place)
+    def _place(self, name: str) -> tuple[int, Placement]:
+        """Link of a named frame, and the frame's undeformed place there."""
+        frame = self.model.mechanism.frames[name]
+        i = self.model.mechanism.link_of[frame.body]
+        return i, self.model.links[i].places[frame.body].of(frame.place)
 
 
 def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:

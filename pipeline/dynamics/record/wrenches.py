@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -18,19 +18,25 @@ from pipeline.dynamics.record.motion import Motions
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
 
 
-def joint_wrenches(motions: Motions) -> dict[str, Wrench]:
-    """Wrench of every joint on its second body: moment about that body's frame origin [N m], force [N]."""
+def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> dict[str, Wrench]:
+    """Wrench of joints on their second bodies: moment about that body's frame origin [N m], force [N].
+
+    names: of the joints; all when None.
+    """
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
     for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
         moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds beside its contact
         push = seen.touch["force"][:, c]
         known[contact.name] = (moment + np.cross(seen.touch["point"][:, c], push), force + push)
-    known |= _inside_groups(motions, known)
+    wanted = model.scene.joint if names is None else names
+    if any(name not in known for name in wanted):
+        known |= _inside_groups(motions, known)
     result = {}
-    for name, joint in model.scene.joint.items():
+    for name in wanted:
         moment, force = known[name]
-        result[name] = (moment - np.cross(motions.frame_positions[joint.between[1]], force), force)
+        arm = motions.frame_position(model.scene.joint[name].between[1])
+        result[name] = (moment - np.cross(arm, force), force)
     return result
 
 

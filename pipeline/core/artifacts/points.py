@@ -1,0 +1,146 @@
+"""Points of a sweep: what is left of each, batches of them as artifacts, and the dataset of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
+from pipeline.core.scene.design import Axis, Design
+from pipeline.core.scene.kept import Kept
+
+Values = dict[str, np.ndarray]
+#: what became of a point
+STATUS = ("done", "refused", "not_run")
+DONE, REFUSED, NOT_RUN = range(3)
+#: what is kept of each quantity: its value, and where asked for the difference from a run at a tighter tolerance, or
+#: the standard deviation over members
+SHARES = ("values", "error", "deviation")
+
+
+@dataclass(frozen=True)
+class Point:
+    """What is left of one point.
+
+    values: by the names of what is kept, in SI; with members their mean.  error: distance from the values at a tighter
+    tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
+    evaluations: of the right-hand side, all runs of the point together.
+    refused: why there are no values; else empty.
+    """
+
+    values: Values
+    error: Values
+    deviation: Values
+    evaluations: int
+    refused: str = ""
+
+
+def batch(points: Mapping[str, Point], kept: Sequence[Kept]) -> xr.Dataset:
+    """Finished points by their keys, as a dataset."""
+    done = list(points.values())
+    variables = _arrays(done, kept, ("point",), (len(done),))
+    variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
+    variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))
+    return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
+
+
+def unpacked(stored: xr.Dataset, kept: Sequence[Kept]) -> dict[str, Point]:
+    """The points of a batch by their keys."""
+    arrays = {str(name): stored[name].values for name in stored.variables}
+    found = {}
+    for k, key in enumerate(arrays["key"]):
+        refused = str(arrays["refused"][k])
+        values, error, deviation = (
+            {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, share)) in arrays}
+            for share in SHARES
+        )
+        found[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
+    return found
+
+
+def variable(one: Kept, share: str) -> str:
+    """Name of a variable."""
+    return one.name if share == "values" else f"{one.name}.{share}"
+
+
+def dataset(
+    design: Design,
+    kept: Sequence[Kept],
+    keys: Sequence[str],
+    points: Mapping[str, Point],
+    time: np.ndarray,
+    attributes: Mapping[str, str | int],
+) -> xr.Dataset:
+    """All points of a sweep on its own dimensions; nan where there is no value.
+
+    keys: of the points, in their order.  points: the finished ones.  time: of the series that are kept [s].
+    """
+    dims, shape = design.dims, design.shape
+    every = [points.get(key) for key in keys]
+    variables = _arrays(every, kept, dims, shape)
+    status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
+    plain = {
+        "status": (np.array(status, dtype=np.int8), "what became of the point"),
+        "reason": (np.array(["" if p is None else p.refused for p in every], dtype=object), "why it was refused"),
+        "evaluations": (
+            np.array([0 if p is None else p.evaluations for p in every], dtype=np.int64),
+            "evaluations of the equations of motion, all runs of the point together",
+        ),
+        "key": (np.array(keys, dtype=object), "digest of all that decides the point"),
+    }
+    for name, (values, _) in plain.items():
+        variables[name] = (dims, values.reshape(shape))
+    sizes = {str(dim) for names, _ in variables.values() for dim in names}
+    coordinates: dict[str, object] = {}
+    for axis in design.axes:
+        coordinates[axis.name] = (axis.name if design.grid else "point", np.array(axis.coordinate))
+    coordinates |= {"axis": list(AXES)} if "axis" in sizes else {}
+    coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}
+    coordinates |= {"time": time} if "time" in sizes else {}
+    result = xr.Dataset(variables, coords=coordinates)
+    _describe(result, design.axes, kept)
+    for name, (_, meaning) in plain.items():
+        result[name].attrs = {"long_name": meaning}
+    result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
+    finished = int(NOT_RUN not in status)
+    return result.assign_attrs({"Conventions": CONVENTIONS, "complete": finished, **attributes})
+
+
+def _arrays(
+    points: Sequence[Point | None], kept: Sequence[Kept], dims: tuple[str, ...], shape: tuple[int, ...]
+) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Values of points, row by row in the order of the dimensions; nan where there are none."""
+    arrays = {}
+    done = next((point for point in points if point is not None and not point.refused), None)
+    for share in SHARES if done is not None else ():
+        for one in kept:
+            if one.name not in getattr(done, share):
+                continue
+            inner = np.shape(getattr(done, share)[one.name])
+            rows = np.full((len(points), *inner), np.nan)
+            for k, point in enumerate(points):
+                if point is not None and not point.refused:
+                    rows[k] = getattr(point, share)[one.name]
+            arrays[variable(one, share)] = ((*dims, *one.dims), rows.reshape((*shape, *inner)))
+    return arrays
+
+
+def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept]) -> None:
+    """Units and meanings."""
+    words = {
+        "values": "",
+        "error": "; distance from the value at a hundredth of the tolerance",
+        "deviation": "; standard deviation over the members",
+    }
+    for one in kept:
+        for share, more in words.items():
+            if variable(one, share) in result:
+                result[variable(one, share)].attrs = {"units": one.unit, "long_name": f"{one.meaning}{more}"}
+    for axis in axes:
+        units = {"units": axis.unit} if axis.unit else {}
+        result[axis.name].attrs = {"long_name": ", ".join(axis.places), **units}
+    if "time" in result.coords:
+        result["time"].attrs = {"units": "s", "long_name": "time"}

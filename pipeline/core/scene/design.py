@@ -1,0 +1,124 @@
+"""The points of a sweep: values of all its parameters, and the places of the scene that take them."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.scene.sweep import Sample, Sweep, number_and_unit
+
+#: a value of a parameter as a scene takes it: a number in SI, text with an SI unit, or anything else as it was written
+Value = Any
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One parameter. values: as the scene takes them, those of all points or of one dimension of the grid.
+
+    unit: SI unit of the values where they were written with one; else empty.
+    """
+
+    name: str
+    places: tuple[str, ...]
+    values: tuple[Value, ...]
+    unit: str
+
+    @property
+    def coordinate(self) -> list[float] | list[str]:
+        """The values as numbers in SI; as text where they are none."""
+        numeric = all(_is_number(value) for value in self.values)
+        return [number_and_unit(v)[0] for v in self.values] if numeric else [_text(v) for v in self.values]
+
+
+@dataclass(frozen=True)
+class Design:
+    """All parameters of a sweep; in a grid each is a dimension, the last one running fastest."""
+
+    axes: tuple[Axis, ...]
+    grid: bool
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of points along each dimension."""
+        return tuple(len(axis.values) for axis in (self.axes if self.grid else self.axes[:1]))
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the dimensions: the parameters, or ``point``."""
+        return tuple(axis.name for axis in self.axes) if self.grid else ("point",)
+
+    def points(self) -> list[dict[str, Value]]:
+        """Place of the scene -> value, point by point."""
+        combined = (itertools.product if self.grid else zip)(*(axis.values for axis in self.axes))
+        return [
+            {place: value for axis, value in zip(self.axes, values, strict=True) for place in axis.places}
+            for values in combined
+        ]
+
+
+def design(sweep: Sweep) -> Design:
+    """The points of a sweep; the same ones whenever it is asked."""
+    if sweep.sample is not None:
+        shares = _shares(sweep.sample, len(sweep.vary)).T
+        axes = [_sampled(sweep, name, share) for name, share in zip(sweep.vary, shares, strict=True)]
+        return Design(tuple(axes), grid=False)
+    return Design(tuple(_listed(sweep, name) for name in sweep.vary), grid=sweep.combine == "grid")
+
+
+def _listed(sweep: Sweep, name: str) -> Axis:
+    parameter = sweep.vary[name]
+    if parameter.values is not None:
+        units = {number_and_unit(v)[1] for v in parameter.values if _is_number(v)}
+        return Axis(name, sweep.places(name), parameter.values, units.pop() if len(units) == 1 else "")
+    a, b = parameter.numbers("first", "last")
+    spaced = np.geomspace if parameter.spacing == "log" else np.linspace
+    return _numbered(sweep, name, spaced(a, b, parameter.count or 2))
+
+
+def _sampled(sweep: Sweep, name: str, shares: np.ndarray) -> Axis:
+    """A parameter whose distribution has these shares below each value, shape (points,)."""
+    parameter = sweep.vary[name]
+    if parameter.mean is not None:
+        from scipy.special import ndtri
+
+        mean, deviation = parameter.numbers("mean", "deviation")
+        return _numbered(sweep, name, mean + deviation * ndtri(shares))
+    a, b = parameter.numbers("first", "last")
+    log = parameter.spacing == "log"
+    return _numbered(sweep, name, a * (b / a) ** shares if log else a + (b - a) * shares)
+
+
+def _numbered(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:
+    unit = sweep.vary[name].unit
+    values = tuple(f"{x!r} {unit}" if unit else x for x in numbers.tolist())
+    return Axis(name, sweep.places(name), values, unit)
+
+
+def _shares(sample: Sample, parameters: int) -> np.ndarray:
+    """Points of the unit cube, shape (points, parameters), none on its faces."""
+    from scipy.stats import qmc
+
+    if sample.method == "random":
+        return np.random.default_rng(sample.seed).uniform(np.finfo(float).tiny, 1.0, (sample.points, parameters))
+    kind = qmc.Sobol if sample.method == "sobol" else qmc.LatinHypercube
+    with warnings.catch_warnings():
+        # a number of points that is no power of two is the user's choice; docs/sweeps.md says what it costs
+        warnings.simplefilter("ignore", UserWarning)
+        drawn = kind(parameters, rng=np.random.default_rng(sample.seed)).random(sample.points)
+    return np.clip(drawn, np.finfo(float).eps, 1.0 - np.finfo(float).eps)
+
+
+def _is_number(value: Value) -> bool:
+    try:
+        number_and_unit(value)
+    except ValueError:
+        return False
+    return True
+
+
+def _text(value: Value) -> str:
+    return value if isinstance(value, str) else repr(value)

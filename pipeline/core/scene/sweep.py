@@ -1,0 +1,210 @@
+"""A sweep: one scene, what is varied in it, and what is kept of every point. See docs/sweeps.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.fields import Part
+from pipeline.core.scene.load import read_toml
+from pipeline.core.scene.mistakes import input_errors
+from pipeline.core.units import any_quantity
+
+#: points of one sweep; more are several sweeps
+MOST_POINTS = 1_000_000
+
+Value = float | str
+#: dimensions that results have besides the parameters
+RESERVED = ("point", "time", "axis", "quat")
+#: ways to say the values of a parameter, each by its keys
+WAYS = (("values",), ("from", "to"), ("mean", "deviation"))
+
+
+class Parameter(Part):
+    """What values a parameter takes: those of a list, a range, or a normal distribution.
+
+    values: one by one.  from, to: a range, of `count` points in a grid; in samples a uniform distribution.
+    spacing: of a range; `log` needs ends of one sign.  mean, deviation: of a normal distribution, in samples.
+    places: the places of the scene that all take the value; default: the parameter's name.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+
+    values: Annotated[tuple[Any, ...], Field(min_length=1)] | None = None
+    first: Value | None = Field(default=None, alias="from")
+    last: Value | None = Field(default=None, alias="to")
+    count: Annotated[int, Field(ge=2, le=MOST_POINTS)] | None = None
+    spacing: Literal["linear", "log"] = "linear"
+    mean: Value | None = None
+    deviation: Value | None = None
+    places: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _bare(cls, given: Any) -> Any:
+        return {"values": given} if isinstance(given, (list, tuple)) else given
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Parameter:
+        given = {"values": self.values, "from": self.first, "to": self.last, "mean": self.mean}
+        named = [key for key, value in {**given, "deviation": self.deviation}.items() if value is not None]
+        if tuple(named) not in WAYS:
+            ways = ", or ".join(" and ".join(way) for way in WAYS)
+            raise ValueError(f"its values are given by {ways}; here by {' and '.join(named) or 'nothing'}")
+        if self.count is not None and self.first is None:
+            raise ValueError("count belongs to a range, from .. to")
+        if self.first is not None:
+            self._check_range()
+        if self.deviation is not None and not self.numbers("mean", "deviation")[1] > 0.0:
+            raise ValueError(f"deviation must be greater than 0, not {self.deviation!r}")
+        return self
+
+    def _check_range(self) -> None:
+        a, b = self.numbers("first", "last")
+        if a == b:
+            raise ValueError(f"from and to are both {self.first!r}: a range needs two different ends")
+        if self.spacing == "log" and not a * b > 0.0:
+            raise ValueError(f"a logarithmic range needs ends of one sign, not {self.first!r} and {self.last!r}")
+
+    def numbers(self, *fields: str) -> tuple[float, ...]:
+        """Fields as numbers in one SI unit, that of `unit`."""
+        return tuple(number_and_unit(getattr(self, name))[0] for name in fields)
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the ends, or of mean and deviation, as they are written; empty for bare numbers."""
+        fields = ("first", "last") if self.first is not None else ("mean", "deviation")
+        units = {number_and_unit(getattr(self, name))[1] for name in fields}
+        if len(units) > 1:
+            one, other = (getattr(self, name) for name in fields)
+            raise ValueError(f"{one!r} and {other!r} are not of one unit")
+        return units.pop()
+
+    @model_validator(mode="after")
+    def _of_one_unit(self) -> Parameter:
+        if self.values is None:
+            _ = self.unit
+        return self
+
+
+def number_and_unit(value: Any) -> tuple[float, str]:
+    """SI value and SI unit of a number, or of text with a unit; ValueError in words."""
+    found = any_quantity(value)
+    if isinstance(found, str):
+        number, _, unit = found.partition(" ")
+        return float(number), unit
+    return found, ""
+
+
+class Sample(Part):
+    """Points spread over all parameters together, instead of a grid.
+
+    method: scrambled Sobol sequence (best with a power of two), Latin hypercube, or independent random numbers.
+    """
+
+    method: Literal["sobol", "latin-hypercube", "random"]
+    points: Annotated[int, Field(ge=1, le=MOST_POINTS)]
+    seed: Annotated[int, Field(ge=0)] = 1
+
+
+class Sweep(Part):
+    """Everything that a sweep file says.
+
+    scene: a scene file, or the name of one below scenes/.  set: changes of the scene that hold at all points.
+    vary: parameters by name; the name is a place of the scene unless `places` says which ones.
+    combine: every value with every other (grid), or the first values, the second ones and so on (list).
+    keep: what is kept of each point, see `pipeline.core.scene.kept`.
+    members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are kept.
+    error: run each point at a hundredth of its tolerance as well, and keep the differences.
+    """
+
+    title: str = ""
+    description: str = ""
+    scene: str
+    set: dict[str, Any] = Field(default_factory=dict)
+    vary: Annotated[dict[str, Parameter], Field(min_length=1)]
+    combine: Literal["grid", "list"] = "grid"
+    sample: Sample | None = None
+    keep: Annotated[tuple[str, ...], Field(min_length=1)]
+    members: Annotated[int, Field(ge=2, le=100_000)] | None = None
+    error: bool = False
+
+    _name: str = PrivateAttr(default="sweep")
+
+    @property
+    def name(self) -> str:
+        """Stem of the file."""
+        return self._name
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Sweep:
+        if self.sample is not None:
+            self._check_sample()
+            return self
+        for name, parameter in self.vary.items():
+            if parameter.mean is not None:
+                raise ValueError(f"vary.{name}: a normal distribution needs a [sample]")
+            if parameter.first is not None and parameter.count is None:
+                raise ValueError(f"vary.{name}: a range needs its count where there is no [sample]")
+        lengths = {name: self.length(name) for name in self.vary}
+        if self.combine == "list" and len(set(lengths.values())) > 1:
+            told = ", ".join(f"{name} {n}" for name, n in lengths.items())
+            raise ValueError(
+                f"combine: parameters that go together must have as many values as each other; here {told}"
+            )
+        points = 1
+        for n in lengths.values() if self.combine == "grid" else list(lengths.values())[:1]:
+            points *= n
+        if points > MOST_POINTS:
+            raise ValueError(f"vary: these are {points} points, more than {MOST_POINTS}; make several sweeps of them")
+        return self
+
+    @model_validator(mode="after")
+    def _each_place_once(self) -> Sweep:
+        seen: dict[str, str] = {}
+        for name in self.vary:
+            if name in RESERVED:
+                raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
+            for place in self.places(name):
+                if place in seen:
+                    raise ValueError(f"vary.{name}: '{place}' is varied by '{seen[place]}' already")
+                seen[place] = name
+        return self
+
+    def _check_sample(self) -> None:
+        if self.combine == "list":
+            raise ValueError('combine: a [sample] makes its own points; leave combine = "list" out')
+        for name, parameter in self.vary.items():
+            if parameter.values is not None or parameter.count is not None:
+                raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")
+
+    def places(self, name: str) -> tuple[str, ...]:
+        """The places of the scene that a parameter sets."""
+        return self.vary[name].places or (name,)
+
+    def length(self, name: str) -> int:
+        """Number of values of a parameter in a grid or list."""
+        parameter = self.vary[name]
+        return parameter.count or len(parameter.values or ())
+
+
+def read_sweep(table: Mapping[str, Any], where: str | Path) -> Sweep:
+    """The sweep that a table says; InputErrors with all mistakes, placed at `where`."""
+    try:
+        return Sweep.model_validate(dict(table))
+    except ValidationError as error:
+        raise input_errors(where, error, Sweep) from None
+
+
+def load_sweep(path: Path) -> Sweep:
+    """The sweep in a TOML file; InputError for a file that cannot be read, or is a scene."""
+    table = read_toml(path)
+    if "body" in table or "extends" in table:
+        raise InputError(str(path), "is a scene, not a sweep of one", "name a file with the keys scene, vary and keep")
+    sweep = read_sweep(table, path)
+    sweep._name = path.stem
+    return sweep

@@ -1,0 +1,105 @@
+"""The model of an edited scene from that of another one, where only numbers of contacts, loads and laws differ.
+
+Placing the links, finding the tree and judging the mobility take most of the time in which a model is made, and none
+of it depends on a clearance, a contact law, a load, the tolerance or the length of the run.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.scene.drives import JointDrive
+from pipeline.core.scene.loads import Gravity
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.laws import drive_laws
+from pipeline.dynamics.model.model import Model, filled
+
+
+def refilled(model: Model, scene: Scene) -> Model | None:
+    """The model of `scene`, equal to the one that would be made from scratch; None when it must be made so.
+
+    model: of a scene without laws given from outside.  Raises InputError as `tabulate` does.
+    """
+    if not _same_structure(model, scene) or not _same_start(model, scene):
+        return None
+    clearances = scene.contacts()
+    contacts = [c._replace(joint=clearances[c.name]) if c.name in clearances else c for c in model.contacts]
+    mechanism = replace(model.mechanism, scene=scene, contacts=contacts)
+    old = model.numbering
+    numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
+    made = filled(mechanism, numbering)
+    # other kinds of laws are other kernels, and a drive that begins to move may contradict another one
+    return made if made.parts == model.parts and _moving(made) == _moving(model) else None
+
+
+def _same_structure(model: Model, scene: Scene) -> bool:
+    old = model.scene
+    if scene.body != old.body or scene.time.start != old.time.start:
+        return False
+    if (scene.stop, scene.gear, scene.start) != (old.stop, old.gear, old.start):
+        return False
+    if list(scene.joint) != list(old.joint) or list(scene.drive) != list(old.drive):
+        return False
+    if list(scene.load) != list(old.load):
+        return False
+    contacts, clearances = scene.contacts(), [joint.clearance for joint in old.contacts().values()]
+    if contacts.keys() != old.contacts().keys():
+        return False
+    # the mechanism's size is that of its points, unless a clearance is larger
+    if any(c >= model.length for c in [*clearances, *(joint.clearance for joint in contacts.values())]):
+        return False
+    pairs = zip(scene.joint.items(), old.joint.values(), strict=True)
+    if any(new is not was and (name not in contacts or _held(new) != _held(was)) for (name, new), was in pairs):
+        return False
+    loads = zip(scene.load.values(), old.load.values(), strict=True)
+    if any(new is not was and not _acts_alike(new, was) for new, was in loads):
+        return False
+    drives = zip(scene.drive.values(), old.drive.values(), strict=True)
+    return all(new is was or _drives_alike(new, was) for new, was in drives)
+
+
+def _held(joint: Any) -> tuple[str, tuple[str, str]]:
+    """What a clearance joint holds beside its contact."""
+    return joint.type, tuple(joint.between)
+
+
+def _acts_alike(new: Any, was: Any) -> bool:
+    """Whether two loads are of one kind and act between the same frames or coordinates."""
+    return _words(new) == _words(was) or (isinstance(new, Gravity) and isinstance(was, Gravity))
+
+
+def _words(load: Any) -> dict[str, Any]:
+    """What a load says in words: its type, frames, joint and coordinate; the rest of it are numbers and laws."""
+    values = {name: value for name, value in load if name != "source"}
+    return {
+        n: v for n, v in values.items() if isinstance(v, str) or (isinstance(v, tuple) and v and isinstance(v[0], str))
+    }
+
+
+def _drives_alike(new: Any, was: Any) -> bool:
+    both = isinstance(new, JointDrive) and isinstance(was, JointDrive)
+    return both and (new.joint, new.coordinate) == (was.joint, was.coordinate)
+
+
+def _same_start(model: Model, scene: Scene) -> bool:
+    """Whether the drives stand at the start where they stood: then the links stand there, too."""
+    if scene.drive is model.scene.drive and scene.time == model.scene.time:
+        return True
+    t = scene.time.start
+    old, new = (drive_laws(one, {}) for one in (model.scene, scene))
+    return all(a.value(t) == b.value(t) for a, b in zip(old, new, strict=True))
+
+
+def _moving(model: Model) -> tuple[bool, ...]:
+    """Which of the drives are not constant."""
+    tables, moving = model.arrays.table(m.PIECES), list[bool]()
+    harmonics = model.arrays.table(m.PIECE_HARMONICS)["n_harmonics"]
+    for first, count in model.arrays.table(m.LAWS)[: len(model.drives)]:
+        values = tables["coefficients"][first : first + count]
+        changes = np.any(values[:, 1:] != 0.0) or np.ptp(values[:, 0]) > 0.0
+        moving.append(bool(changes or np.any(harmonics[first : first + count] > 0)))
+    return tuple(moving)

@@ -1,0 +1,156 @@
+"""One point of a sweep: a run of which nothing is made but the numbers that are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.artifacts.event_kinds import CLOSING
+from pipeline.core.artifacts.points import Point, Values
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.progress import silent
+from pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
+from pipeline.core.scene.kept import OF_CONTACTS, Kept
+from pipeline.core.scene.load import edited
+from pipeline.core.scene.schema import Ensemble, Scene
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.equations.observation import Observed
+from pipeline.dynamics.record.ensemble import ball_offsets
+from pipeline.dynamics.record.motion import Motions, quaternions
+from pipeline.dynamics.record.wrenches import joint_wrenches
+from pipeline.dynamics.run.alike import engines_alike
+from pipeline.dynamics.run.engine import Engine
+from pipeline.dynamics.run.ledger import require_closed
+from pipeline.dynamics.run.run import follow, observed, require_shallow
+from pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from pipeline.dynamics.run.start import consistent_start
+from pipeline.dynamics.run.trajectory import Trajectory
+
+#: where nothing is kept of the way, the ledger of energy is looked at so often
+LOOKS = 50
+#: how much tighter the tolerance of the run is by which the error is estimated
+TIGHTER = 1e-2
+
+
+@dataclass
+class Runner:
+    """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
+
+    kept: what is kept.  members: starts of each point that differ by a hair; 0: the one of the scene.
+    error: whether each point is run at a tighter tolerance as well.
+    """
+
+    bundles: Mapping[str, xr.Dataset]
+    kept: Sequence[Kept]
+    members: int = 0
+    error: bool = False
+    engine: Engine | None = None
+
+    def run(self, scene: Scene) -> Point:
+        """One point; what physics or the input of this point refuses is told in the point, not raised."""
+        scene = thinned(scene, self.kept)
+        try:
+            values, deviation, count = self._values(scene)
+            if not self.error:
+                return Point(values, {}, deviation, count)
+            tight = edited(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
+            better, _, more = self._values(tight)
+        except (SolverError, InputError) as error:
+            return Point({}, {}, {}, 0, str(error))
+        return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
+
+    def _values(self, scene: Scene) -> tuple[Values, Values, int]:
+        engine, other = engines_alike(self.engine, scene, self.bundles)
+        self.engine = self.engine or engine
+        found, count = list[Values](), 0
+        for start in self._starts(engine):
+            last, trajectory, _ = follow(engine, start, silent, other)
+            found.append(_kept(last, trajectory, self.kept))
+            count += trajectory.counters["evaluations"]
+        if not self.members:
+            return found[0], {}, count
+        stacked = {name: np.stack([values[name] for values in found]) for name in found[0]}
+        means = {name: values.mean(axis=0) for name, values in stacked.items()}
+        return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
+
+    def _starts(self, engine: Engine) -> list[np.ndarray]:
+        start, model = consistent_start(engine), engine.model
+        if not self.members:
+            return [start]
+        jacobian = offset_jacobian(engine, start)
+        offsets = ball_offsets(model, model.scene.ensemble or Ensemble(), self.members)
+        return [perturbed(engine, start, jacobian, moved) for moved in offsets]
+
+
+def thinned(scene: Scene, kept: Sequence[Kept]) -> Scene:
+    """The scene with no more regular outputs than what is kept needs."""
+    if any(one.throughout for one in kept):
+        return scene
+    interval = max(scene.output.interval, (scene.time.end - scene.time.start) / LOOKS)
+    return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
+
+
+def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Values:
+    seen = observed(engine, trajectory)
+    require_shallow(engine.model, trajectory, seen)
+    require_closed(engine.model, trajectory, seen)
+    motions, series = Motions(engine.model, seen), dict[str, np.ndarray]()
+    forces = joint_wrenches(motions, sorted({k.quantity.owner for k in kept if k.quantity.kind in ("force", "moment")}))
+    values: Values = {}
+    for one in kept:
+        if one.quantity.kind in OF_CONTACTS:
+            values[one.name] = np.asarray(_of_contact(engine, trajectory, seen, one))
+            continue
+        if one.quantity.name not in series:
+            series[one.quantity.name] = _series(motions, forces, one)
+        found = series[one.quantity.name]
+        if one.reduction == "series":
+            value = found[_regular(engine, trajectory.time)]
+        else:
+            value = reduced(trajectory.time, found, one.reduction)
+        values[one.name] = value if "axis" in one.dims or "quat" in one.dims else value.reshape(value.shape[:1])
+    return values
+
+
+def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Kept) -> np.ndarray:
+    """Values at all rows, shape (rows, components), as the run's dataset has them."""
+    owner, kind = one.quantity.owner, one.quantity.kind
+    if kind in ("force", "moment"):
+        return forces[owner][kind == "force"]
+    if kind == "drive_force":
+        drives = list(motions.model.drives)
+        column = drives.index(owner)
+        force: np.ndarray = motions.model.drive_signs[column] * motions.seen.drive_force[:, [column]]
+        return force
+    body = motions.body(owner)
+    by_kind: dict[str, Callable[[], np.ndarray]] = {
+        "position": lambda: body.p + motions.model.mechanism.origin,
+        "orientation": lambda: quaternions(body.R),
+        "velocity": lambda: body.v,
+        "angular_velocity": lambda: body.omega,
+    }
+    return by_kind[kind]()
+
+
+def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kept) -> float:
+    contact = [c.name for c in engine.model.contacts].index(one.quantity.owner)
+    if one.quantity.kind == "impulse":
+        ledger = seen.state[-1, engine.model.speeds.stop :]
+        slots = ledger[m.CONTACT_SLOTS : m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(engine.model.contacts)]
+        return float(m.named(m.CONTACT_LEDGER, slots[None])["impulse"][0, contact])
+    events = trajectory.events
+    closings = events[(events["contact"] == contact) & (events["kind"] == CLOSING)]
+    if one.quantity.kind == "peak_force":
+        return float(closings["peak_force"].max(initial=0.0))
+    return of_impacts(closings["time"][closings["speed"] > IMPACT], one.reduction)
+
+
+def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
+    """Rows at the regular output times; a break that takes the place of one is the same but for rounding."""
+    wanted = regular_times(engine.model.scene.time, engine.model.scene.output)
+    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+    nearer = np.where(np.abs(time[after - 1] - wanted) < np.abs(time[after] - wanted), after - 1, after)
+    return np.asarray(nearer)

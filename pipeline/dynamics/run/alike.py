@@ -1,0 +1,40 @@
+"""Engines of many edits of one scene: what has been compiled and judged for one of them serves the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+
+import xarray as xr
+
+from pipeline.core.integrators import INTEGRATORS
+from pipeline.core.progress import silent
+from pipeline.core.scene.drives import PathDrive
+from pipeline.core.scene.load import edited
+from pipeline.core.scene.schema import Scene
+from pipeline.dynamics.effects import scheme_of
+from pipeline.dynamics.model.refill import refilled
+from pipeline.dynamics.run.engine import Engine, assemble
+from pipeline.dynamics.run.run import engine_of, engines
+
+
+def engines_alike(
+    known: Engine | None, scene: Scene, bundles: Mapping[str, xr.Dataset]
+) -> tuple[Engine, Callable[[], Engine]]:
+    """What `engines` gives, to the last bit, at less cost where an engine of a similar scene is `known`.
+
+    known: with the same bundles; it is not changed.  Errors as of `engines`.
+    """
+    model = None if known is None or not _may_serve(known, scene) else refilled(known.model, scene)
+    if known is None or model is None:
+        return engines(scene, bundles, silent)
+    heir = INTEGRATORS[scene.solver.integrator].hands_over_to
+    other = cache(lambda: engine_of(edited(scene, {"solver.integrator": heir}), bundles, silent))
+    return assemble(model, known.entry, known.method, known.mobility), other
+
+
+def _may_serve(known: Engine, scene: Scene) -> bool:
+    """Whether the scene runs on the same kernels, no other run finds its motion, and its start is no special one."""
+    old = known.model.scene
+    paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
+    return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start

@@ -1,0 +1,147 @@
+"""Figures of a sweep: curves over one parameter, maps over two, clouds of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import ceil
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pipeline.post.plotting.style import INK, SOFT, files, grid, heading, plain, style
+
+COLUMNS = 2
+LINE, REFUSED = "#0072B2", "#D55E00"
+#: a parameter whose largest value is so many times its least one is drawn on a logarithmic axis
+DECADE = 8.0
+#: factors that make the numbers of an axis handy
+HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
+NAME = "sweep"
+
+
+def figures(sweep: xr.Dataset) -> dict[str, bytes]:
+    """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, or text along them."""
+    panels = _panels(sweep)
+    parameters = [str(name) for name in sweep["status"].dims]
+    draw = _drawn(sweep, parameters)
+    if draw is None or not panels:
+        return {}
+    rows = ceil(len(panels) / COLUMNS)
+    with style():
+        figure, axes = grid(rows, COLUMNS, (9.6, 1.0 + 2.9 * rows))
+        for ax, name in zip(axes.ravel(), panels, strict=False):
+            draw(figure, ax, sweep, name)
+            ax.set_title(name)
+        for ax in axes.ravel()[len(panels) :]:
+            ax.set_visible(False)
+        refused = int((sweep["status"] == 1).sum())
+        missing = int((sweep["status"] == 2).sum())
+        told = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
+        told += [f"{refused} refused"] if refused else []
+        told += [f"{missing} not run"] if missing else []
+        heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(told))
+        return files(NAME, figure)
+
+
+Draw = Callable[[Figure, Axes, xr.Dataset, str], None]
+
+
+def _panels(sweep: xr.Dataset) -> list[str]:
+    """Variables with one number for each point; vectors and series are left to the user's own figures."""
+    dims = sweep["status"].dims
+    names = [str(name) for name in sweep.data_vars if sweep[name].dims == dims and "units" in sweep[name].attrs]
+    return [name for name in names if not name.endswith((".error", ".deviation"))]
+
+
+def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
+    if parameters == ["point"]:
+        names = _coordinates(sweep)
+        if not names:
+            return None
+        ordered = len(names) > 1 and _walks(sweep, names)
+        return _curve if len(names) == 1 or ordered else _cloud
+    if any(sweep[name].dtype.kind not in "fiu" for name in parameters):
+        return None
+    return {1: _curve, 2: _map}.get(len(parameters))
+
+
+def _coordinates(sweep: xr.Dataset) -> list[str]:
+    """Numeric parameters of points, in the order of the sweep."""
+    own = [str(name) for name in sweep.coords if sweep[name].dims == ("point",)]
+    return [name for name in own if sweep[name].dtype.kind in "fiu"]
+
+
+def _walks(sweep: xr.Dataset, names: list[str]) -> bool:
+    """Whether all parameters go up, or down, together from point to point: then one of them tells the others."""
+    steps = [np.diff(sweep[name].values) for name in names]
+    return all(bool((step > 0).all() or (step < 0).all()) for step in steps)
+
+
+def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
+    parameter = _parameter(sweep)
+    x, y = sweep[parameter].values * _scale(sweep, parameter)[0], sweep[name].values
+    spread = next((sweep[f"{name}{end}"].values for end in (".deviation", ".error") if f"{name}{end}" in sweep), None)
+    if spread is not None:
+        ax.fill_between(x, y - spread, y + spread, color=LINE, alpha=0.22, lw=0.0)
+    ax.plot(x, y, color=LINE, marker="o", ms=3.0)
+    for place in x[sweep["status"].values == 1]:
+        ax.axvline(place, color=REFUSED, lw=0.8, ls=":")
+    _label(ax, sweep, parameter, name)
+    if x.min() > 0.0 and x.max() > DECADE * x.min():
+        ax.set_xscale("log")
+        plain(ax.xaxis)
+
+
+def _parameter(sweep: xr.Dataset) -> str:
+    dims = [str(dim) for dim in sweep["status"].dims]
+    return _coordinates(sweep)[0] if dims == ["point"] else dims[0]
+
+
+def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
+    rows, columns = (str(dim) for dim in sweep["status"].dims)
+    x, y = (sweep[dim].values * _scale(sweep, dim)[0] for dim in (columns, rows))
+    mesh = ax.pcolormesh(x, y, sweep[name].values, shading="nearest", cmap="viridis")
+    bar = figure.colorbar(mesh, ax=ax)
+    bar.set_label(sweep[name].attrs["units"], color=SOFT)
+    bar.outline.set_visible(False)
+    ax.grid(False)
+    refused = np.argwhere(sweep["status"].values == 1)
+    ax.plot(x[refused[:, 1]], y[refused[:, 0]], "x", color=REFUSED, ms=4.0)
+    ax.set_xlabel(_axis(sweep, columns))
+    ax.set_ylabel(_axis(sweep, rows))
+
+
+def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
+    """Values by the first parameter, coloured by the second; mean and 5 % and 95 % quantiles as lines."""
+    first, second = _coordinates(sweep)[:2]
+    y, scale = sweep[name].values, _scale(sweep, second)[0]
+    points = ax.scatter(
+        sweep[first].values * _scale(sweep, first)[0], y, c=sweep[second].values * scale, s=11.0, cmap="viridis"
+    )
+    bar = figure.colorbar(points, ax=ax)
+    bar.set_label(_axis(sweep, second), color=SOFT)
+    bar.outline.set_visible(False)
+    known = y[np.isfinite(y)]
+    if len(known):
+        ax.axhline(known.mean(), color=INK, lw=0.9)
+        for quantile in np.quantile(known, (0.05, 0.95)):
+            ax.axhline(quantile, color=INK, lw=0.7, ls=(0, (4, 3)))
+    _label(ax, sweep, first, name)
+
+
+def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:
+    ax.set_xlabel(_axis(sweep, parameter))
+    units = sweep[name].attrs["units"]
+    ax.set_ylabel("" if units == "1" else units)
+
+
+def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
+    unit = sweep[parameter].attrs.get("units", "")
+    return HANDY.get(unit, (1.0, unit))
+
+
+def _axis(sweep: xr.Dataset, parameter: str) -> str:
+    unit = _scale(sweep, parameter)[1]
+    return f"{parameter} ({unit})" if unit else parameter

@@ -1,0 +1,192 @@
+"""``flexclear sweep``: many points of one scene, each kept as soon as it is done."""
+
+from __future__ import annotations
+
+import argparse
+import pickle
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core.artifacts.store import disk_limits, write_dataset
+from pipeline.core.errors import InputError, SolverError
+from pipeline.core.scene.load import load_scene, scene_name
+from pipeline.core.scene.sweep import Sweep, load_sweep
+from pipeline.core.workflow import cores
+from stages import run, sweep_plan
+from stages.run import Workplace
+from stages.sweep_engine import Engine, Job, engine, now
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.artifacts.points import Point
+    from pipeline.core.scene.schema import Scene
+
+#: finished points are stored after so many seconds, later after that share of the time so far
+OFTEN, SHARE = 2.0, 0.01
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
+    parser.add_argument("--workers", type=int, metavar="N", help="processes of this machine (default: its cores)")
+    parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
+    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep)")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring sweeps up to date: dataset and figures below results/sweeps, a summary on the screen."""
+    if options.out is not None:
+        if len(options.sweeps) > 1:
+            raise InputError("--out", f"takes one sweep, not {len(options.sweeps)}", "run the sweeps one by one")
+        run.check_target(options.out)
+    place = run.workplace()
+    paths = [run.find_scene(name) for name in options.sweeps]
+    wanted = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
+    with engine(width(options.workers), options.scheduler) as workers:
+        for path, plan in zip(paths, wanted, strict=True):
+            folder = place.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
+            _show(plan, bring(plan, workers, place, folder), folder, options.out)
+
+
+def width(asked: int | None) -> int:
+    """Number of workers; InputError for one that cannot be."""
+    if asked is not None and asked < 1:
+        raise InputError("--workers", f"must be at least 1, not {asked}")
+    return asked or cores.cores()
+
+
+def read(path: Path) -> tuple[Sweep, Scene]:
+    """A sweep file and its scene, which is looked for beside the file, then below scenes/."""
+    sweep = load_sweep(path)
+    beside = path.parent / sweep.scene
+    try:
+        found = beside if beside.is_file() else run.find_scene(sweep.scene)
+    except InputError as error:
+        raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
+    return sweep, load_scene(found)
+
+
+def of_scene(
+    scene: Scene, table: Mapping[str, Any], workers: int | None = None, scheduler: str | None = None
+) -> xr.Dataset:
+    """The dataset of a sweep that a table describes as a file does, but for its scene; see `pipeline.sweep`."""
+    from pipeline.core.scene.sweep import read_sweep
+
+    plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, "sweep"), scene, "sweep")
+    with engine(width(workers), scheduler) as found:
+        return bring(plan, found, run.workplace())
+
+
+@dataclass
+class _Desk:
+    """Where finished points arrive: they are stored now and then, and told."""
+
+    plan: sweep_plan.Plan
+    place: Workplace
+    total: int
+    done: dict[str, Point]
+    waiting: list[tuple[Job, Point]] = field(default_factory=list)
+    begun: float = field(default_factory=now)
+    stored: float = field(default_factory=now)
+    fresh: int = 0
+
+    def take(self, finished: Sequence[tuple[Job, Point]], tell: Callable[[float, str], None]) -> None:
+        """Note finished points."""
+        self.waiting += finished
+        self.done |= {job.key: point for job, point in finished}
+        self.fresh += len(finished)
+        since = now() - self.begun
+        if now() - self.stored > max(OFTEN, SHARE * since):
+            self.store()
+        refused = sum(bool(point.refused) for point in self.done.values())
+        told = f", {refused} refused" if refused else ""
+        rate = self.fresh / since if since > 0.0 else 0.0
+        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{told}, {rate:.3g}/s")
+
+    def store(self) -> None:
+        """Put what waits into the cache, family by family."""
+        self.stored = now()
+        for family in self.plan.families:
+            mine = {job.key: point for job, point in self.waiting if job.family == family.key}
+            if mine:
+                family.keep(mine, self.place.store, self.plan.kept)
+        self.waiting = []
+
+
+def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path | None = None) -> xr.Dataset:
+    """The dataset of a sweep, brought up to date point by point.
+
+    folder: where dataset and figures are shown; on Ctrl-C it is left there with the points that are finished.
+    Raises FlexclearError.
+    """
+    ready = sweep_plan.prepare(plan, place)
+    with ExitStack() as locks:
+        for family in ready.families:
+            locks.enter_context(
+                place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep"))
+            )
+        found = {key: point for family in ready.families for key, point in family.find(place.store, plan.kept).items()}
+        wanted = {job.key: job for job in ready.jobs}
+        desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found})
+        missing = [job for key, job in wanted.items() if key not in desk.done]
+        try:
+            if missing:
+                _run(desk, workers, missing)
+        finally:
+            desk.store()
+            result = ready.dataset(desk.done)
+            if folder is not None:
+                _publish(result, folder)
+    return result
+
+
+def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
+    monitor = desk.place.monitor
+    monitor.start(1)
+    name = monitor.begin(desk.plan.sweep.name, "sweep")
+    packed = {family.key: pickle.dumps(family.work) for family in desk.plan.families}
+    failed = True
+    try:
+        workers.run(missing, packed, lambda finished, _: desk.take(finished, lambda f, t: monitor.update(name, f, t)))
+        failed = False
+    finally:
+        monitor.finish(name, failed=failed)
+        monitor.end()
+
+
+def _publish(result: xr.Dataset, folder: Path) -> None:
+    with disk_limits(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_dataset(folder / "sweep.nc", result)
+
+
+def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
+    """Figures beside the dataset, and a summary on the screen."""
+    from pipeline.core.artifacts.store import publish
+    from pipeline.post.sweep import figures
+
+    for name, content in figures(result).items():
+        publish(folder / name, content)
+    if out is not None:
+        with disk_limits(out.parent):
+            write_dataset(out, result)
+    print("\n".join(summary(plan, result, folder)))
+    if not (result["status"] == 0).any():
+        raise SolverError(f"{plan.sweep.name}: every point was refused; the reasons are above")
+
+
+def summary(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path) -> Iterator[str]:
+    """Points, refusals by their reason, and where the dataset is."""
+    refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
+    yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {folder / 'sweep.nc'}"
+    kinds: dict[str, list[str]] = {}
+    for reason in refused:
+        # the same refusal at another time or size is the same to who reads the summary
+        words = " ".join(word for word in reason.partition("\n")[0].split() if not any(c.isdigit() for c in word))
+        kinds.setdefault(words, []).append(reason)
+    for same in kinds.values():
+        yield f"  {len(same)} x {same[0]}"

@@ -1,0 +1,272 @@
+"""What a sweep comes to: its points checked, told apart by the flexible bodies they need, and named by content."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core.errors import InputError
+from pipeline.core.scene.design import Axis, Design, design
+from pipeline.core.scene.drives import PathDrive
+from pipeline.core.scene.kept import Kept, parse_kept
+from pipeline.core.scene.load import edited, with_numbers
+from pipeline.core.workflow.task import Task, facts, key
+from stages import s4_simulate
+from stages.graph import Graph
+from stages.run import Workplace, check
+from stages.sweep_engine import Job
+from stages.sweep_points import Family as Work
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from pipeline.core.artifacts.points import Point
+    from pipeline.core.artifacts.store import Store
+    from pipeline.core.scene.schema import Scene
+    from pipeline.core.scene.sweep import Sweep
+
+#: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
+CHECKED = 200
+#: what a place of the scene decides that cannot be in one series
+TIMES = ("time.start", "time.end", "output.interval")
+#: stands for what is varied in the facts of a family
+VARIED = "varied"
+
+
+@dataclass(frozen=True)
+class Family:
+    """Points that share their flexible bodies: what workers are given, and the facts that decide all of them."""
+
+    work: Work
+    facts: Mapping[str, str]
+
+    @property
+    def key(self) -> str:
+        """Digest of the facts."""
+        return self.work.key
+
+    @property
+    def folder(self) -> tuple[str, str]:
+        """Stage of its batches in the store, and a name there that no batch has."""
+        return f"sweep/{self.key}", "family"
+
+    def keep(self, points: Mapping[str, Point], store: Store, kept: Sequence[Kept]) -> None:
+        """Store finished points as one artifact."""
+        from pipeline.core.artifacts.points import batch
+
+        name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
+        store.put(self.folder[0], name, {"nc": batch(points, kept)}, self.facts)
+
+    def find(self, store: Store, kept: Sequence[Kept]) -> dict[str, Point]:
+        """All points of the family that are stored and sound."""
+        from pipeline.core.artifacts.points import unpacked
+
+        found: dict[str, Point] = {}
+        for path in sorted((store.root / "cache" / self.folder[0]).glob("*.json")):
+            record = store.find(self.folder[0], path.stem)
+            if record is not None:
+                found |= unpacked(store.load(record), kept)
+        return found
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep whose places, values and quantities are known to fit its scene.
+
+    scene: with what is set, at the first point.  families, jobs: once the flexible bodies are there; see `prepare`.
+    """
+
+    sweep: Sweep
+    scene: Scene
+    design: Design
+    kept: tuple[Kept, ...]
+    families: tuple[Family, ...] = ()
+    jobs: tuple[Job, ...] = ()
+
+    def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
+        """The sweep's dataset of the points that are finished."""
+        from pipeline.core.artifacts import points as results
+        from pipeline.core.quantities import regular_times
+
+        attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
+        attributes |= {"title": self.sweep.title} if self.sweep.title else {}
+        attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
+        attributes |= {"members": self.sweep.members} if self.sweep.members else {}
+        keys, time = [job.key for job in self.jobs], regular_times(self.scene.time, self.scene.output)
+        return results.dataset(self.design, self.kept, keys, points, time, attributes)
+
+
+def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
+    """The plan of a sweep, all of it checked before anything is run.
+
+    where: the sweep's file, for messages.  Raises InputError for places that the scene does not have, values that it
+    refuses, and quantities that nothing of it has.
+    """
+    try:
+        base = edited(scene, {**sweep.set, "accuracy": None}) if sweep.set else edited(scene, {"accuracy": None})
+    except InputError as error:
+        raise _placed(f"{where} [set]", error) from None
+    made = design(sweep)
+    _check_values(base, made, where)
+    base = edited(base, made.points()[0])
+    kept = tuple(_kept(base, name, where) for name in sweep.keep)
+    _check_kept(sweep, base, made, kept, where)
+    return Plan(sweep, base, made, kept)
+
+
+def _placed(place: str, error: InputError) -> InputError:
+    problem, remedy = getattr(error, "problem", str(error)), getattr(error, "remedy", None)
+    return InputError(place, problem, remedy)
+
+
+def _check_values(base: Scene, made: Design, where: str) -> None:
+    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are looked at.
+
+    In a grid each value stands beside the first ones of the others: what some combinations mean for the mechanism is
+    found when they are run.
+    """
+    points = made.points()
+    try:
+        edited(base, points[0])
+    except InputError as error:
+        raise _placed(f"{where} [vary{_guilty(base, made)}]", error) from None
+    for axis in made.axes:
+        for k in _looked_at(axis):
+            chosen = points[k] if not made.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
+            try:
+                with_numbers(base, chosen)
+            except InputError as error:
+                raise _placed(f"{where} [vary.{axis.name}]", error) from None
+
+
+def _guilty(base: Scene, made: Design) -> str:
+    """The parameter whose first value the scene does not take by itself, with a dot before it; or nothing."""
+    for axis in made.axes:
+        try:
+            edited(base, dict.fromkeys(axis.places, axis.values[0]))
+        except InputError:
+            return f".{axis.name}"
+    return ""
+
+
+def _looked_at(axis: Axis) -> Sequence[int]:
+    numbers = axis.coordinate
+    if len(numbers) <= CHECKED or isinstance(numbers[0], str):
+        return range(len(numbers))
+    by_size = sorted(range(len(numbers)), key=lambda k: numbers[k])
+    return by_size[0], by_size[-1]
+
+
+def _kept(base: Scene, name: str, where: str) -> Kept:
+    try:
+        return parse_kept(name, base.owners())
+    except ValueError as error:
+        raise InputError(f"{where} [keep]", str(error)) from None
+
+
+def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], where: str) -> None:
+    varied = {place for axis in made.axes for place in axis.places}
+    timed = sorted(varied & set(TIMES))
+    for one in kept:
+        if one.reduction == "series" and timed:
+            raise InputError(
+                f"{where} [keep]",
+                f"'{one.name}' is a series, whose times are those of all points, but {timed[0]} is varied",
+                "keep a number of it, such as the final or the largest value",
+            )
+        if one.quantity.kind == "drive_force" and isinstance(base.drive[one.quantity.owner], PathDrive):
+            raise InputError(
+                f"{where} [keep]", f"'{one.quantity.owner}' leads a frame along a path and has no single force"
+            )
+    if sweep.members and not base.contacts() and not base.stop:
+        raise InputError(
+            f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
+        )
+    if sweep.members and any(one.quantity.kind == "orientation" for one in kept):
+        raise InputError(f"{where} [keep]", "orientations have no mean over members", "keep a position instead")
+    if sweep.error and base.solver.step is not None:
+        raise InputError(
+            f"{where} [error]", "the scene has steps of fixed length, which no tolerance changes", "vary solver.step"
+        )
+
+
+def prepare(wanted: Plan, place: Workplace) -> Plan:
+    """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
+    points = wanted.design.points()
+    groups = _groups(wanted.scene, points)
+    graphs = {text: Graph(edited(wanted.scene, first), shown=False) for text, first in groups.items()}
+    outcome = place.bring([task for graph in graphs.values() for task in graph.bundle.values()])
+    check(outcome)
+    modules = _modules(wanted)
+    families = {}
+    for text, graph in graphs.items():
+        records = {body: outcome.records[id(task)] for body, task in graph.bundle.items()}
+        simulate = s4_simulate.params(graph.scene)
+        task = Task(
+            stage="sweep",
+            scene=graph.scene.name,
+            run="stages.sweep_points:work",
+            params={
+                "simulate": _without_varied(simulate, points[0], groups[text]),
+                "keep": [one.name for one in wanted.kept],
+                "members": wanted.sweep.members or 0,
+                "error": wanted.sweep.error,
+            },
+            folder="",
+            modules=modules,
+        )
+        found = facts(task, {f"bundle/{body}": record.digest for body, record in records.items()}, place.sources)
+        bundles = {body: place.store.load(record) for body, record in records.items()}
+        keep = tuple(one.name for one in wanted.kept)
+        work = Work(key(found), simulate, bundles, keep, wanted.sweep.members or 0, wanted.sweep.error)
+        families[text] = Family(work, found)
+    jobs = []
+    for point in points:
+        family = families[_group(wanted.scene, point)[0]].key
+        jobs.append(Job(_point_key(family, point), family, point))
+    return replace(wanted, families=tuple(families.values()), jobs=tuple(jobs))
+
+
+def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Those values of a point that decide its flexible bodies, and their text."""
+    bodies = tuple(f"body.{name}." for name in scene.flexible())
+    mine = {place: value for place, value in point.items() if place.startswith(bodies)} if bodies else {}
+    return json.dumps(mine, sort_keys=True, default=str), mine
+
+
+def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    return dict(_group(scene, point) for point in points)
+
+
+def _modules(wanted: Plan) -> tuple[str, ...]:
+    """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
+    found = set(s4_simulate.modules(wanted.scene))
+    for axis in wanted.design.axes:
+        for value in dict.fromkeys(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else ():
+            original = next(v for v in axis.values if str(v) == value)
+            found |= set(s4_simulate.modules(edited(wanted.scene, dict.fromkeys(axis.places, original))))
+    return tuple(sorted(found))
+
+
+def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters of a run without what differs from point to point, so that a sweep may be extended.
+
+    own: values that are those of a whole family.
+    """
+    table = copy.deepcopy(dict(simulate))
+    for place in point:
+        node, keys = table["scene"], place.split(".")
+        for name in keys[:-1]:
+            node = node[int(name) if isinstance(node, list) else name]
+        if place not in own:
+            node[int(keys[-1]) if isinstance(node, list) else keys[-1]] = VARIED
+    return table
+
+
+def _point_key(family: str, point: Mapping[str, Any]) -> str:
+    text = json.dumps([family, dict(sorted(point.items()))], default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]

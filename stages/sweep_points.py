@@ -1,0 +1,83 @@
+"""Points of a sweep in a worker, on this machine or another one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from pipeline.core.artifacts.points import Point
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: runners that a worker keeps
+RUNNERS = 8
+
+
+@dataclass(frozen=True)
+class Family:
+    """Points that share a scene and its flexible bodies.
+
+    simulate: the scene, as of the simulate stage.  bundles: reduced flexible bodies by name.  keep: names of what is
+    kept.  members: of each point, 0 for the scene's own start.  error: whether errors are estimated.
+    """
+
+    key: str
+    simulate: Mapping[str, Any]
+    bundles: Mapping[str, xr.Dataset]
+    keep: tuple[str, ...]
+    members: int
+    error: bool
+
+
+@lru_cache(maxsize=RUNNERS)
+def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
+    """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
+    import pickle
+
+    from pipeline.core.scene.kept import parse_kept
+    from pipeline.dynamics.record.point import Runner
+    from stages.s4_simulate import rebuild
+
+    family: Family = pickle.loads(packed)
+    scene = rebuild(family.simulate)
+    kept = [parse_kept(name, scene.owners()) for name in family.keep]
+    return scene, Runner(family.bundles, kept, family.members, family.error)
+
+
+def work(key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool) -> tuple[list[Point], float]:
+    """Points of a family, and the processor time that they took [s].
+
+    packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
+    """
+    from pipeline.core.errors import InputError
+    from pipeline.core.scene.load import with_numbers
+    from pipeline.core.workflow import cores
+
+    cores.tell(alone)
+    scene, runner = _opened(key, packed)
+    begun, found = time.process_time(), list[Point]()
+    for point in points:
+        try:
+            edited = with_numbers(scene, point)
+        except InputError as error:
+            found.append(Point({}, {}, {}, 0, str(error)))
+            continue
+        found.append(runner.run(edited))
+    return found, time.process_time() - begun
+
+
+def source_digest() -> str:
+    """Digest of the sources that a worker runs, to be compared with those of who asks it."""
+    import hashlib
+
+    from pipeline.core.workflow.fingerprint import TREE
+
+    digest = hashlib.sha256()
+    for folder in ("pipeline", "stages"):
+        for path in sorted((TREE / folder).rglob("*.py")):
+            digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()

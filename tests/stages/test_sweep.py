@@ -1,0 +1,413 @@
+"""Sweeps: their points have known answers, do not depend on who runs them, and none is run twice."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from scipy.special import ellipk
+
+import pipeline
+from pipeline.core.errors import InputError
+from pipeline.core.scene.design import design
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.sweep import read_sweep
+from pipeline.core.workflow.fingerprint import Sources
+from pipeline.core.workflow.task import STORE
+from pipeline.post.sweep import figures
+from stages import run, sweep, sweep_engine, sweep_plan
+from stages.__main__ import main
+from stages.s4_simulate import modules
+
+GRAVITY = 9.81
+#: a process that is silent for so long hangs, however busy the machine is [s]
+PATIENCE = 600.0
+PENDULUM = """
+scene = "checks/pendulum"
+keep = ["bob.velocity.largest", "bob.position.final"]
+set = { "time.end" = "0.5 s" }
+vary."body.bob.com.0" = { from = "-0.5 m", to = "-2 m", count = COUNT }
+"""
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder of results."""
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    return tmp_path / "results"
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Keys of the points that are run."""
+    keys: list[str] = []
+    plain = sweep_engine.Engine.run
+
+    def watched(engine: Any, jobs: Sequence[sweep_engine.Job], *rest: Any) -> None:
+        keys.extend(job.key for job in jobs)
+        plain(engine, jobs, *rest)
+
+    monkeypatch.setattr(sweep_engine.Engine, "run", watched)
+    return keys
+
+
+def pendulum(folder: Path, count: int, name: str = "lengths") -> Path:
+    """A sweep file over the length of the pendulum."""
+    path = folder / f"{name}.toml"
+    path.write_text(PENDULUM.replace("COUNT", str(count)))
+    return path
+
+
+def flexclear(*arguments: str, cwd: Path, results: Path) -> subprocess.Popen[str]:
+    """The command in a process of its own."""
+    environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd)}
+    command = [sys.executable, "-m", "stages", *arguments]
+    return subprocess.Popen(
+        command, cwd=cwd, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+
+
+def test_a_pendulum_is_back_after_its_period_whatever_its_length(root: Path):
+    """Released from the horizontal, the period is 4 K(1/2) sqrt(l/g)."""
+    lengths = np.array([0.3, 1.0, 2.5])
+    periods = 4.0 * ellipk(0.5) * np.sqrt(lengths / GRAVITY)
+    vary = {"body.bob.com.0": -lengths, "time.end": periods}
+    found = pipeline.sweep(
+        root / "scenes/checks/pendulum.toml", vary, ["bob.position.final"], combine="list", workers=1
+    )
+    assert found["bob.position.final"].dims == ("point", "axis")
+    away = found["bob.position.final"].values + np.outer(lengths, [1.0, 0.0, 0.0])
+    # a miss of the position is quadratic in that of the time, where the pendulum rests; measured 1e-7 of the length
+    assert np.abs(away).max(axis=1) == pytest.approx(np.zeros(3), abs=3e-6 * lengths.min())
+
+
+def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Path):
+    """The pendulum passes the bottom at sqrt(2 g l)."""
+    vary = {
+        "body.bob.com.0": {"from": "-50 cm", "to": "-2 m", "count": 3},
+        "load.gravity.acceleration.1": ["-9.81 m/s^2", "-1.62 m/s^2"],
+    }
+    found = pipeline.sweep(
+        root / "scenes/checks/pendulum.toml", vary, ["bob.velocity.largest"], set={"output.interval": "5 ms"}, workers=1
+    )
+    speed = found["bob.velocity.largest"]
+    assert speed.dims == ("body.bob.com.0", "load.gravity.acceleration.1")
+    assert found["body.bob.com.0"].values == pytest.approx([-0.5, -1.25, -2.0])
+    assert found["body.bob.com.0"].attrs["units"] == "m"
+    gravity = -found["load.gravity.acceleration.1"].values
+    expected = np.sqrt(2.0 * np.outer(-found["body.bob.com.0"].values, gravity))
+    # the speed is largest between outputs 5 ms apart: within (2.5 ms omega)^2/2 of it, omega < 9 rad/s; 2.5e-4
+    assert speed.values == pytest.approx(expected, rel=3e-4)
+    assert (found["status"] == 0).all()
+    assert speed.attrs["units"] == "m/s"
+    assert found.attrs["complete"] == 1
+
+
+def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
+    """Without the record, the twin and the dataset of a run, the numbers are the same to the last bit."""
+    path = root / "scenes/checks/bounce.toml"
+    keep = ["ball.velocity.largest", "ball.velocity.rms", "ball.position.final", "ball.position.series"]
+    keep += ["contact.peak_force", "contact.impulse", "contact.impact_times.count", "contact.impact_times.first"]
+    keep += ["contact.force.largest", "ball.orientation.final"]
+    values = [0.6, 0.8]
+    found = pipeline.sweep(path, {"joint.contact.normal.restitution": values}, keep, workers=1)
+    for k, value in enumerate(values):
+        one = pipeline.run(pipeline.load_scene(path, {"joint.contact.normal.restitution": value}))
+        here, velocity = found.isel({"joint.contact.normal.restitution": k}), one["velocity"].sel(body="ball").values
+        closing = (one["event_kind"] == 1) & (one["event_approach_speed"] > 1e-4)
+        speed, t = np.linalg.norm(velocity, axis=1), one["time"].values
+        expected = {
+            "ball.velocity.largest": speed.max(),
+            "ball.velocity.rms": np.sqrt(np.trapezoid(speed**2, t) / (t[-1] - t[0])),
+            "ball.position.final": one["position"].sel(body="ball").values[-1],
+            "ball.position.series": one["position"].sel(body="ball", time=found["time"], method="nearest").values,
+            "contact.peak_force.largest": one["event_peak_force"].max().values,
+            "contact.impulse.final": one["contact_impulse"].values[-1, 0],
+            "contact.impact_times.count": closing.sum().values,
+            "contact.impact_times.first": one["event_time"].values[closing][0],
+            "contact.force.largest": np.linalg.norm(one["joint_force"].sel(joint="contact").values, axis=1).max(),
+            "ball.orientation.final": one["quaternion"].sel(body="ball").values[-1],
+        }
+        for name, number in expected.items():
+            assert np.array_equal(here[name].values, number), name
+        assert here["evaluations"] == one.attrs["evaluations"]
+
+
+def test_the_error_that_is_told_is_the_error(root: Path):
+    """The oscillator's closed form says how far off a value is; the difference from the tighter run says the same."""
+    keep = ["mass.position.final"]
+    found = pipeline.sweep(
+        root / "scenes/checks/oscillator.toml",
+        {"load.spring.stiffness": [150.0, 250.0]},
+        keep,
+        set={"time.end": 1.0, "solver.rtol": 1e-5},
+        error=True,
+        workers=1,
+    )
+    k = found["load.spring.stiffness"].values
+    decay, omega = 4.0 / 4.0, np.sqrt(k / 2.0 - 1.0)
+    exact = 0.25 + 0.1 * np.exp(-decay) * (np.cos(omega) + decay / omega * np.sin(omega))
+    off = np.abs(found["mass.position.final"].values[:, 2] - exact)
+    told = found["mass.position.final.error"].values[:, 2]
+    # the tighter run is not exact: it leaves a hundredth, and where errors cancel more
+    assert told == pytest.approx(off, rel=0.5)
+    assert (off > 1e-12).all()
+
+
+def test_bytes_are_the_same_whoever_runs_the_points(root: Path, tmp_path: Path):
+    files = []
+    for count in (1, 2):
+        target = tmp_path / f"{count}.nc"
+        done = flexclear(
+            "sweep",
+            str(pendulum(tmp_path, 30)),
+            f"--workers={count}",
+            f"--out={target}",
+            cwd=root,
+            results=tmp_path / f"results{count}",
+        )
+        out, err = done.communicate(timeout=PATIENCE)
+        assert done.returncode == 0, err
+        assert "30 points, 0 refused" in out
+        files.append(target.read_bytes())
+    assert files[0] == files[1]
+
+
+def _begun(process: subprocess.Popen[str], results: Path) -> None:
+    """Wait until a batch is in the store."""
+    end = time.monotonic() + PATIENCE
+    while not list((results / "cache" / "sweep").glob("*/*.json")):
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path, fresh: Path, asked: list[str]):
+    path = pendulum(tmp_path, 400)
+    process = flexclear("sweep", str(path), "--workers=1", cwd=root, results=fresh)
+    _begun(process, fresh)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    plan = sweep_plan.prepare(sweep_plan.plan(*sweep.read(path), str(path)), run.workplace())
+    stored = {key for family in plan.families for key in family.find(run.workplace().store, plan.kept)}
+    assert main(["sweep", str(path), "--workers=1"]) == 0
+    assert stored
+    assert set(asked) == {job.key for job in plan.jobs} - stored
+    assert len(asked) < 400
+    asked.clear()
+    assert main(["sweep", str(path), "--workers=1"]) == 0
+    assert asked == []
+
+
+def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path):
+    results = tmp_path / "results"
+    process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--workers=2", cwd=root, results=results)
+    _begun(process, results)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, err
+    with xr.open_dataset(results / "sweeps" / "lengths" / "sweep.nc") as left:
+        assert left.attrs["complete"] == 0
+        done = left["status"].values == 0
+        assert 0 < done.sum() < 20_000
+        assert (left["status"].values[~done] == 2).all()
+        assert np.isfinite(left["bob.velocity.largest"].values[done]).all()
+        assert np.isnan(left["bob.velocity.largest"].values[~done]).all()
+
+
+def test_more_values_take_the_finished_points_over(root: Path, fresh: Path, asked: list[str]):
+    scene, keep = root / "scenes/checks/pendulum.toml", ["bob.velocity.final"]
+    first = pipeline.sweep(scene, {"body.bob.com.0": [-1.0, -2.0]}, keep, workers=1)
+    asked.clear()
+    second = pipeline.sweep(scene, {"body.bob.com.0": [-3.0, -2.0, -1.0]}, keep, workers=1)
+    assert len(asked) == 1
+    assert second.sel({"body.bob.com.0": [-1.0, -2.0]}).equals(first)
+
+
+def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fresh: Path, asked: list[str]):
+    arguments = (root / "scenes/checks/pendulum.toml", {"solver.evaluations": [100, 100_000]}, ["bob.velocity.final"])
+    for wanted in (2, 0):
+        asked.clear()
+        found = pipeline.sweep(*arguments, workers=1)
+        assert len(asked) == wanted
+        assert found["status"].values.tolist() == [1, 0]
+        assert "evaluations" in str(found["reason"].values[0])
+        assert found["reason"].values[1] == ""
+        assert np.isnan(found["bob.velocity.final"].values[0]).all()
+        assert np.isfinite(found["bob.velocity.final"].values[1]).all()
+
+
+def test_a_sweep_of_refusals_only_is_no_success(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
+    path = tmp_path / "none.toml"
+    path.write_text('scene = "checks/pendulum"\nkeep = ["bob.velocity.final"]\nvary."solver.evaluations" = [50, 60]\n')
+    assert main(["sweep", str(path), "--workers=1"]) == 3
+    assert "2 refused" in capsys.readouterr().out
+
+
+def test_members_give_mean_and_deviation(root: Path):
+    """Neighbouring starts of a bouncing ball part with every impact; the first one is the same to their distance."""
+    path, keep = root / "scenes/checks/bounce.toml", ["contact.impact_times.first", "ball.velocity.final"]
+    vary = {"joint.contact.normal.restitution": [0.7]}
+    found = pipeline.sweep(path, vary, keep, members=4, workers=1).isel({"joint.contact.normal.restitution": 0})
+    drop = np.sqrt(2.0 * 0.1 / GRAVITY)
+    # starts are 1e-8 m apart, which the speed of the impact turns into less than 1e-8 s
+    assert float(found["contact.impact_times.first"]) == pytest.approx(drop, abs=1e-7)
+    assert 0.0 < float(found["contact.impact_times.first.deviation"]) < 1e-8
+    assert (found["ball.velocity.final.deviation"].values[2:] > 0.0).all()
+
+
+@pytest.mark.parametrize(
+    "change, place, words",
+    [
+        ({"vary": {"body.bop.com.0": [1.0]}}, "vary.body.bop.com.0", "there is no 'body.bop'"),
+        ({"vary": {"body.bob.com.7": [1.0]}}, "vary.body.bob.com.7", "there is no 'body.bob.com.7'"),
+        ({"vary": {"body.bob.mass": ["1 kg", "1 m"]}}, "vary.body.bob.mass", "length"),
+        ({"vary": {"body.bob.mass": [1.0, -1.0]}}, "vary.body.bob.mass", "-1"),
+        ({"vary": {"body.bob.mass": {"from": 1, "to": 2}}}, "sweep", "needs its count"),
+        ({"vary": {"body.bob.mass": {"from": "1 kg", "to": 2, "count": 3}}}, "vary.body.bob.mass", "one unit"),
+        ({"vary": {"body.bob.mass": {"from": -1, "to": 2, "count": 3, "spacing": "log"}}}, "mass", "ends of one sign"),
+        ({"vary": {"a": [1.0, 2.0], "b": [1.0]}, "combine": "list"}, "sweep", "a 2, b 1"),
+        (
+            {"vary": {"a": {"values": [1.0], "places": ["time.end"]}, "time.end": [2.0]}},
+            "sweep",
+            "varied by 'a' already",
+        ),
+        ({"vary": {"time": [1.0]}}, "sweep", "another name"),
+        ({"vary": {"time.end": [1.0, 2.0]}, "keep": ["bob.position.series"]}, "keep", "time.end is varied"),
+        ({"keep": ["bob.speed.largest"]}, "keep", "velocity"),
+        ({"keep": ["bob.velocity"]}, "keep", "bob.velocity.largest"),
+        ({"keep": ["bop.velocity.largest"]}, "keep", "bob"),
+        ({"keep": ["bob.orientation.mean"]}, "keep", "final"),
+        ({"set": {"time.end": "1 kg"}}, "set", "mass"),
+        ({"members": 3}, "members", "no clearance joint"),
+        ({"sample": {"method": "sobol", "points": 4}}, "sweep", "without count"),
+        ({"set": {"solver.integrator": "rk4", "solver.step": 1e-3}, "error": True}, "error", "fixed length"),
+    ],
+)
+def test_what_cannot_be_is_refused_before_anything_runs(
+    root: Path, asked: list[str], change: dict[str, Any], place: str, words: str
+):
+    table = {"vary": {"body.bob.mass": [1.0, 2.0]}, "keep": ["bob.velocity.largest"]} | change
+    scene = load_scene(root / "scenes/checks/pendulum.toml")
+    with pytest.raises(InputError) as refused:
+        sweep.of_scene(scene, table, workers=1)
+    assert place in str(refused.value).partition(":")[0]
+    assert words in str(refused.value)
+    assert refused.value.exit_code == 2
+    assert asked == []
+
+
+def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["sweep", str(pendulum(tmp_path, 2)), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    said = capsys.readouterr().err
+    assert "--scheduler tcp://127.0.0.1:9" in said
+    assert "not installed" in said or "no scheduler answers" in said
+
+
+@pytest.mark.slow
+def test_a_cluster_gives_the_same_bytes(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    distributed = pytest.importorskip("distributed")
+    found = []
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        for name, address in (("here", None), ("cluster", cluster.scheduler_address)):
+            monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / name))
+            found.append(
+                pipeline.sweep(
+                    root / "scenes/checks/pendulum.toml",
+                    {"body.bob.com.0": np.linspace(-2.0, -1.0, 12)},
+                    ["bob.velocity.largest"],
+                    workers=1,
+                    scheduler=address,
+                )
+            )
+    assert found[0].identical(found[1])
+
+
+def test_a_latin_hypercube_has_one_point_in_every_row_and_column():
+    table = {"vary": {"a": {"from": 0.0, "to": 8.0}, "b": {"from": 1.0, "to": 256.0, "spacing": "log"}}}
+    table |= {"scene": "x", "keep": ["y"], "sample": {"method": "latin-hypercube", "points": 8, "seed": 3}}
+    one, other = design(read_sweep(table, "sweep")), design(read_sweep(table, "sweep"))
+    assert one == other
+    assert one.dims == ("point",)
+    assert sorted(np.floor(one.axes[0].coordinate).tolist()) == list(range(8))
+    assert sorted(np.floor(np.log2(one.axes[1].coordinate)).tolist()) == list(range(8))
+
+
+def test_a_sobol_sample_of_a_normal_distribution_has_its_mean_and_deviation():
+    table = {"vary": {"a": {"mean": "5 mm", "deviation": "1 mm"}}, "scene": "x", "keep": ["y"]}
+    table |= {"sample": {"method": "sobol", "points": 1024}}
+    (axis,) = design(read_sweep(table, "sweep")).axes
+    # independent numbers would miss the mean by 3e-5 m; the sequence is far better
+    assert np.mean(axis.coordinate) == pytest.approx(5e-3, abs=3e-6)
+    assert np.std(axis.coordinate) == pytest.approx(1e-3, rel=1e-2)
+    assert axis.unit == "m"
+
+
+def test_the_sweeps_that_come_along_fit_their_scenes(root: Path):
+    paths = sorted((root / "scenes/sweeps").glob("*.toml"))
+    assert len(paths) >= 4
+    for path in paths:
+        plan = sweep_plan.plan(*sweep.read(path), str(path))
+        assert np.prod(plan.design.shape) > 1
+
+
+def test_every_kind_of_sweep_has_a_figure_of_equal_bytes(root: Path):
+    scene, keep = root / "scenes/checks/pendulum.toml", ["bob.velocity.largest"]
+    lengths, masses = {"from": -2.0, "to": -1.0}, {"from": 1.0, "to": 20.0}
+    kinds: list[dict[str, Any]] = [
+        {"vary": {"body.bob.com.0": {**lengths, "count": 3}}},
+        {"vary": {"body.bob.com.0": {**lengths, "count": 2}, "body.bob.mass": {**masses, "count": 3}}},
+        {"vary": {"body.bob.com.0": lengths, "body.bob.mass": masses}, "sample": {"method": "random", "points": 4}},
+    ]
+    pictures = set()
+    for kind in kinds:
+        found = pipeline.sweep(scene, kind.pop("vary"), keep, workers=1, **kind)
+        drawn = figures(found)
+        assert drawn == figures(found)
+        assert set(drawn) == {"sweep.png", "sweep.svg"}
+        pictures.add(drawn["sweep.png"])
+    assert len(pictures) == 3
+
+
+#: runs one point in a fresh process and prints the own modules that it loaded
+LOADED = """
+import sys
+import numpy, xarray
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.sweep import read_sweep
+from stages import run, sweep_plan
+table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
+plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), run.workplace())
+import pickle
+(family,), (job,) = plan.families, plan.jobs
+before = set(sys.modules)
+for name in list(before):
+    if name.startswith("pipeline.dynamics"):
+        del sys.modules[name]
+before = set(sys.modules)
+from stages.sweep_points import work
+(point,), _ = work(family.key, pickle.dumps(family.work), [job.point], True)
+assert not point.refused, point.refused
+print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("pipeline", "stages")))
+"""
+
+
+def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
+    path = root / "scenes/checks/clearance_slider_crank.toml"
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED, str(path)], cwd=root, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    known = Sources(root).closure(["stages.sweep_points", STORE, *modules(load_scene(path))]).keys()
+    loaded = set(done.stdout.split())
+    assert len(loaded) > 20
+    assert loaded <= known
