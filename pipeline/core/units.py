@@ -96,6 +96,10 @@ UNITS: dict[str, tuple[float, str]] = {
     "rad/m": (1.0, "angle per length"),
     "N/rad": (1.0, "force per angle"),
     "N s/rad": (1.0, "force per angular velocity"),
+    "N/s": (1.0, "force per time"),
+    "N/m s": (1.0, "stiffness per time"),
+    "N/rad s": (1.0, "force per angle and time"),
+    "N m/rad s": (1.0, "torsional stiffness per time"),
     "%": (1e-2, "number"),
 }
 

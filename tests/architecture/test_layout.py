@@ -107,7 +107,8 @@ def test_every_dependency_is_pinned(root: Path):
 def test_every_library_that_is_imported_is_declared(root: Path):
     """An indirect dependency may vanish with the next version of what brought it."""
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
-    wanted = [*project["dependencies"], *project["optional-dependencies"]["render"]]
+    extras = project["optional-dependencies"]
+    wanted = [*project["dependencies"], *extras["render"], *extras["cluster"]]
     declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in wanted}
     declared |= {"skfem", "vtkmodules", "pipeline", "stages"} | set(sys.stdlib_module_names)
     found = set()

@@ -14,7 +14,7 @@ from pipeline.core.artifacts import deficits
 from pipeline.core.errors import InputError
 from pipeline.core.scene.fields import Pose
 from pipeline.core.scene.load import load_scene
-from pipeline.core.units import quantity, unit
+from pipeline.core.units import any_quantity, quantity, unit
 from pipeline.structure.fe.beam_recipe import NodeFrame
 from pipeline.structure.fe.recipe_parts import TurnedFrame
 
@@ -232,3 +232,10 @@ def test_the_remedy_for_missing_compliance_is_one_that_the_body_does_not_have() 
     assert 'not made for ["B"]' in other_frames
     assert "more normal modes than now (count = 12)" in too_few
     assert 'reference = "craig-bampton"' not in other_frames + too_few
+
+
+@pytest.mark.parametrize("text", ["900 N/m s", "3 N m/deg s", "2 kN/s", "60 mm", "4 N s/rad"])
+def test_a_quantity_whose_dimension_is_known_later_is_read_twice_alike(text: str) -> None:
+    once = any_quantity(text)
+    assert isinstance(once, str)
+    assert any_quantity(once) == once

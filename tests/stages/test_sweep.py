@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import runpy
 import signal
 import subprocess
 import sys
@@ -376,6 +377,13 @@ def test_every_kind_of_sweep_has_a_figure_of_equal_bytes(root: Path):
         assert set(drawn) == {"sweep.png", "sweep.svg"}
         pictures.add(drawn["sweep.png"])
     assert len(pictures) == 3
+
+
+def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
+    """The mass turns round where sqrt(k/m - (c/2m)^2) T = pi."""
+    example = runpy.run_path(str(root / "docs/examples/optimise.py"))
+    # the velocity is right to 1e-8 or so, and changes by 0.01 m/s per N/m; measured 1e-6
+    assert example["best"]() == pytest.approx(2.0 * ((np.pi / 0.5) ** 2 + 1.0), abs=1e-4)
 
 
 #: runs one point in a fresh process and prints the own modules that it loaded

@@ -15,7 +15,8 @@ from pipeline.core.scene.drives import JointDrive
 from pipeline.core.scene.loads import Gravity
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.laws import drive_laws
+from pipeline.dynamics.drives.pieces import pieces_of
+from pipeline.dynamics.model.driving import Prescribed, prescribed
 from pipeline.dynamics.model.model import Model, filled
 
 
@@ -87,11 +88,16 @@ def _drives_alike(new: Any, was: Any) -> bool:
 
 def _same_start(model: Model, scene: Scene) -> bool:
     """Whether the drives stand at the start where they stood: then the links stand there, too."""
-    if scene.drive is model.scene.drive and scene.time == model.scene.time:
-        return True
-    t = scene.time.start
-    old, new = (drive_laws(one, {}) for one in (model.scene, scene))
-    return all(a.value(t) == b.value(t) for a, b in zip(old, new, strict=True))
+    pairs = zip(prescribed(model.scene), prescribed(scene), strict=True)
+    changed = [(was, new) for was, new in pairs if was.law is not new.law]
+    try:
+        return all(_at_start(was, scene) == _at_start(new, scene) for was, new in changed)
+    except ValueError:
+        return False  # a law that cannot be had, as is told when the model is made from scratch
+
+
+def _at_start(one: Prescribed, scene: Scene) -> float:
+    return pieces_of(one.law, one.dimension).value(scene.time.start)
 
 
 def _moving(model: Model) -> tuple[bool, ...]:
