@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.core.artifacts.store import Record, publish
 from pipeline.core.errors import InputError
-from pipeline.core.scene.ideal import EFFECTS, ideal
+from pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from pipeline.core.workflow.task import Task
 from stages import run
 from stages.graph import Graph
@@ -109,7 +109,7 @@ def twins(scene: Scene, without: str) -> list[Scene]:
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
     found: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
-        there = [e for e in effects if (scene.contacts() if e == "clearance" else scene.flexible())]
+        there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
         if there or not found:
             twin = ideal(scene, effects)
             same = any(twin.model_dump() == other.model_dump() for other in found)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pipeline.core.artifacts.store import Record, publish
+from pipeline.core.scene.ideal import loose
 from pipeline.core.workflow.task import Task
 from stages import compare
 from stages.graph import Graph
@@ -34,7 +35,7 @@ def make(graph: Graph, place: Workplace) -> Path:
     """
     scene = graph.scene
     compared = None
-    if scene.contacts() or scene.flexible():
+    if loose(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], place, "both")
     outcome = place.bring([graph.overview, graph.render])

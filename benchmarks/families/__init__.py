@@ -11,4 +11,5 @@ NAMES = {
     "solids": "solids:FAMILY",
     "stability": "stability:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
+    "geometry": "geometry:FAMILY",
 }

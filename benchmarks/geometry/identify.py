@@ -6,7 +6,8 @@ and dz = ax dangle. With n the direction of the legs, 2 n_z dz = 1/2. Both are l
 
     ax = dz / dangle,    height / leg length = n_z = 1 / (4 dz),
 
-and the other three numbers of a layout, ay, bx, by, are free. What Table 8 prints are the clearance times dz and dangle.
+and the other three numbers of a layout, ay, bx, by, are free. Table 8 prints the clearance times dz and
+dangle.
 """
 
 from __future__ import annotations

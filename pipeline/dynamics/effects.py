@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 JOINTS, CONTACTS = "pipeline.dynamics.joints", "pipeline.dynamics.contact"
 NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
 LOADS, LAWS, RECORDS = "pipeline.dynamics.loads", "pipeline.dynamics.drives", "pipeline.dynamics.record"
-INTEGRATORS = "pipeline.dynamics.integrate"
+INTEGRATORS, STARTS = "pipeline.dynamics.integrate", "pipeline.dynamics.starts"
 #: laws of time that are polynomials throughout, or made of others
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated"}
 
@@ -120,6 +120,10 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(LAWS, law, "law")
     for name, load in scene.load.items():
         yield Named(LOADS, load.type, f"[load.{name}]")
+    if scene.start is not None and scene.start.at is not None:
+        yield Named(STARTS, scene.start.at, "[start.at]")
+        for name, contact in contacts.items():
+            yield Named(JOINTS, contact.type.removeprefix("clearance-"), f"[joint.{name}]")
     for name in scene.output.requests():
         yield Named(RECORDS, name, "[output]")
 

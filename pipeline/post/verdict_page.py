@@ -60,5 +60,5 @@ def row(name: str, verdict: xr.Dataset) -> tuple[str, ...]:
         str(after) if after else "not",
         f"{float(verdict.return_distance):.1e}",
         f"{float(verdict.contraction):.2f}" if "contraction" in verdict and after else "",
-        f"{100 * float(verdict.few_lines):.0f} %" if "few_lines" in verdict else "",
+        f"{100 * float(verdict.few_lines):.0f} %" if "few_lines" in verdict and not after else "",
     )

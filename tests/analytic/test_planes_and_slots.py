@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tests.analytic.mechanism_runs import impacts, run
+from pipeline.core.errors import InputError
+from pipeline.core.scene.ideal import ideal
+from pipeline.core.scene.load import load_scene
+from tests.analytic.mechanism_runs import TREE, impacts, run
 from tests.reference import contact_solutions as exact
 
 PLANE, YOKE = "checks/ball_on_plane", "checks/scotch_yoke"
@@ -94,3 +97,10 @@ def test_a_pin_meets_the_round_ends_of_its_slot() -> None:
     assert len(found["start"]) == 3
     across = dataset.position.sel(body="free").values[:, 1] - 1.0
     assert np.abs(across).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", [PLANE, YOKE])
+def test_planes_and_slots_have_no_ideal_joint_in_their_place(name: str) -> None:
+    """They are told, and not replaced by something else."""
+    with pytest.raises(InputError, match="nothing to take away"):
+        ideal(load_scene(TREE / "scenes" / f"{name}.toml"))

@@ -32,6 +32,8 @@ APPLIED = (
     "pipeline.dynamics.loads.fields",
     "pipeline.dynamics.loads.composing",
     "pipeline.dynamics.drives.oscillation",
+    "pipeline.dynamics.starts",
+    "pipeline.dynamics.linear",
 )
 FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
 SCHEME = Scheme("dop853")

@@ -110,7 +110,7 @@ FROM = ("", "pipeline", "pipeline/core", "pipeline/dynamics", "pipeline/structur
 #: first parts of names that are no sources: written by runs, quantities, units, scenes by name, symbols
 ELSEWHERE = {".venv", "results", "sps4", "checks", "mesh", "modes", "bundle", "figures", "tables", "report"}
 #: files that runs or users make
-MADE = {"run.nc", "cost.json", "timing.nc"}
+MADE = {"slider_crank.toml", "rod.toml", "run.nc", "cost.json", "timing.nc"}
 
 
 def named(page: str) -> list[str]:

@@ -83,6 +83,8 @@ def test_cells_are_counted_from_the_recipe():
     ):
         with pytest.raises(ResourceError, match=r"1e\+06 cells are more than the 500000"):
             check_cells(shape, elements, limits, Path("r.toml"))
+    with pytest.raises(ResourceError, match=r"1e\+300 cells"):
+        check_cells({}, 10**400, limits, Path("r.toml"))
     check_cells({"cells": [10, 10, 10]}, None, limits, Path("r.toml"))
     check_cells("nonsense", "nonsense", limits, Path("r.toml"))
 

@@ -133,14 +133,14 @@ class _Contact(Part):
 
     floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
     for grazing and resting contact.  initial_approach_speed: impact rate of a contact that the
-    scene's start already has; without it, a start in contact is refused.
+    scene's start already has, 0 of one that rests there; without it, a start in contact is refused.
     """
 
     between: tuple[FrameName, FrameName]
     normal: NormalLaw
     friction: Friction | None = None
     floor: Annotated[Speed, Positive] = 1e-6
-    initial_approach_speed: Annotated[Speed, Positive] | None = None
+    initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
 
     @property
     def shape(self) -> tuple[float, float]:

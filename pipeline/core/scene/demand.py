@@ -40,6 +40,6 @@ def check_run(scene: Scene, results: Path) -> None:
 def row(scene: Scene) -> int:
     """Bytes of a row of the scene's run, about."""
     modes = sum(b.modes.count if isinstance(b.modes.count, int) else 30 for b in scene.flexible().values())
-    counts = (len(scene.owners()["body"]), len(scene.joint), len(scene.contacts()), len(scene.forces()), modes)
+    counts = (len(scene.owners()["body"]), len(scene.joint), len(scene.owners()["contact"]), len(scene.forces()), modes)
     each = (BODY, JOINT, CONTACT, LOAD, MODE)
     return ALWAYS + sum(count * size for count, size in zip(counts, each, strict=True))

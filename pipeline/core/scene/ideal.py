@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from pipeline.core.errors import InputError
+from pipeline.core.scene.clearance import Clearance
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.core.scene.wanted import parse
 
 #: effects that can be taken away, and how a scene without them is called
 EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}
-#: joint with clearance -> the joint that holds the same places together without
+#: joint with clearance -> the joint that holds the same places together without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
 KEPT = ("mesh", "pose", "velocity", "angular_velocity")
@@ -24,7 +25,7 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
     """
     changes: dict[str, Any] = {}
     if "clearance" in effects:
-        for name, joint in scene.contacts().items():
+        for name, joint in loose(scene).items():
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[joint.type], "between": list(joint.between)}
     if "flexibility" in effects:
         for name, body in scene.flexible().items():
@@ -39,13 +40,20 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
     return edited(scene, changes | _without_owners(scene, effects))
 
 
+def loose(scene: Scene) -> dict[str, Clearance]:
+    """The joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
+    return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
+
+
 def _without_owners(scene: Scene, effects: tuple[str, ...]) -> dict[str, Any]:
     """Edits of what is asked for, where what it is asked of is taken away."""
     found: dict[str, Any] = {}
     owners = scene.owners()
-    if "clearance" in effects and scene.contacts():
-        owners = {**owners, "contact": ()}
-        found["ensemble"] = None
+    if "clearance" in effects and loose(scene):
+        left = tuple(name for name in owners["contact"] if name not in loose(scene))
+        owners = {**owners, "contact": left}
+        if not left:
+            found["ensemble"] = None
         if scene.accuracy is not None:
             wanted = {
                 n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)

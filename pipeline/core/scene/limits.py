@@ -70,4 +70,5 @@ def check_cells(shape: Any, elements: Any, limits: Limits, recipe: Path) -> None
         given = cells if isinstance(cells, list) else list(cells.values()) if isinstance(cells, dict) else given
     count = prod(max(n, 1) for n in given if isinstance(n, int)) if given else 0
     if count > limits.cells:
-        raise ResourceError(f"{recipe}: {count:.3g} cells are more than the {limits.cells} that limits.cells allows")
+        told = f"{min(count, 10**300):.3g}"  # a whole number may be beyond any float
+        raise ResourceError(f"{recipe}: {told} cells are more than the {limits.cells} that limits.cells allows")

@@ -86,12 +86,16 @@ def _named_frames(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
 
 
 def _named_joints(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    for family in ("drive", "load"):
+    for family in ("drive", "load", "stop"):
         for name, part in _tables(table.get(family)):
             if isinstance(part.get("joint"), str):
                 yield f"{family}.{name}.joint", part["joint"]
             for actuator in _texts(part.get("actuators")):
                 yield f"{family}.{name}.actuators", actuator.partition(".")[0]
+    for name, part in _tables(table.get("gear")):
+        for key in ("first", "second"):
+            if isinstance(part.get(key), str):
+                yield f"gear.{name}.{key}", part[key].partition(".")[0]
 
 
 def _named_bodies(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core.scene.clearance import CONTACTS, Clearance
+from pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
 from pipeline.core.scene.drives import Drive
 from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from pipeline.core.scene.gears import Gear
@@ -299,13 +299,17 @@ class Scene(Part):
 
     def summary(self) -> str:
         """Which parts there are, in words."""
+        planes = sum(isinstance(joint, BallOnPlane) for joint in self.contacts().values())
         counts = {
             ("rigid body", "rigid bodies"): len(self.rigid()) + len(self.meshed()),
             ("flexible body", "flexible bodies"): len(self.flexible()),
             ("joint", "joints"): len(self.joint) - len(self.contacts()),
-            ("joint with clearance", "joints with clearance"): len(self.contacts()),
+            ("joint with clearance", "joints with clearance"): len(self.contacts()) - planes,
+            ("ball on a plane", "balls on planes"): planes,
             ("drive", "drives"): len(self.drive),
             ("load", "loads"): len(self.load),
+            ("stop", "stops"): len(self.stop),
+            ("gear", "gears"): len(self.gear),
         }
         return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
 

@@ -1,13 +1,68 @@
-"""How a run begins where the poses of the bodies leave a choice."""
+"""How a run begins, where that is more than the bodies' poses and velocities."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 
-from pipeline.core.scene.fields import Part
+from pipeline.core.scene.fields import Number, Part, PartName
+
+#: the keys of one joint coordinate
+KEYS = ("position", "near", "velocity")
+#: where a run may begin, other than where the scene puts its bodies
+At = Literal["equilibrium", "ideal"]
+Measure = float | str
+
+
+class JointStart(Part):
+    """Start of one joint coordinate; its unit, where text gives one, is that of the coordinate or of its rate.
+
+    position: where it starts, kept.  near: of several ways to assemble the mechanism, the one in which it is nearest to
+    this; without the poses of bodies it is also where the assembly is looked for.  velocity: its rate.
+    """
+
+    position: Measure | None = None
+    near: Measure | None = None
+    velocity: Measure | None = None
+
+    @model_validator(mode="after")
+    def _something(self) -> JointStart:
+        if all(getattr(self, key) is None for key in KEYS):
+            raise ValueError(f"one of {', '.join(KEYS)} says how the coordinate starts; here none does")
+        if self.position is not None and self.near is not None:
+            raise ValueError("position says where the coordinate starts, near only about where; give one of them")
+        return self
+
+
+def _coordinates(value: Any) -> Any:
+    """A joint with one coordinate need not name it; the empty name stands for it."""
+    if isinstance(value, Mapping) and (not value or set(value) & {*KEYS, "source"}):
+        return {"": value}
+    return value
+
+
+class ModalStart(Part):
+    """Deformation of a flexible body at the start, by its modes in the order of the bundle; those left out are zero.
+
+    coordinate: modal coordinates [sqrt(kg) m].  velocity: their rates [sqrt(kg) m/s]; without them, the bodies'.
+    """
+
+    coordinate: tuple[Number, ...] = ()
+    velocity: tuple[Number, ...] | None = None
+
+
+class _Either:
+    """Lets the JSON schema say that both forms are written."""
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        several = handler(schema)
+        return {"anyOf": [several["additionalProperties"], several]}
+
+
+JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates), _Either()]
 
 
 class Branch(Part):
@@ -30,8 +85,26 @@ def _several(value: Any) -> Any:
 class Start(Part):
     """The start of the run.
 
+    at: "equilibrium", the static equilibrium with the drives where their laws start, and the joint coordinates whose
+    `position` is given held there; or "ideal", where the mechanism without clearance would start, each loose pin
+    resting in its socket on the side to which the joint's force presses it.
+    joint: of joints, by name; those with several coordinates by the coordinate's name below.
+    modal: of flexible bodies, by name.
     branch: in a change point, which of the branches that cross there the motion takes; with several loops a list, each
     choosing among what those before it have left.
     """
 
-    branch: Annotated[tuple[Branch, ...], BeforeValidator(_several), Field(min_length=1)]
+    at: At | None = None
+    joint: dict[PartName, JointStarts] = Field(default_factory=dict)
+    modal: dict[PartName, ModalStart] = Field(default_factory=dict)
+    branch: Annotated[tuple[Branch, ...], BeforeValidator(_several)] = ()
+
+    @model_validator(mode="after")
+    def _no_two_deformations(self) -> Start:
+        given = [name for name, modal in self.modal.items() if modal.coordinate]
+        if self.at is not None and given:
+            raise ValueError(
+                f"at = '{self.at}' says how bodies are deformed, and so does modal.{given[0]}.coordinate: "
+                "give one of them"
+            )
+        return self

@@ -28,6 +28,11 @@ class Coordinate:
         return "angle" if self.turning else "length"
 
     @property
+    def unit(self) -> str:
+        """Of its values in results."""
+        return "rad" if self.turning else "m"
+
+    @property
     def force(self) -> str:
         """Dimension of what acts along it."""
         return "torque" if self.turning else "force"

@@ -22,9 +22,8 @@ from pipeline.dynamics.model.model import Model, tabulate
 from pipeline.dynamics.run import observation, singular
 from pipeline.dynamics.run.engine import Engine, prepare
 from pipeline.dynamics.run.run import driven
+from pipeline.dynamics.run.start import NO_IMPACT
 
-#: impact rate that a contact is given: at rest the hysteresis of an impact long past has no say
-NO_IMPACT = 1e300
 #: drives reach the wanted pose in strides of this share of the mechanism's size, or this angle
 STRIDE = 0.05
 #: shortest stride, as a share of the whole way, before the pose counts as out of reach

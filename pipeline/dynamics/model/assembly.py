@@ -3,53 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, eye_array
 
-from pipeline.core.algebra import rotation_vector_to_matrix, skew
+from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model import given_start
 from pipeline.dynamics.model.chain import path_positions
-from pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
+from pipeline.dynamics.model.closing import EXACT, apart, close, misfit, opposite
+from pipeline.dynamics.model.constraints import Constraint, constraints, demands
+from pipeline.dynamics.model.deformation import start_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.laws import NONE
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.placing import assemblies, chosen
+from pipeline.dynamics.model.start_table import Given, given_coordinates
 
-#: a start further from closed than this share of the mechanism's size is a mistake, not rounding
-WORST_GUESS = 0.05
-#: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end; where
-#: coordinates are large beside the mechanism, so many roundings of them if that is more
-EXACT, CLOSED = 1e-13, 1e-11
-EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
 #: joints that miss each other by less than this share of the mechanism's size are meant to fit
 SLIGHT = 1e-4
-ITERATIONS = 60
-#: least damping, as a share of the mean of the normal matrix: without any, that of redundant joints has no inverse
-ROUNDING = 1e-15
-#: least cosine between axes that a joint keeps parallel
-SAME_WAY = 0.5
-#: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
-LEAST_GYRATION = 0.01
-
-
-@dataclass(frozen=True)
-class Misfit:
-    """Residuals of all joints: `values` scaled by the mechanism's size, `gradient` against the links' motions.
-
-    The gradient is sparse: a joint concerns two links.
-    """
-
-    values: np.ndarray
-    gradient: csr_array
-
-    @property
-    def worst(self) -> float:
-        """Largest residual."""
-        return float(np.max(np.abs(self.values), initial=0.0))
 
 
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
@@ -61,120 +35,44 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     engine does.
     given: laws that replace the scene's.
     """
-    joints, poses = constraints(mechanism, given), [link.start for link in mechanism.links]
-    _refuse_apart(mechanism, joints, poses)
-    _refuse_opposite(joints, poses)
+    starts = given_coordinates(mechanism.scene)
+    given_start.refuse_driven(mechanism, starts, given)
+    joints, poses = constraints(mechanism, given, starts), [link.start for link in mechanism.links]
+    placed = given_start.given_links(mechanism)
+    between = [joint for joint in joints if {joint.link_a, joint.link_b} <= placed]
+    free = len(placed) + sum(link.massless for link in mechanism.links[1:]) < len(mechanism.links)
+    wrong = apart(mechanism, joints, poses) or opposite(joints, poses)
+    search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
+    judged = between if search else joints
+    wrong = apart(mechanism, judged, poses) or opposite(judged, poses)
+    if wrong is not None:
+        raise wrong
     missed = given_start.misses(mechanism, joints, poses, given)
     given_start.refuse_far(mechanism, missed)
-    residual = max([*residuals(joints, poses).values(), *(miss.size for miss in missed)], default=0.0)
+    residual = max([*residuals(judged, poses).values(), *(miss.size for miss in missed)], default=0.0)
     mechanism = replace(mechanism, start_residual=residual, placed=tuple(poses))
-    if mechanism.has_paths or not mechanism.all_rigid:
+    if search:
+        return _searched(mechanism, joints, placed, starts)
+    asked = bool(starts or mechanism.deformation)
+    if mechanism.has_paths or not (mechanism.all_rigid or asked):
         return settled(mechanism, poses)
     closed = close(mechanism, joints, poses)
-    if closed is None:
+    if closed is None and mechanism.all_rigid:
         _refuse_drives(mechanism, joints, poses)
         raise _impossible(mechanism, joints, poses)
-    return settled(mechanism, closed)
+    return settled(mechanism, closed or poses)
 
 
-def close(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> list[Placement] | None:
-    """Poses nearby, in the metric of the mass, in which all joints fit; None when there are none.
-
-    Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints ask for the
-    same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
-    """
-    here, grain = list(poses), _rounding(mechanism)
-    exact, closed = max(EXACT, EXACT_ROUNDINGS * grain), max(CLOSED, CLOSED_ROUNDINGS * grain)
-    now = misfit(mechanism, joints, here)
-    if now.worst <= exact:
-        return here
-    from scipy.sparse.linalg import spsolve  # slow to import, and most scenes give poses that fit
-
-    mobility = diags_array(_mobilities(mechanism, here))
-    damping = 1.0
-    for _ in range(ITERATIONS):
-        G = now.gradient @ mobility
-        normal, rows = G @ now.gradient.T, len(now.values)
-        scale = max(damping * float(np.linalg.norm(now.values)), ROUNDING) * normal.trace() / rows
-        step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
-        there = _moved(mechanism, here, step)
-        then = misfit(mechanism, joints, there)
-        if np.linalg.norm(then.values) < np.linalg.norm(now.values):
-            here, now, damping = there, then, 0.1 * damping
-        else:
-            damping *= 10.0
-        if now.worst <= exact or damping > 1e12:
-            break
-    return here if now.worst <= closed else None
-
-
-def _rounding(mechanism: Mechanism) -> float:
-    """Rounding of the largest coordinates of the scene, as a share of the mechanism's size."""
-    reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
-    reach += [frame.place.p for frame in mechanism.frames.values()]
-    return float(np.finfo(float).eps * np.max(np.abs(reach)) / mechanism.length)
-
-
-def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Misfit:
-    """Residuals of all joints and driven coordinates.
-
-    Motions: per link but the ground its small rotation about its centre of mass, and that centre's displacement in
-    units of the mechanism's size.
-    """
-    L = mechanism.length
-    values, blocks, row = [], list[tuple[np.ndarray, int, int]](), 0
-    centres = [pose.of(Placement(_centre(link))).p for link, pose in zip(mechanism.links, poses, strict=True)]
-    for joint in joints:
-        A, B = joint.frames(poses)
-        parts = [demands(joint.edge.kind, A, B)]
-        if joint.values:
-            parts.append(prescribed(joint.edge.kind, A, B, joint.values))
-        for residual, wrench in parts:
-            force = np.any(wrench[:, 3:] != 0.0, axis=1)
-            values.append(np.where(force, residual / L, residual))
-            for link, sign in ((joint.link_a, -1.0), (joint.link_b, 1.0)):
-                moment = wrench[:, :3] - wrench[:, 3:] @ skew(centres[link]).T
-                block = sign * np.hstack([np.where(force[:, None], moment / L, moment), wrench[:, 3:]])
-                if link:  # the ground does not move
-                    blocks.append((block, row, 6 * (link - 1)))
-            row += len(wrench)
-    shape = (row, 6 * (len(mechanism.links) - 1))
-    return Misfit(np.concatenate([*values, np.zeros(0)]), _sparse(blocks, shape))
-
-
-def _sparse(blocks: list[tuple[np.ndarray, int, int]], shape: tuple[int, int]) -> csr_array:
-    """Matrix of dense blocks, each with its first row and column; what overlaps is added."""
-    places = [np.add(np.indices(block.shape).reshape(2, -1), [[row], [column]]) for block, row, column in blocks]
-    entries = np.concatenate([*(block.ravel() for block, *_ in blocks), np.zeros(0)])
-    rows, columns = np.concatenate([*places, np.zeros((2, 0), dtype=np.int64)], axis=1)
-    return csr_array((entries, (rows, columns)), shape=shape)
-
-
-def _centre(link: Link) -> np.ndarray:
-    return link.inertia.com if link.inertia is not None else np.zeros(3)
-
-
-def _mobilities(mechanism: Mechanism, poses: Sequence[Placement]) -> np.ndarray:
-    """Inverse of mass and least principal moment of inertia per motion, shape (6 (links - 1),)."""
-    L, result = mechanism.length, []
-    largest = max((link.mass for link in mechanism.links[1:]), default=1.0)
-    for link in mechanism.links[1:]:
-        if link.massless:
-            result += [0.0] * 6
-            continue
-        moment = float(np.linalg.eigvalsh(link.inertia.moments)[0]) if link.inertia is not None else 0.0
-        result += [largest / max(moment / L**2, link.mass * LEAST_GYRATION**2)] * 3 + [largest / link.mass] * 3
-    return np.array(result)
-
-
-def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> list[Placement]:
-    moved = [poses[0]]
-    for i, link in enumerate(mechanism.links[1:], start=1):
-        turn, shift = step[6 * i - 6 : 6 * i - 3], mechanism.length * step[6 * i - 3 : 6 * i]
-        centre = poses[i].of(Placement(_centre(link))).p
-        R = rotation_vector_to_matrix(turn) @ poses[i].R
-        moved.append(Placement(centre + shift - R @ _centre(link), R))
-    return moved
+def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
+    """The mechanism with links without poses put where the joints allow it; InputError where they do not."""
+    found = assemblies(mechanism, joints, placed, starts)
+    if not found:
+        _refuse_starts(mechanism, joints, placed, starts)
+        driven = any(joint.values for joint in joints)
+        if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
+            raise _out_of_reach(mechanism, joints)
+        raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
+    return replace(settled(mechanism, found[0].poses), choice=chosen(mechanism, joints, found, starts))
 
 
 def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
@@ -192,7 +90,7 @@ def _between(
 ) -> Placement:
     """Pose of a massless link: that of its inboard frame, moved along or about z by its own coordinate."""
     assert link.inboard is not None
-    F = settled_poses[link.inboard.link].of(link.inboard.place)
+    F = settled_poses[link.inboard.link].of(start_place(mechanism, link.inboard))
     if not link.joint.positions:
         return F
     value = float(chain_positions(mechanism, link, poses)[0])
@@ -211,7 +109,7 @@ def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]
 
     def at(frame: str) -> Placement:
         site = mechanism.site(frame)
-        return poses[site.link].of(site.place)
+        return poses[site.link].of(start_place(mechanism, site))
 
     G = at(edge.frame_b)
     if link.on_path:
@@ -231,44 +129,23 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
     return worst
 
 
-def _refuse_apart(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> None:
-    for joint in joints:
-        A, B = joint.frames(poses)
-        values, wrenches = demands(joint.edge.kind, A, B)
-        force = np.any(wrenches[:, 3:] != 0.0, axis=1)
-        apart = float(np.max(np.abs(values[force]), initial=0.0))
-        turned = float(np.max(np.abs(values[~force]), initial=0.0))
-        a, b = joint.edge.frame_a, joint.edge.frame_b
-        if apart > WORST_GUESS * mechanism.length:
-            raise InputError(
-                f"[joint.{joint.name}.between]",
-                f"'{a}' and '{b}' start {apart:.3g} m apart, where a {joint.edge.kind} joint lets them be together "
-                f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
-                "correct the poses of the bodies, or the frames",
-            )
-        if turned > WORST_GUESS:
-            raise InputError(
-                f"[joint.{joint.name}.between]",
-                f"axes of '{a}' and '{b}' start {np.degrees(np.arcsin(min(turned, 1.0))):.3g} deg from where a "
-                f"{joint.edge.kind} joint holds them (more than {np.degrees(np.arcsin(WORST_GUESS)):.2g} deg)",
-                "correct the orientations of the bodies, or of the frames",
-            )
-
-
-def _refuse_opposite(joints: list[Constraint], poses: Sequence[Placement]) -> None:
-    """Axes that a joint keeps parallel must point the same way: its coordinate is counted about them."""
-    for joint in joints:
-        A, B = joint.frames(poses)
-        pairs = joint_class(joint.edge.kind).ROTATIONS
-        for k in range(3):
-            others = {other for axis, other in pairs if axis == k} | {axis for axis, other in pairs if other == k}
-            if len(others - {k}) == 2 and A.R[:, k] @ B.R[:, k] < SAME_WAY:
-                raise InputError(
-                    f"[joint.{joint.name}.between]",
-                    f"the {'xyz'[k]} axes of '{joint.edge.frame_a}' and '{joint.edge.frame_b}', which a "
-                    f"{joint.edge.kind} joint keeps parallel, do not point the same way",
-                    "turn one of the frames",
-                )
+def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> None:
+    """InputError when the mechanism could be assembled, but for the positions that the scene gives."""
+    wanted = [start for start in starts if start.position is not None]
+    driven = {(start.joint, start.number) for start in wanted}
+    loose = [
+        replace(joint, values={k: v for k, v in joint.values.items() if (joint.name, k) not in driven})
+        for joint in joints
+    ]
+    others = assemblies(mechanism, loose, placed, starts) if wanted else []
+    if others:
+        there = others[0].coordinates
+        reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in wanted)
+        raise InputError(
+            f"{wanted[0].place[:-1]}.position]",
+            f"the joints fit together, but not at the positions given; they do, for example, at {reached}",
+            "correct the position, or say with near about where the coordinate starts",
+        )
 
 
 def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> None:
@@ -276,9 +153,15 @@ def _refuse_drives(mechanism: Mechanism, joints: list[Constraint], poses: list[P
     driven = [joint for joint in joints if joint.values]
     if not driven or close(mechanism, [replace(joint, values={}) for joint in joints], poses) is None:
         return
+    raise _out_of_reach(mechanism, driven)
+
+
+def _out_of_reach(mechanism: Mechanism, joints: Sequence[Constraint]) -> InputError:
+    """What is said of joints that fit together, but not where their drives start."""
+    driven = {joint.name for joint in joints if joint.values}
     scene = mechanism.scene
-    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in {joint.name for joint in driven}]
-    raise InputError(
+    names = [n for n, d in scene.drive.items() if getattr(d, "joint", None) in driven]
+    return InputError(
         f"[drive.{names[0]}.law]",
         f"the joints fit together, but not where the drives ({', '.join(names)}) are at t = {scene.time.start:.6g} s: "
         "the mechanism is over-driven, or a drive starts out of reach",

@@ -8,16 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.model.deformation import start_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.laws import NONE, drive_laws
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.start_table import Given
 from pipeline.dynamics.model.tree import PATH, Edge
 
 
 @dataclass(frozen=True)
 class Constraint:
-    """A joint between frames on two links; `values`: what drives prescribe at the start, by number of coordinate."""
+    """A joint between frames on two links.
+
+    values: where coordinates are at the start, by number: those that drives prescribe, and those that the scene gives.
+    """
 
     edge: Edge
     link_a: int
@@ -36,8 +41,13 @@ class Constraint:
         return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
 
 
-def constraints(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> list[Constraint]:
-    """All joints but contacts and paths: those of the tree in the order of its links, then the closures."""
+def constraints(
+    mechanism: Mechanism, given: Mapping[str, Pieces] = NONE, starts: Sequence[Given] = ()
+) -> list[Constraint]:
+    """All joints but contacts and paths: those of the tree in the order of its links, then the closures.
+
+    given: laws that replace the scene's.  starts: coordinates whose positions hold besides.
+    """
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
     tree = [link.branch.edge for link in mechanism.links if link.branch.edge is not None and not link.massless]
@@ -46,15 +56,17 @@ def constraints(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> lis
         if edge.kind == PATH:
             continue
         a, b = mechanism.site(edge.frame_a), mechanism.site(edge.frame_b)
-        values = {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
-        joints.append(Constraint(edge, a.link, a.place, b.link, b.place, values))
+        values = {s.number: s.position for s in starts if s.joint == edge.name and s.position is not None}
+        values |= {k: laws[name].value(t) for k, name in enumerate(edge.drives) if name is not None}
+        places = (start_place(mechanism, site) for site in (a, b))
+        joints.append(Constraint(edge, a.link, next(places), b.link, next(places), values))
     return joints
 
 
 def outboard_place(mechanism: Mechanism, link: Link) -> Placement:
     """A link's own side of its inboard joint, in the link's frame."""
     frame = link.branch.frame
-    return Placement() if frame is None or not link.flexible else mechanism.frames[frame].place
+    return Placement() if frame is None or not link.flexible else start_place(mechanism, mechanism.site(frame))
 
 
 def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarray]:

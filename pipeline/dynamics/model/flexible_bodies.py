@@ -147,7 +147,7 @@ def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return F[k, l, i, j][order], where
 
 
-def _frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
     k = list(bundle["frame"].values).index(frame)
     pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
@@ -170,7 +170,7 @@ def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
     frame = _inboard_frame(mechanism, link)
     if frame is None:
         return False
-    _, *shapes = _frame_shapes(_body(mechanism, link)[1], frame)
+    _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
     drawn = bow(mechanism, link, frame)
     return any(np.any(shape) for shape in [*shapes, *([] if drawn is None else [drawn])])
 
@@ -185,7 +185,7 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
         if frame is None:
             pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros(3 * n), np.zeros(3 * n)
         else:
-            pose, *shapes = _frame_shapes(_body(mechanism, link)[1], frame)
+            pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
         if shortened:
             drawn = None if frame is None else bow(mechanism, link, frame)
             shapes.append(np.zeros(n * n) if drawn is None else drawn)

@@ -9,13 +9,16 @@ import numpy as np
 
 from pipeline.core.algebra import matrix_to_quaternion, rotation_between, rotation_vector_to_matrix
 from pipeline.core.errors import InputError
+from pipeline.core.scene.drives import PathDrive
 from pipeline.dynamics.drives.pieces import Pieces
 from pipeline.dynamics.model.chain import path_positions
 from pipeline.dynamics.model.constraints import Constraint, prescribed
-from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.deformation import start_place
+from pipeline.dynamics.model.driving import coordinate_of, joint_class
 from pipeline.dynamics.model.laws import drive_laws
 from pipeline.dynamics.model.mechanism import Mechanism
 from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.start_table import Given
 from pipeline.dynamics.model.tree import PATH, Edge
 
 #: a start further from its drive's law than this, as share of the mechanism's size or in rad, is a contradiction
@@ -28,13 +31,15 @@ MOST = 8
 
 @dataclass(frozen=True)
 class Miss:
-    """A driven coordinate whose start, in the poses given, is not where its law starts [m or rad].
+    """A coordinate whose start, in the poses given, is not where a drive's law or the scene starts it [m or rad].
 
+    rule: what starts it at `value`, in words.  drive: its drive, or nothing.
     of_path: the coordinate is one of a path, not of a joint.
     """
 
-    drive: str
+    drive: str | None
     place: str
+    rule: str
     what: str
     now: float
     value: float
@@ -51,15 +56,15 @@ class Miss:
         """What is given, and what the law says."""
         unit = "rad" if self.turning else "m"
         return (
-            f"{self.what} starts at {self.now:.6g} {unit} in the poses given, and at {self.value:.6g} {unit} by the "
-            f"law of drive '{self.drive}': {self.size:.3g} {unit} apart"
+            f"{self.what} starts at {self.now:.6g} {unit} in the poses given, and at {self.value:.6g} {unit} by "
+            f"{self.rule}: {self.size:.3g} {unit} apart"
         )
 
 
 def misses(
     mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement], given: Mapping[str, Pieces]
 ) -> list[Miss]:
-    """Drives against the poses that the scene gives; a body without a pose contradicts nothing.
+    """Starts of coordinates against the poses that the scene gives; a body without a pose contradicts nothing.
 
     given: laws that replace the scene's; they were made for these poses and are not looked at.
     """
@@ -72,7 +77,7 @@ def misses(
             continue
         site = mechanism.site(edge.frame_b)
         if site.link in placed:
-            found += _of_path(mechanism, edge, poses[site.link].of(site.place), given)
+            found += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
     return [miss for miss in found if miss.drive not in given]
 
 
@@ -91,11 +96,14 @@ def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
     relative, declared = A.inverse().of(B), joint_class(joint.edge.kind)
     now = declared.coordinates(relative.R, relative.p)
     for (k, value), apart in zip(joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True):
-        drive, coordinate = str(joint.edge.drives[k]), declared.COORDINATES[k]
+        coordinate, drive = declared.COORDINATES[k], joint.edge.drives[k] if joint.edge.drives else None
         what = f"joint '{joint.name}'" if len(declared.COORDINATES) == 1 else f"'{joint.name}.{coordinate.name}'"
         # the angle nearest to the law's, where turns are counted
         start = value + float(apart) if coordinate.turning else float(now[k])
-        yield Miss(drive, f"[drive.{drive}.law]", what, start, value, coordinate.turning)
+        named = joint.name if len(declared.COORDINATES) == 1 else f"{joint.name}.{coordinate.name}"
+        place = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
+        rule = f"the law of drive '{drive}'" if drive else "its own start"
+        yield Miss(drive, place, rule, what, start, value, coordinate.turning)
 
 
 def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Miss]:
@@ -106,14 +114,14 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
     if edge.vector:
         turn = rotation_vector_to_matrix(np.array(wanted[3:6], dtype=float))
         apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
-        drive = str(edge.drives[3]).partition(".")[0]
-        yield Miss(
-            str(edge.drives[3]), f"[drive.{drive}.rotation]", f"the turn of '{edge.frame_b}'", apart, 0.0, True, True
-        )
+        drive, what = str(edge.drives[3]), f"the turn of '{edge.frame_b}'"
+        place = f"[drive.{drive.partition('.')[0]}.rotation]"
+        yield Miss(drive, place, f"the law of drive '{drive}'", what, apart, 0.0, True, True)
     for k, (name, value) in enumerate(zip(edge.drives, wanted, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue
-        yield Miss(name, f"[drive.{name}]", f"'{edge.frame_b}'", float(now[k]), value, k >= 3, True)
+        rule, what = f"the law of drive '{name}'", f"'{edge.frame_b}'"
+        yield Miss(name, f"[drive.{name}]", rule, what, float(now[k]), value, k >= 3, True)
 
 
 def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
@@ -130,8 +138,32 @@ def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
             raise InputError(
                 miss.place,
                 f"{miss.text()} (more than {limit:.3g} {unit})",
-                "correct the poses or where the law starts, or leave out the poses of the bodies that the drive places",
+                "correct the poses or where the law starts, or leave out the poses of the bodies that the drive places"
+                if miss.drive
+                else "correct the poses or the position, or leave out the poses of the bodies that follow from it",
             )
+
+
+def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[str, Pieces]) -> None:
+    """InputError for starts of driven coordinates that are not those of the drives' laws.
+
+    given: laws that replace the scene's; they were made for this start.
+    """
+    t, laws = mechanism.scene.time.start, dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
+    for name, drive in mechanism.scene.drive.items():
+        if isinstance(drive, PathDrive) or name in given:
+            continue
+        joint, number, coordinate = coordinate_of(mechanism.scene, drive.joint, drive.coordinate, f"[drive.{name}]")
+        for start in (s for s in starts if (s.joint, s.number) == (joint, number)):
+            for key, order, wanted in (("position", 0, start.position), ("velocity", 1, start.velocity)):
+                law, unit = laws[name].value(t, order), coordinate.unit + "/s" * order
+                size = 1.0 if coordinate.turning else mechanism.length
+                if wanted is not None and abs(law - wanted) > WRITTEN * max(size, abs(law)):
+                    raise InputError(
+                        f"{start.place[:-1]}.{key}]",
+                        f"is {wanted:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
+                        "leave it out; what is driven starts as its law does",
+                    )
 
 
 def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:

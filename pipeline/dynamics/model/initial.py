@@ -13,14 +13,17 @@ from pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, Rig
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.model.assembly import chain_positions
 from pipeline.dynamics.model.constraints import outboard_place
+from pipeline.dynamics.model.deformation import start_place
 from pipeline.dynamics.model.driving import joint_class
 from pipeline.dynamics.model.flexible_bodies import bow, shift
 from pipeline.dynamics.model.gauges import angles
+from pipeline.dynamics.model.given_rates import given_rates
 from pipeline.dynamics.model.mechanism import Link, Mechanism
 from pipeline.dynamics.model.model import Model
 
-#: state -> frames of all links, named fields of LINK_FRAMES, and rates at which the loops open, (closure rows,)
-Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+#: state -> frames of all links and sites, named fields of LINK_FRAMES and SITE_FRAMES, and rates at which the loops
+#: open, (closure rows,)
+Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
 #: misses below this share of the speeds asked for are rounding
 RIGID = 1e-9
@@ -40,6 +43,8 @@ def start_state(model: Model) -> np.ndarray:
     for i, link in enumerate(model.links[1:], start=1):
         if not link.drives and joint_class(link.kind).POSITIONS:
             y[model.numbering.positions[i]] = _positions(model.mechanism, link)
+    for i, q in model.mechanism.deformation.items():
+        y[model.numbering.modal_positions[i]] = q
     return y
 
 
@@ -49,7 +54,7 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     if edge is not None and edge.kind != link.kind:
         return chain_positions(mechanism, link, starts)
     assert link.inboard is not None
-    F = starts[link.inboard.link].of(link.inboard.place)
+    F = starts[link.inboard.link].of(start_place(mechanism, link.inboard))
     relative = F.inverse().of(link.start.of(outboard_place(mechanism, link)))
     return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
 
@@ -59,7 +64,7 @@ class Velocities:
     """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
     asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
-    bodies: those that are given velocities, which the first `told` rows ask for; the others keep the loops closed.
+    given: places of the velocities that the first `told` rows ask for; the other rows keep the loops closed.
     fastest: size of all these velocities, those of a slow motion at least.
     """
 
@@ -67,16 +72,16 @@ class Velocities:
     asked: np.ndarray
     target: np.ndarray
     told: int
-    bodies: tuple[str, ...]
+    given: tuple[str, ...]
     fastest: float
 
 
 def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
-    """What bodies and loops ask of the speeds in a state."""
-    wanted = with_velocities(model)
+    """What bodies, joints, modes and loops ask of the speeds in a state."""
+    wanted, others = with_velocities(model), given_rates(model)
     y = y.copy()
     y[model.speeds] = 0.0
-    given, centres = _given(wanted).ravel(), [_centre(model, name) for name in wanted]
+    given, centres = _given(wanted).ravel(), [centre_of(model, name) for name in wanted]
     told = ~np.isnan(given)
 
     unit, L = model.speed_scales, model.length
@@ -84,9 +89,11 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
     opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
-        frames, opening = motion(state)
-        moving = [centre.motion(frames, state[: model.nq], state[model.speeds]) for centre in centres]
-        return np.concatenate([np.array(moving).ravel()[told] / lengths, opening / opening_lengths])
+        frames, sites, opening = motion(state)
+        q, u = state[: model.nq], state[model.speeds]
+        moving = np.array([centre.motion(frames, q, u) for centre in centres])
+        coordinates = [rate.of(sites, u) / rate.size for rate in others]
+        return np.concatenate([moving.ravel()[told] / lengths, coordinates, opening / opening_lengths])
 
     base = rates(y)
     columns = []
@@ -94,34 +101,40 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    asked = np.concatenate([given[told] / lengths, np.zeros(len(base) - told.sum())])
+    asked = np.concatenate([given[told] / lengths, [rate.wanted / rate.size for rate in others]])
+    count = len(asked)
+    asked = np.concatenate([asked, np.zeros(len(base) - count)])
     fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
     matrix = np.array(columns).T.reshape(len(base), model.nv)
-    return Velocities(matrix, asked, asked - base, int(told.sum()), tuple(wanted), fastest)
+    places = [*(f"[body.{name}.velocity]" for name in wanted), *dict.fromkeys(rate.place for rate in others)]
+    return Velocities(matrix, asked, asked - base, count, tuple(places), fastest)
 
 
 def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
-    """Y with speeds that give the bodies their velocities and keep the loops closed; otherwise the least speeds.
+    """Y with speeds that give bodies, joints and modes their velocities and keep the loops closed; otherwise the least.
 
-    Velocities are those of centres of mass, of flexible bodies as of rigid ones.  Flexible bodies start without speeds
-    of deformation if joints, drives and given velocities allow that.
+    Velocities of bodies are those of centres of mass, flexible or rigid.  Flexible bodies start without speeds of
+    deformation if joints, drives and given velocities allow that.
     share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
     Raises InputError when joints and drives do not allow the velocities.
     """
     elastic = np.zeros(model.nv, dtype=bool)
     for modes in model.numbering.modal_coordinates.values():
         elastic[modes] = True
-    if not with_velocities(model) and not elastic.any():
+    others = given_rates(model)
+    if not with_velocities(model) and not others and not elastic.any():
         return y
+    elastic[[rate.speed for rate in others if rate.speed is not None]] = False
     equations = velocity_equations(model, motion, y)
     speeds, miss = _least(equations.matrix * ~elastic, equations.target)
     if miss > RIGID * equations.fastest:
         speeds, miss = _least(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
-    if equations.bodies and miss > max(WRITTEN * equations.fastest, share * largest):
+    if equations.given and miss > max(WRITTEN * equations.fastest, share * largest):
+        names = ", ".join(place.removeprefix("[body.").removesuffix(".velocity]") for place in equations.given)
         raise InputError(
-            f"[body.{equations.bodies[0]}.velocity]",
-            f"joints and drives do not allow the velocities given for {', '.join(equations.bodies)} (they miss by "
+            equations.given[0],
+            f"joints and drives do not allow the velocities given for {names} (they miss by "
             f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the "
             "largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
@@ -141,21 +154,51 @@ def with_velocities(model: Model) -> dict[str, RigidBody | FlexibleBody]:
     }
 
 
-def changed_velocities(model: Model, frames: np.ndarray, y: np.ndarray) -> list[str]:
-    """Sentences about bodies that do not start with the velocities that the scene gives, with amounts.
+def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: np.ndarray) -> list[str]:
+    """Sentences about bodies, joints and modes whose start velocities are not those that the scene gives, with amounts.
 
-    y: state at the start.  frames: of all links there, named fields of LINK_FRAMES.
+    y: state at the start.  frames, sites: of all links and sites there, named fields of LINK_FRAMES and SITE_FRAMES.
     """
     wanted, found, unit = with_velocities(model), [], _units(model)
     given = _given(wanted)
     limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
     for name, row in zip(wanted, given, strict=True):
-        apart = np.abs(_centre(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
+        apart = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
         if np.nanmax(apart / unit) > limit:
             turning, moving = np.fmax.reduce(apart.reshape(2, 3), axis=1, initial=0.0)
             found.append(
                 f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
                 f"{moving:.3g} m/s and {turning:.3g} rad/s"
+            )
+    for rate in given_rates(model):
+        apart = abs(rate.of(sites, y[model.speeds]) - rate.wanted)
+        if apart > WRITTEN * (_slow(model) * rate.size + abs(rate.wanted)):
+            found.append(
+                f"the start velocity {rate.place} was mended so that joints and drives allow it: by {apart:.3g}"
+            )
+    return found
+
+
+def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
+    """Sentences about modes that a start z has otherwise than y, in which they are as the scene gives them.
+
+    Raises InputError where they are far from that.
+    """
+    found = []
+    for i, q in model.mechanism.deformation.items():
+        mine, name = model.numbering.modal_positions[i], model.links[i].flexible
+        apart, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
+        unit = model.length * model.links[i].mass ** 0.5
+        if apart > max(WRITTEN * unit, WRONG * largest):
+            raise InputError(
+                f"[start.modal.{name}.coordinate]",
+                f"joints and drives do not allow this deformation: they change it by {apart:.3g} sqrt(kg) m",
+                "give another one, or let a joint give way",
+            )
+        if apart > WRITTEN * max(largest, WRITTEN * unit):
+            found.append(
+                f"the deformation given for {name} was mended so that joints and drives allow it: by up to {apart:.3g} "
+                "sqrt(kg) m"
             )
     return found
 
@@ -187,7 +230,7 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
 
 
 @dataclass(frozen=True)
-class _Centre:
+class Centre:
     """Centre of mass of a body: its place in the frame of its link, undeformed.
 
     shape, bow: its shift with the modal coordinates, as in `flexible_bodies.shift`; these are at `positions` and
@@ -210,18 +253,18 @@ class _Centre:
         return np.concatenate([frame["omega"], v])
 
 
-def _centre(model: Model, name: str) -> _Centre:
-    """The centre of mass of a body."""
+def centre_of(model: Model, name: str) -> Centre:
+    """The centre of mass of a body, and how it moves."""
     i, body = model.mechanism.link_of[name], model.scene.body[name]
     link = model.links[i]
     if isinstance(body, RigidBody):
         place = link.places[name]
-        return _Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0)))
+        return Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
     bent, numbering = bow(model.mechanism, i), model.numbering
     bent = None if bent is None else bent / link.mass
-    return _Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
+    return Centre(i, first, shape, bent, numbering.modal_positions[i], numbering.modal_coordinates[i])
 
 
 def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:

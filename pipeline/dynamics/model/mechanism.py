@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ from pipeline.dynamics.model.merge import (
     rigid_inertia,
     start_places,
 )
+from pipeline.dynamics.model.start_table import given_modes
 from pipeline.dynamics.model.stops import STOP, End, ends
 from pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
 
@@ -136,6 +137,8 @@ class Mechanism:
     origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
+    choice: which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
+    deformation: modal coordinates at the start of the flexible links to which the scene gives some.
     """
 
     scene: Scene
@@ -148,6 +151,8 @@ class Mechanism:
     length: float
     start_residual: float = 0.0
     placed: tuple[Placement, ...] = ()
+    deformation: Mapping[int, np.ndarray] = field(default_factory=dict)
+    choice: str = ""
 
     @cached_property
     def drives(self) -> tuple[str, ...]:
@@ -216,7 +221,8 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
     length = _length(scene, links, frames)
     touching: list[tuple[str, Clearance | End]] = [*scene.contacts().items(), *ends(scene, length)]
     contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in touching]
-    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length)
+    deformation = {link_of[name]: q for name, q in given_modes(scene, bundles).items()}
+    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length, deformation=deformation)
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:

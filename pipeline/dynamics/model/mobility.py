@@ -17,7 +17,8 @@ import scipy.linalg
 from pipeline.core.algebra import rotation_vector_to_matrix
 from pipeline.core.errors import InputError
 from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import LEAST_GYRATION, close, settled
+from pipeline.dynamics.model.assembly import settled
+from pipeline.dynamics.model.closing import LEAST_GYRATION, close
 from pipeline.dynamics.model.constraints import constraints
 from pipeline.dynamics.model.couplings import Coupling
 from pipeline.dynamics.model.merge import Placement

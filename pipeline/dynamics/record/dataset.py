@@ -77,7 +77,14 @@ def attributes(scene: Scene) -> dict[str, str]:
 
 def warnings(run: Run) -> list[str]:
     """Sentences about what a run is to be doubted for."""
-    return [*run.mended, *_contact_warnings(run), *_flexible_warnings(run), *_step_warnings(run.model, run.trajectory)]
+    choice = [run.model.mechanism.choice] if run.model.mechanism.choice else []
+    return [
+        *choice,
+        *run.mended,
+        *_contact_warnings(run),
+        *_flexible_warnings(run),
+        *_step_warnings(run.model, run.trajectory),
+    ]
 
 
 def _step_warnings(model: Model, trajectory: Trajectory) -> list[str]:

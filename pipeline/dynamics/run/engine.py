@@ -18,6 +18,7 @@ from pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from pipeline.dynamics.integrate.method import Method
 from pipeline.dynamics.model import selection
 from pipeline.dynamics.model.driving import coordinate_of
+from pipeline.dynamics.model.given_rates import given_rates
 from pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from pipeline.dynamics.model.model import Model
 from pipeline.dynamics.run import singular
@@ -170,13 +171,14 @@ def may_start_singular(model: Model) -> bool:
     """Whether a run may start in a singular pose: something moves or says which way, and no contact may interfere."""
     bodies = model.scene.body.values()
     given = [v for b in bodies for v in (getattr(b, "velocity", None), getattr(b, "angular_velocity", None))]
-    moved = any(v is not None and np.any(np.asarray(v) != 0.0) for v in given) or model.scene.start is not None
+    moved = any(v is not None and np.any(np.asarray(v) != 0.0) for v in given) or bool(given_rates(model))
+    moved = moved or (model.scene.start is not None and bool(model.scene.start.branch))
     return not model.contacts and (moved or any(moves(model, name) for name in model.drives))
 
 
 def _check_branch(model: Model, mobility: Mobility) -> None:
     """InputError for a choice between branches where there is none, or by a coordinate that is not there."""
-    if model.scene.start is None:
+    if model.scene.start is None or not model.scene.start.branch:
         return
     for choice in model.scene.start.branch:
         coordinate_of(model.scene, choice.joint, choice.coordinate, "[start.branch]")

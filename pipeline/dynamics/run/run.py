@@ -13,11 +13,13 @@ import xarray as xr
 from pipeline.core.errors import SolverError
 from pipeline.core.integrators import INTEGRATORS
 from pipeline.core.progress import Progress
+from pipeline.core.registry import lookup
 from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.load import edited
 from pipeline.core.scene.schema import Scene
 from pipeline.dynamics import memory as m
 from pipeline.dynamics.drives.pieces import Pieces
+from pipeline.dynamics.effects import STARTS
 from pipeline.dynamics.equations import observation
 from pipeline.dynamics.equations.observation import Observed
 from pipeline.dynamics.model.mechanism import build
@@ -72,9 +74,18 @@ def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     return actuated(scene, bundles, progress)
 
 
+def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Scene:
+    """The scene with the poses and velocities of where it says that the run begins, instead of its own."""
+    if scene.start is None or scene.start.at is None:
+        return scene
+    begin = lookup(STARTS, scene.start.at, where="[start.at]")
+    found: Scene = begin(scene, bundles, progress)
+    return found
+
+
 def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, Callable[[], Engine]]:
     """The engine of a run, and the maker of one that goes on with the implicit method that takes over."""
-    moved, given = driven(scene, bundles, progress)
+    moved, given = driven(begun(scene, bundles, progress), bundles, progress)
 
     def made(wanted: Scene) -> Engine:
         return prepare(tabulate(build(wanted, bundles), given), progress)
@@ -91,8 +102,8 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    mended = tuple(mends(engine, start))
-    for sentence in mended:
+    mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
+    for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
     engine, trajectory, switched = follow(engine, start, progress, other)
     seen = observed(engine, trajectory)

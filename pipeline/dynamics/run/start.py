@@ -15,6 +15,8 @@ from pipeline.dynamics.run import singular
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.observation import observe
 
+#: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
+NO_IMPACT = 1e300
 #: surfaces that overlap by less than this share of the clearance touch
 TOUCHING = 1e-9
 
@@ -46,9 +48,9 @@ def consistent_start(engine: Engine) -> np.ndarray:
 def start_motions(engine: Engine) -> initial.Motions:
     """What speeds at the start mean: motions of the links, and rates at which the loops open."""
 
-    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def motion(state: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         _look(engine, state)
-        return engine.table(m.LINK_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
+        return engine.table(m.LINK_FRAMES), engine.table(m.SITE_FRAMES), engine.view(m.RESIDUAL_RATE).copy()
 
     return motion
 
@@ -58,7 +60,10 @@ def mends(engine: Engine, y: np.ndarray) -> list[str]:
     _look(engine, y)
     frames = engine.table(m.LINK_FRAMES)
     now = [Placement(frame["origin"], frame["axes"]) for frame in frames]
-    return [*moved(engine.model.mechanism, now), *initial.changed_velocities(engine.model, frames, y)]
+    model = engine.model
+    bent = initial.changed_positions(model, initial.start_state(model), y)
+    speeds = initial.changed_velocities(model, frames, engine.table(m.SITE_FRAMES), y)
+    return [*moved(model.mechanism, now), *bent, *speeds]
 
 
 def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from pipeline.dynamics.run.collocation import Collocation
 from pipeline.dynamics.run.engine import Engine
 from pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from pipeline.dynamics.run.singular_start import start_motion
-from pipeline.dynamics.run.start import overlapping
+from pipeline.dynamics.run.start import NO_IMPACT, overlapping
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -264,7 +264,7 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
         speed = engine.model.contacts[c].joint.initial_approach_speed
         if speed is None:
             continue  # a start that differs by a hair from one that touches: it closes at once
-        engine.modes[c], engine.latched[c] = 1, speed
+        engine.modes[c], engine.latched[c] = 1, speed or NO_IMPACT
         event[n[m.N_EVENTS]] = (c, m.CLOSING, engine.start, speed, 0.0, 0.0, np.nan)
         watched["event_row"][c], watched["trend0"][c] = n[m.N_EVENTS], m.STEEPLY
         n[m.N_EVENTS] += 1

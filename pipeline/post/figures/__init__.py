@@ -39,6 +39,7 @@ NAMES = {
     "table08": "table08:make",
     "table09": "table09:make",
     "table10": "table10:make",
+    "table_verdicts": "table_verdicts:make",
 }
 
 

@@ -111,8 +111,9 @@ def _ball(axes: Axes, seen: View, centre: np.ndarray, color: str, zorder: float)
 
 
 def _name(axes: Axes, seen: View, point: np.ndarray, text: str, shift: tuple[float, float]) -> None:
+    x, y = seen.project(point) + shift
     axes.annotate(
-        text, seen.project(point) + shift, ha="center", va="center", fontsize=8.6, color=style.INK, zorder=10,
+        text, (x, y), ha="center", va="center", fontsize=8.6, color=style.INK, zorder=10,
         bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.78},
     )  # fmt: skip
 

@@ -57,7 +57,7 @@ def _joint(axes: Axes, eccentricity: float, *, touching: bool = False) -> None:
     axes.plot(*np.array([np.zeros(2), q]).T, color=style.SOFT, lw=0.8, ls=":", zorder=3)
     for point, name, shift in ((np.zeros(2), "S", (-0.09, 0.06)), (ball, "B", (-0.11, -0.1)), (q, "Q", (-0.1, -0.05))):
         axes.plot(*point, "o", color=style.INK, ms=4, zorder=5)
-        axes.annotate(name, point + shift, fontsize=10, zorder=6)
+        axes.annotate(name, (point[0] + shift[0], point[1] + shift[1]), fontsize=10, zorder=6)
     _arrow(axes, np.zeros(2), ball, "p_SB", (0.06, 0.1))
     _arrow(axes, q, q + 0.34 * n, "n", (0.05, -0.06))
     _arrow(axes, q, q + 0.34 * t, "t", (0.06, 0.03))
@@ -75,8 +75,8 @@ def _arrow(
 ) -> None:
     axes.annotate(
         "",
-        end,
-        start,
+        (end[0], end[1]),
+        (start[0], start[1]),
         arrowprops={"arrowstyle": "-|>", "color": color, "lw": 1.2, "shrinkA": 0, "shrinkB": 0},
         zorder=6,
     )

@@ -98,7 +98,13 @@ def triad(axes: Axes, seen: View, origin: np.ndarray, length: float, names: tupl
     start = seen.project(origin)
     for direction, name in zip(np.eye(3), names, strict=True):
         end = seen.project(origin + length * direction)
-        axes.annotate("", end, start, arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.1}, zorder=9)
+        axes.annotate(
+            "",
+            (end[0], end[1]),
+            (start[0], start[1]),
+            arrowprops={"arrowstyle": "-|>", "color": INK, "lw": 1.1},
+            zorder=9,
+        )
         axes.annotate(
             name, end + 0.16 * (end - start), ha="center", va="center", fontsize=8.5, color=INK, annotation_clip=False
         )

@@ -49,12 +49,15 @@ def _returns(axes: Axes, verdict: xr.Dataset) -> None:
 
 
 def _power(axes: Axes, verdict: xr.Dataset) -> None:
-    for component in range(verdict.sizes["component"])[::-1]:
-        power = np.maximum(verdict.power.values[1:, component], 1e-16)
-        axes.semilogy(verdict.frequency.values[1:], power, lw=0.9, color=COLOR if component == 0 else LIGHT)
     axes.set_title("spectrum")
     axes.set_xlabel("cycles per period")
     axes.set_ylabel("share of the variance")
+    if not verdict.power.values.any():
+        axes.text(0.5, 0.5, "the states stand still", transform=axes.transAxes, ha="center", color=style.SOFT)
+        return
+    for component in range(verdict.sizes["component"])[::-1]:
+        power = np.maximum(verdict.power.values[1:, component], 1e-16)
+        axes.semilogy(verdict.frequency.values[1:], power, lw=0.9, color=COLOR if component == 0 else LIGHT)
     axes.set_ylim(bottom=max(1e-16, axes.get_ylim()[0]))
 
 

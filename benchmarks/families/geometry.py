@@ -1,0 +1,202 @@
+"""Which layouts of the mechanism have the sensitivities of the paper's Table 8, and what they predict besides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.geometry import identify, predict
+from benchmarks.geometry.identify import DANGLE, DZ, Member
+from benchmarks.geometry.kinematics import Layout, answer
+from benchmarks.geometry.predict import FLEXIBLE, MEMBERS, RESTITUTION, STARTS, Open
+from benchmarks.page import Columns, table
+from pipeline.post.paper import TABLE8, TABLE9
+
+#: layouts of the family whose runs are made: every so manieth of a coarser grid
+COARSE, SHOWN = 0.02, 5
+
+
+def members_rows() -> Iterator[Record]:
+    """The family on its grid: one record with its extent, and one for the layout that is taken."""
+    found = identify.family()
+    told: Record = {"members": len(found), "on_the_plate": sum(identify.on_the_plate(m.layout) for m in found)}
+    for name in ("ax", "ay", "bx", "by", "height", "leg"):
+        values = [getattr(m.layout, name) for m in found]
+        told |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
+    yield told
+    yield _member(identify.chosen(found))
+
+
+def velocity_rows() -> Iterator[Record]:
+    """Runs with clearance of some of the family, the other choices as in the scenes; and of the first layout."""
+    for member in sorted(identify.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
+        yield _member(member) | predict.rigid(member.layout, Open())
+    first = Layout(0.086603, 0.05, 0.1, 0.173205, 0.35)
+    yield _member(Member(first, answer(first))) | predict.rigid(first, Open()) | {"first": True}
+
+
+def open_rows() -> Iterator[Record]:
+    """The layout that is taken, over what else the paper leaves open."""
+    layout = identify.chosen(identify.family()).layout
+    for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
+        choice = Open(restitution, gravity, start)
+        told = {"restitution": restitution, "gravity": gravity, "start": start}
+        yield told | predict.rigid(layout, choice)
+
+
+def flexible_rows() -> Iterator[Record]:
+    """The layout that is taken, with a flexible rod and clearance."""
+    layout = identify.chosen(identify.family()).layout
+    for name in FLEXIBLE:
+        yield {"set": name, "count": MEMBERS} | predict.flexible(layout, name)
+
+
+def _member(member: Member) -> Record:
+    layout, told = member.layout, member.answer
+    place = {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height", "leg")}
+    return place | {"dz": told.dz, "dangle": told.dangle, "lift": told.lift, "tilt": told.tilt,
+                    "condition": told.condition, "room": told.room}  # fmt: skip
+
+
+ROWS: dict[str, Callable[[], Iterator[Record]]] = {
+    "members": members_rows,
+    "velocity": velocity_rows,
+    "open": open_rows,
+    "flexible": flexible_rows,
+}
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """The rows of each group."""
+    for case in cases:
+        yield case, list(ROWS[case.name]())
+
+
+def show(records: list[Record]) -> dict[str, str]:
+    """The parts of the page, of the groups of rows that are there."""
+    rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
+    return {name: TABLES[name](of) for name, of in rows.items()}
+
+
+def _mm(name: str, digits: int = 1) -> Callable[[Record], str]:
+    return lambda r: f"{1e3 * r[name]:.{digits}f}"
+
+
+PLACE: Columns = {
+    "A [mm]": lambda r: f"±{1e3 * r['ax']:.1f}, ±{1e3 * r['ay']:.1f}",
+    "B [mm]": lambda r: f"±{1e3 * r['bx']:.1f}, ±{1e3 * r['by']:.1f}",
+    "height [mm]": _mm("height"),
+    "leg [mm]": _mm("leg"),
+}
+ERRORS: Columns = {
+    "angle [mrad]": _mm("angle", 3),
+    "z [mm]": _mm("displacement", 4),
+    "v [mm/s]": _mm("velocity"),
+    "peak force [N]": lambda r: f"{r['peak_force']:.0f}",
+    "acceleration [m/s²]": lambda r: f"{r['peak_acceleration']:.0f}",
+}
+
+
+def _members(rows: list[Record]) -> str:
+    """The closed form in numbers, the family's extent, the member that is taken."""
+    (extent, taken), upright = rows, 1.0 / (4.0 * DZ)
+    spans = "; ".join(
+        f"{words} {1e3 * extent[f'{name}_least']:.0f} to {1e3 * extent[f'{name}_most']:.0f} mm"
+        for name, words in (("ay", "ay"), ("bx", "bx"), ("by", "by"), ("height", "start height"), ("leg", "legs"))
+    )
+    return (
+        f"Table 8 asks for dz/dL1 = {DZ:.4f} and dangle/dL1 = {DANGLE:.4f} rad/m. Hence ax = "
+        f"{1e3 * taken['ax']:.1f} mm "
+        f"and height / leg = {upright:.4f}, legs {np.degrees(np.arccos(upright)):.1f} degrees from the "
+        f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * identify.STEP:g} mm are left: {spans}. "
+        f"{extent['on_the_plate'] or 'None'} of them has all four joint centres over the plate, whatever way that is "
+        f"turned.\n\nTaken, as the least condition number over the stroke:\n\n"
+        + table(
+            [taken],
+            {
+                **PLACE,
+                "condition": lambda r: f"{r['condition']:.2f}",
+                "lift [mm]": _mm("lift"),
+                "tilt [deg]": lambda r: f"{np.degrees(r['tilt']):.2f}",
+                "legs apart by [mm]": _mm("room", 0),
+            },
+        )
+    )
+
+
+def _velocity(rows: list[Record]) -> str:
+    """Runs of members of the family, and how near they come to the velocity of Table 8."""
+    of = [r for r in rows if "first" not in r and "velocity" in r]
+    found = [1e3 * r["velocity"] for r in of]
+    columns: Columns = {
+        "layout": lambda r: "first" if r.get("first") else "family",
+        **PLACE,
+        "condition": lambda r: f"{r['condition']:.1f}",
+        **ERRORS,
+        "force, ideal [N]": lambda r: f"{r['ideal_reaction']:.0f}",
+    }
+    printed = f"{TABLE8.angle:.3e} rad, {TABLE8.displacement:.4f} mm, {TABLE8.velocity:.2f} mm/s"
+    return (
+        f"Table 8 prints {printed}. Angle and displacement of the {len(of)} members are "
+        f"{min(r['angle'] for r in of) / TABLE8.angle:.2f} to {max(r['angle'] for r in of) / TABLE8.angle:.2f} and "
+        f"{1e3 * min(r['displacement'] for r in of) / TABLE8.displacement:.2f} to "
+        f"{1e3 * max(r['displacement'] for r in of) / TABLE8.displacement:.2f} times the printed ones, as identified; "
+        f"the velocity is {min(found):.0f} to {max(found):.0f} mm/s, {min(found) / TABLE8.velocity:.1f} to "
+        f"{max(found) / TABLE8.velocity:.1f} times the printed "
+        f"one.\n\n{table([r for r in rows if 'velocity' in r], columns)}"
+    )
+
+
+def _open(rows: list[Record]) -> str:
+    columns: Columns = {
+        "restitution": lambda r: f"{r['restitution']:g}",
+        "gravity": lambda r: "yes" if r["gravity"] else "no",
+        "ball starts": lambda r: r["start"],
+        **ERRORS,
+    }
+    refused = [r for r in rows if "velocity" not in r]
+    told = "".join(f"\nRefused: {r['restitution']:g}, {r['start']}: {r['reason']}\n" for r in refused)
+    return table([r for r in rows if "velocity" in r], columns) + ("\n" + told if told else "")
+
+
+def _flexible(rows: list[Record]) -> str:
+    """Ensembles beside Table 9."""
+    columns: Columns = {
+        "mode set": lambda r: r["set"],
+        "angle [mrad]": _spread("angle", 1e3, 3),
+        "angle, paper": lambda r: _printed(r, "angle", 1e3),
+        "z [mm]": _spread("displacement", 1e3, 4),
+        "z, paper": lambda r: _printed(r, "displacement", 1.0),
+        "v [mm/s]": _spread("velocity", 1e3, 1),
+        "v, paper": lambda r: _printed(r, "velocity", 1.0),
+        "peak force [N]": _spread("peak_force", 1.0, 0),
+        "acceleration [m/s²]": _spread("peak_acceleration", 1.0, 0),
+    }
+    return table(rows, columns)
+
+
+def _spread(name: str, factor: float, digits: int) -> Callable[[Record], str]:
+    return lambda r: f"{factor * r[name]:.{digits}f} ± {factor * r[f'{name}_std']:.{digits}f}"
+
+
+def _printed(row: Record, name: str, factor: float) -> str:
+    value: Any = getattr(TABLE9.get(row["set"]), name, None)
+    return "–" if value is None else f"{factor * value:.4g}"
+
+
+TABLES = {"members": _members, "velocity": _velocity, "open": _open, "flexible": _flexible}
+
+FAMILY = Family(
+    what="layouts of the paper's mechanism that have the sensitivities of Table 8, and what they predict",
+    takes="2 min",
+    page="geometry.md",
+    cases=lambda: [Case(name) for name in ROWS],
+    measure=measure,
+    show=show,
+    quick="members",
+    times=False,
+)

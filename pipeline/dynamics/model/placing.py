@@ -1,0 +1,171 @@
+"""Assembly from joints alone: where links without poses go, of several ways the one nearest to what the scene hints.
+
+The joints place what has no pose one link after the other, their coordinates at the values that drives, starts and
+hints give, else at zero or, to find other assemblies, anywhere. Loops are then closed (`closing.close`), with the links
+that have a pose held still as long as that is possible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.core.algebra import rotation_vector_to_matrix
+from pipeline.dynamics.model.closing import close, misfit, opposite
+from pipeline.dynamics.model.constraints import Constraint
+from pipeline.dynamics.model.driving import joint_class
+from pipeline.dynamics.model.mechanism import Mechanism
+from pipeline.dynamics.model.merge import Placement
+from pipeline.dynamics.model.start_table import Given
+
+#: guesses from which assemblies are looked for; the first has nothing at random
+GUESSES = 16
+#: size of random slides, as a share of the mechanism's size
+SLIDE = 0.3
+#: assemblies are one if no coordinate differs by more than this, in radians or shares of the mechanism's size
+SAME = 1e-4
+#: a mechanism that can move, and is so near to all hints, is looked for no further
+NEAR = 0.5
+#: singular values of naturally sized rows below this share of the largest leave a motion free
+LOOSE = 1e-6
+
+Hints = Mapping[tuple[str, int], float]
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Poses of all links in which the joints fit. coordinates: of the joints, by name and number [m or rad]."""
+
+    poses: list[Placement]
+    coordinates: dict[tuple[str, int], float]
+
+
+def assemblies(
+    mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]
+) -> list[Assembly]:
+    """Ways in which the joints fit, the best one first: nearest to the hints, then to the first guess.
+
+    placed: links that have a pose.  Empty when none was found.
+    """
+    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
+    known = {(j.name, k): value for j in joints for k, value in j.values.items()}
+    random, found, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
+    for k in range(GUESSES):
+        guess = _guess(mechanism, joints, placed, hints | known, random if k else None, k / GUESSES)
+        if k == 0:
+            aim = _coordinates(joints, guess) | hints
+        poses = close(mechanism, joints, guess, placed)
+        if poses is None and len(placed) > 1:
+            poses = close(mechanism, joints, guess)
+        if poses is None or opposite(joints, poses) is not None:
+            continue
+        made = Assembly(poses, _coordinates(joints, poses))
+        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in found):
+            found.append(made)
+        if not _isolated(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR:
+            break  # a mechanism that can move is assembled where it was first looked for
+    return sorted(
+        found,
+        key=lambda one: (
+            _distance(mechanism, joints, one.coordinates, hints),
+            _distance(mechanism, joints, one.coordinates, aim),
+        ),
+    )
+
+
+def chosen(
+    mechanism: Mechanism, joints: Sequence[Constraint], found: Sequence[Assembly], starts: Sequence[Given]
+) -> str:
+    """What is said of several assemblies of which the scene chooses none; else nothing."""
+    first = found[0]
+    if len(found) < 2 or not _isolated(mechanism, list(joints), first.poses):
+        return ""
+    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
+    told = [_distance(mechanism, joints, one.coordinates, hints) for one in found]
+    if hints and told[1] - told[0] > SAME:
+        return ""
+    units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
+    apart = {key: abs(first.coordinates[key] - found[1].coordinates[key]) for key in first.coordinates}
+    name, k = max(apart, key=lambda key: apart[key])
+    coordinate, several = units[name, k], len([key for key in units if key[0] == name]) > 1
+    label = f"{name}.{coordinate.name}" if several else name
+    values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in found[1:])
+    return (
+        f"the joints can be assembled in {len(found)} ways, and the scene does not say in which: it starts with "
+        f"{label} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
+        f"[start.joint.{label}] near = ... chooses"
+    )
+
+
+def _guess(
+    mechanism: Mechanism,
+    joints: Sequence[Constraint],
+    placed: set[int],
+    values: Hints,
+    random: np.random.Generator | None,
+    spread: float,
+) -> list[Placement]:
+    """Poses of all links, those not placed each put where a joint to a known one has it."""
+    poses, known = [link.start for link in mechanism.links], set(placed)
+    # joints with little freedom place best
+    order = sorted(joints, key=lambda joint: len(joint_class(joint.edge.kind).SPEEDS) - len(joint.values))
+    while True:
+        joint = next((j for j in order if (j.link_a in known) != (j.link_b in known)), None)
+        if joint is None:
+            return poses
+        motion = _motion(mechanism, joint, values, random, spread)
+        if joint.link_a in known:
+            poses[joint.link_b] = poses[joint.link_a].of(joint.place_a).of(motion).of(joint.place_b.inverse())
+            known.add(joint.link_b)
+        else:
+            poses[joint.link_a] = poses[joint.link_b].of(joint.place_b).of(motion.inverse()).of(joint.place_a.inverse())
+            known.add(joint.link_a)
+
+
+def _motion(
+    mechanism: Mechanism, joint: Constraint, values: Hints, random: np.random.Generator | None, spread: float
+) -> Placement:
+    """Pose of a joint's second frame in its first, its coordinates moved one after the other."""
+    coordinates = joint_class(joint.edge.kind).COORDINATES
+    pose = Placement()
+    if not coordinates and random is not None and joint.edge.kind == "spherical":
+        return Placement(R=rotation_vector_to_matrix(np.pi * spread * random.normal(size=3)))
+    for k, coordinate in enumerate(coordinates):
+        value, along = values.get((joint.name, k)), np.eye(3)[coordinate.axis]
+        if value is None:
+            value = 0.0 if random is None else float(random.uniform(-1.0, 1.0))
+            value *= np.pi if coordinate.turning else SLIDE * mechanism.length
+        step = Placement(R=rotation_vector_to_matrix(value * along)) if coordinate.turning else Placement(value * along)
+        pose = pose.of(step)
+    return pose
+
+
+def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
+    found = dict[tuple[str, int], float]()
+    for joint in joints:
+        A, B = joint.frames(poses)
+        declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
+        now = declared.coordinates(relative.R, relative.p)
+        found |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
+    return found
+
+
+def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
+    """Largest difference of coordinates that both have, in radians or shares of the mechanism's size."""
+    turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
+    apart = [0.0]
+    for key in one.keys() & other.keys():
+        way = one[key] - other[key]
+        apart.append(abs((way + np.pi) % (2.0 * np.pi) - np.pi) if turning[key] else abs(way) / mechanism.length)
+    return max(apart)
+
+
+def _isolated(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> bool:
+    """Whether the joints, with what is prescribed of them, leave no motion."""
+    free = [i for i, link in enumerate(mechanism.links) if i and not link.massless]
+    columns = [6 * (i - 1) + k for i in free for k in range(6)]
+    gradient = misfit(mechanism, joints, poses).gradient.toarray()[:, columns]
+    values = np.linalg.svd(gradient, compute_uv=False)
+    return len(columns) <= len(values) and bool(values[len(columns) - 1] > LOOSE * values[0])

@@ -1,0 +1,102 @@
+"""What the table ``[start]`` says of joints and modes, in SI numbers; what cannot be meant is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from pipeline.core.errors import InputError
+from pipeline.core.registry import suggestion
+from pipeline.core.scene.schema import Scene
+from pipeline.core.units import quantity
+from pipeline.dynamics.joints.coordinate import Coordinate
+from pipeline.dynamics.model.driving import coordinate_of
+
+
+@dataclass(frozen=True)
+class Given:
+    """Start of coordinate `number` of a joint: position and near [m or rad], velocity [m/s or rad/s]; None: not given.
+
+    place: where the scene says so.
+    """
+
+    joint: str
+    number: int
+    coordinate: Coordinate
+    place: str
+    position: float | None
+    near: float | None
+    velocity: float | None
+
+    @property
+    def name(self) -> str:
+        """As records call it, shortened where the joint has but one coordinate."""
+        return self.place.removeprefix("[start.joint.").removesuffix("]")
+
+
+def given_coordinates(scene: Scene) -> list[Given]:
+    """The joint coordinates that the scene gives a start.
+
+    Raises InputError for joints and coordinates that are not there, and for units that do not fit.
+    """
+    found = []
+    for joint, coordinates in (scene.start.joint if scene.start is not None else {}).items():
+        for name, start in coordinates.items():
+            place = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
+            _, number, coordinate = coordinate_of(scene, joint, name or None, place)
+            rate = "angular velocity" if coordinate.turning else "velocity"
+            values = [
+                _measure(getattr(start, key), dimension, f"{place[:-1]}.{key}]")
+                for key, dimension in (
+                    ("position", coordinate.dimension),
+                    ("near", coordinate.dimension),
+                    ("velocity", rate),
+                )
+            ]
+            found.append(Given(joint, number, coordinate, place, *values))
+    return found
+
+
+def _measure(value: float | str | None, dimension: str, place: str) -> float | None:
+    try:
+        return None if value is None else quantity(value, dimension)
+    except ValueError as error:
+        raise InputError(place, str(error)) from None
+
+
+def given_modes(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:
+    """Modal coordinates at the start of the flexible bodies that the scene gives some, [sqrt(kg) m], shape (mode,).
+
+    Raises InputError for bodies that are not flexible, and for more numbers than modes.
+    """
+    given = scene.start.modal if scene.start is not None else {}
+    return {name: _padded(scene, bundles, name, "coordinate", start.coordinate) for name, start in given.items()}
+
+
+def given_modal_velocities(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:
+    """The same for their rates [sqrt(kg) m/s], of the bodies that the scene gives some."""
+    given = scene.start.modal if scene.start is not None else {}
+    return {
+        name: _padded(scene, bundles, name, "velocity", start.velocity)
+        for name, start in given.items()
+        if start.velocity is not None
+    }
+
+
+def _padded(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], name: str, key: str, values: tuple[float, ...]
+) -> np.ndarray:
+    if name not in scene.flexible():
+        known = suggestion(name, scene.flexible()) if scene.flexible() else "the scene has no flexible body"
+        raise InputError(f"[start.modal.{name}]", f"there is no flexible body '{name}'", known)
+    modes = bundles[name].sizes["mode"]
+    if len(values) > modes:
+        raise InputError(
+            f"[start.modal.{name}.{key}]",
+            f"{len(values)} numbers are given for the {modes} modes of '{name}'",
+            "give one per mode, in the order of the bundle; those left out at the end are zero",
+        )
+    return np.array([*values, *[0.0] * (modes - len(values))])

@@ -1,0 +1,13 @@
+"""Where a run may begin, other than where its scene puts the bodies. To add one: a module here, and its name in
+`Start.at`, core/scene/start.
+
+Each module has a function ``begin(scene, bundles, progress) -> Scene``: the scene with the poses, velocities and modal
+coordinates of that start in the place of what it says itself.
+"""
+
+from typing import get_args
+
+from pipeline.core.scene.start import At
+
+KIND = "start"
+NAMES = {name: f"{name}:begin" for name in get_args(At)}

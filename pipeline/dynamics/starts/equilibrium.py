@@ -1,0 +1,55 @@
+"""A run that begins at the static equilibrium of its scene, drives and given joint coordinates held."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray as xr
+
+from pipeline.core.progress import Progress
+from pipeline.core.scene.drives import JointDrive
+from pipeline.core.scene.laws import Constant
+from pipeline.core.scene.schema import Scene
+from pipeline.core.scene.start import JointStart, Start
+from pipeline.dynamics.linear.bench import state
+from pipeline.dynamics.linear.equilibrium import equilibrium
+from pipeline.dynamics.model.driving import joint_drives
+from pipeline.dynamics.model.start_table import given_coordinates
+from pipeline.dynamics.starts.snapshot import posed, resting
+
+
+def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Scene:
+    """The scene at its equilibrium; velocities stay as the scene gives them.
+
+    Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium near its poses.
+    """
+    bench, rest = equilibrium(_held(scene), bundles, progress, None, None, False)
+    progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
+    return resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time))
+
+
+def _held(scene: Scene) -> Scene:
+    """The scene with the joint coordinates whose position it gives held by drives, and nothing else of its start but
+    hints.
+    """
+    assert scene.start is not None
+    driven, holds = joint_drives(scene), dict[str, Any](scene.drive)
+    for start in given_coordinates(scene):
+        drives = driven.get(start.joint, ())
+        if start.position is not None and not (drives and drives[start.number]):
+            law = Constant(type="constant", value=start.position)
+            name = f"hold-{start.joint}-{start.coordinate.name}"
+            holds[name] = JointDrive(joint=start.joint, coordinate=start.coordinate.name, law=law)
+    hints = {
+        joint: {
+            name: _hint(one) for name, one in coordinates.items() if one.position is not None or one.near is not None
+        }
+        for joint, coordinates in scene.start.joint.items()
+    }
+    hinted = Start(joint={joint: coordinates for joint, coordinates in hints.items() if coordinates})
+    return scene.model_copy(update={"drive": holds, "start": hinted})
+
+
+def _hint(one: JointStart) -> JointStart:
+    return one.model_copy(update={"velocity": None})

@@ -1,0 +1,89 @@
+"""A scene whose bodies are as they are in a state of an engine, whatever joints or drives that engine has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.core.algebra import matrix_to_quaternion
+from pipeline.core.scene.clearance import Clearance
+from pipeline.core.scene.fields import Pose
+from pipeline.core.scene.parts import Ground
+from pipeline.core.scene.schema import Scene
+from pipeline.core.scene.start import JointStart, ModalStart, Start
+from pipeline.dynamics import memory as m
+from pipeline.dynamics.model.initial import centre_of
+from pipeline.dynamics.run.engine import Engine
+
+Vector = tuple[float, float, float]
+
+
+def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
+    """The scene with every body where it is in state y at time t, and deformed as there.
+
+    Velocities are those of the scene.  What the scene says of joints' positions and where to begin is left out.
+    """
+    engine.evaluate(y, t)
+    frames, model, bodies = engine.table(m.LINK_FRAMES), engine.model, dict[str, Any]()
+    for name, body in scene.body.items():
+        i = model.mechanism.link_of[name]
+        if isinstance(body, Ground):
+            bodies[name] = body
+            continue
+        place, frame = model.links[i].places[name], frames[i]
+        p = frame["origin"] + frame["axes"] @ place.p + model.mechanism.origin
+        quaternion = matrix_to_quaternion(frame["axes"] @ place.R)
+        pose = Pose(position=tuple(p.tolist()), quaternion=tuple(quaternion.tolist()))
+        bodies[name] = body.model_copy(update={"pose": pose})
+    given = scene.start.modal if scene.start is not None else {}
+    modal = {
+        name: ModalStart(coordinate=tuple(q), velocity=given[name].velocity if name in given else None)
+        for name, q in _modes(engine, y[: model.nq], model.numbering.modal_positions).items()
+    }
+    return scene.model_copy(update={"body": bodies, "start": _begun(scene, modal)})
+
+
+def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
+    """The same with the velocities of that state as well."""
+    still, model = posed(scene, engine, y, t), engine.model
+    frames, q, u, bodies = engine.table(m.LINK_FRAMES), y[: model.nq], y[model.speeds], dict(still.body)
+    for name, body in still.body.items():
+        if not isinstance(body, Ground):
+            twist = centre_of(model, name).motion(frames, q, u)
+            given = {"angular_velocity": tuple(twist[:3].tolist()), "velocity": tuple(twist[3:].tolist())}
+            bodies[name] = body.model_copy(update=given)
+    assert still.start is not None
+    rates = _modes(engine, u, model.numbering.modal_coordinates)
+    modal = {n: ModalStart(coordinate=s.coordinate, velocity=tuple(rates[n])) for n, s in still.start.modal.items()}
+    start = still.start.model_copy(update={"joint": {}, "modal": modal})
+    return still.model_copy(update={"body": bodies, "start": start})
+
+
+def resting(scene: Scene) -> Scene:
+    """The scene with its contacts at rest, where they are closed at the start."""
+    joints = {
+        name: joint.model_copy(update={"initial_approach_speed": 0.0})
+        if isinstance(joint, Clearance) and joint.initial_approach_speed is None
+        else joint
+        for name, joint in scene.joint.items()
+    }
+    return scene.model_copy(update={"joint": joints})
+
+
+def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
+    """Values of the modes of flexible bodies, by name."""
+    return {str(engine.model.links[i].flexible): values[mine].tolist() for i, mine in numbers.items()}
+
+
+def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
+    """The start without what the poses say now."""
+    old = scene.start if scene.start is not None else Start()
+    rates = {
+        joint: {
+            name: JointStart(velocity=one.velocity) for name, one in coordinates.items() if one.velocity is not None
+        }
+        for joint, coordinates in old.joint.items()
+    }
+    kept = {joint: coordinates for joint, coordinates in rates.items() if coordinates}
+    return old.model_copy(update={"at": None, "joint": kept, "modal": modal})

@@ -1,0 +1,165 @@
+"""Runs that begin by joint coordinate, by modes, at the equilibrium, or as their ideal twins: closed forms of each."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from pipeline import dynamics
+from pipeline.core.errors import InputError
+from pipeline.core.scene.load import load_scene
+from pipeline.core.scene.schema import Scene
+from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.test_assembly import loose
+from tests.properties.test_dynamics_start import angles
+
+G = 9.81
+CHECKS = TREE / "scenes" / "checks"
+
+
+def simulate(scene: Scene) -> xr.Dataset:
+    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+
+
+# A four-bar, by the rate of a coordinate -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name, k", [("j0", 0), ("j3", 2)])
+def test_the_rate_of_one_coordinate_sets_the_loop_in_motion(name: str, k: int) -> None:
+    crank, rate = 0.9, 3.0
+    step = 1e-4
+    # of the closed form, by central differences; its error is some 1e-8
+    shares = (np.array(angles(crank + step)) - np.array(angles(crank - step))) / (2.0 * step)
+    start = {"j0": {"position": crank}, "j3": {"near": 1.5}}
+    start[name] = start[name] | {"velocity": f"{rate * shares[k]} rad/s"}
+    table = loose(crank, joint=start)
+    del table["drive"]
+    run = simulate(Scene.model_validate(table))
+    found = run.angular_velocity.sel(body=["crank", "coupler", "rocker"]).values[0, :, 2]
+    assert found == pytest.approx(rate * shares, rel=1e-6)
+    assert float(run.joint_position.sel(coordinate="j0")[0]) == pytest.approx(crank, abs=1e-10)
+    assert "start_mended" not in run.attrs
+
+
+def test_rates_of_coordinates_that_contradict_each_other_are_refused() -> None:
+    table = loose(0.9, joint={"j0": {"position": 0.9, "velocity": 3.0}, "j3": {"near": 1.5, "velocity": 9.0}})
+    del table["drive"]
+    with pytest.raises(InputError, match=r"\[start.joint.j0.velocity\]: joints and drives do not allow the velocities"):
+        simulate(Scene.model_validate(table))
+
+
+# A cantilever, by its modes and at its equilibrium -------------------------------------------------------------------
+
+
+@cache
+def cantilever(**start: Any) -> xr.Dataset:
+    """The clamped rod of scenes/checks for 2 ms; its weight only where it begins at the equilibrium."""
+    weight = {} if "at" in start else {"load": {}}
+    table = start if "at" in start else {"modal": {"rod": start}}
+    return simulate(load_scene(CHECKS / "clamped_rod.toml", {**weight, "start": table, "time.end": "2 ms"}))
+
+
+def first_frequencies() -> np.ndarray:
+    """Of the rod's modes, clamped as they are made [rad/s]."""
+    scene = load_scene(CHECKS / "clamped_rod.toml")
+    return np.asarray(np.sqrt(np.diag(bundles(scene)["rod"]["modal_stiffness"].values)))
+
+
+def test_a_cantilever_let_go_in_a_mode_is_the_cosine_of_its_frequency() -> None:
+    size, omega = 1e-4, first_frequencies()
+    run = cantilever(coordinate=(size,))
+    q = run.modal_coordinate.values
+    # rtol 1e-10; the other modes are touched by terms of second order alone, of the size of q over the rod's
+    assert q[:, 0] == pytest.approx(size * np.cos(omega[0] * run.time.values), abs=1e-9 * size)
+    assert np.abs(q[:, 1:]).max() < 1e-7 * size
+
+
+def test_a_cantilever_struck_in_a_mode_is_the_sine_of_its_frequency() -> None:
+    size, omega = 1e-4, first_frequencies()
+    run = cantilever(velocity=(0.0, 0.0, size * omega[2]))
+    assert run.modal_coordinate.values[:, 2] == pytest.approx(
+        size * np.sin(omega[2] * run.time.values), abs=1e-7 * size
+    )
+
+
+def test_a_cantilever_that_begins_at_its_equilibrium_stays_there() -> None:
+    run = cantilever(at="equilibrium")
+    length, stiffness, line = 0.24, 7.17e10 * np.pi * 1e-8 / 4.0, 2740.0 * np.pi * 1e-4
+    sag = line * G * length**4 / (8.0 * stiffness)
+    tip = run.frame_position.sel(frame="rod.top", axis="z").values
+    # the static shapes carry loads at the ends; of a uniform one they and ten vibrations leave 1e-5
+    assert tip[0] == pytest.approx(-sag, rel=1e-4)
+    assert np.abs(tip - tip[0]).max() < 1e-7 * sag  # forces are in balance to 1e-12 of the weight
+
+
+# A pendulum of a beam, held at an angle ------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_beam_held_at_an_angle_sags_and_is_let_go_from_there() -> None:
+    length, side, density, modulus = 0.3, 8e-3, 7870.0, 200e9
+    line, stiffness, angle = density * side**2, modulus * side**4 / 12.0, 0.5
+    table = {
+        "title": "pendulum of a beam",
+        "time": {"end": 1e-3},
+        "output": {"interval": 5e-5},
+        "load": {"weight": {"type": "gravity", "acceleration": [0.0, -G, 0.0]}},
+        "body": {
+            "ground": {"type": "ground", "frames": {"hook": {}}},
+            "rod": {
+                "type": "flexible",
+                "mesh": str(TREE / "meshes" / "checks" / "crank_rod.toml"),
+                "modes": {"reference": "craig-bampton", "count": 14, "interfaces": ["crank", "slider"]},
+            },
+        },
+        "joint": {"pin": {"type": "revolute", "between": ["ground.hook", "rod.crank"]}},
+        "start": {"at": "equilibrium", "joint": {"pin": {"position": angle}}},
+    }
+    run = simulate(Scene.model_validate(table))
+    assert float(run.joint_position[0, 0]) == pytest.approx(angle, abs=1e-13)  # it is held there
+    assert float(run.joint_velocity[0, 0]) == 0.0
+    tip = run.frame_position.sel(frame="rod.slider").values[0]
+    across = np.array([-np.sin(angle), np.cos(angle), 0.0])
+    sag = line * G * np.cos(angle) * length**4 / (8.0 * stiffness)
+    # modes beyond the fourteenth hold 1e-5 of it at most
+    assert across @ tip == pytest.approx(-sag, rel=1e-4)
+    # let go, it keeps its energy: the default tolerance is 1e-10
+    assert np.abs(run.energy_error.values).max() < 1e-9 * line * length * G * length
+
+
+# Clearance as without ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_loose_pin_begins_at_rest_in_its_socket_as_the_ideal_joint_presses_it() -> None:
+    """The bar lets go from the horizontal with the force of the ideal hinge, and goes on with it."""
+    changes = {"time.end": "2 ms", "output.interval": "0.1 ms"}
+    loose_one = simulate(load_scene(CHECKS / "clearance_pendulum.toml", {**changes, "start.at": "ideal"}))
+    mass, along, across = 1.0, 0.3, 0.002
+    about = 2e-2 + mass * (along**2 + across**2)  # [kg m^2] about the hinge, y of the bar
+    alpha = mass * G * along / about
+    force = mass * np.array([alpha * across, G - alpha * along])  # along the bar and upwards, on the bar
+    first = loose_one.isel(time=0)
+    # the offset of 0.1 mm moves the hinge, by 3e-4 of the arm
+    assert float(first.contact_normal_force[0]) == pytest.approx(np.linalg.norm(force), rel=1e-2)
+    offset = first.contact_offset.values[0]
+    assert np.linalg.norm(offset) - 1e-4 == pytest.approx(float(first.contact_penetration[0]), rel=1e-6)
+    forces = loose_one.contact_normal_force.values[:, 0]
+    assert forces.max() < 1.2 * forces[0]  # nothing is hit
+    assert forces.min() > 0.8 * forces[0]
+    kinds = [loose_one.event_kind.attrs["flag_meanings"].split()[k] for k in loose_one.event_kind.values]
+    assert kinds[0] == "closing"  # which the start already has
+    assert float(loose_one.event_approach_speed[0]) == 0.0
+    assert {"opening", "closing"} & set(kinds[1:]) == set()
+
+
+@pytest.mark.slow
+def test_a_bar_on_a_loose_pin_that_begins_at_its_equilibrium_hangs_there() -> None:
+    changes: dict[str, object] = {"time.end": "2 ms", "output.interval": "0.1 ms", "start.at": "equilibrium"}
+    run = simulate(load_scene(CHECKS / "clearance_pendulum.toml", changes))
+    assert run.contact_normal_force.values[:, 0] == pytest.approx(1.0 * G, rel=1e-6)
+    assert np.abs(run.velocity.values).max() < 1e-8

@@ -1,0 +1,84 @@
+"""Layouts identified from Table 8: the closed form, the kinematics behind it, and the scenes made of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.geometry import identify, kinematics, scenes
+from benchmarks.geometry.identify import DANGLE, DZ
+from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
+from pipeline.post.paper import TABLE8
+
+TREE = Path(__file__).resolve().parents[2]
+TAKEN = (0.07, 0.15, 0.35)
+
+
+def lengths(layout: Layout, z: float, angle: float) -> np.ndarray:
+    """Lengths of the legs in a pose, from the places of their ends alone."""
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return np.linalg.norm(layout.A @ turn.T + [0.0, 0.0, z] - layout.B, axis=1)
+
+
+def test_poses_have_the_lengths_of_the_legs() -> None:
+    layout, extensions = identify.fitted(*TAKEN), np.linspace(0.0, 0.06, 7)
+    for extension, z, angle in zip(extensions, *poses(layout, extensions), strict=True):
+        wanted = layout.leg + np.array([extension, extension, 0.0, 0.0])
+        assert lengths(layout, z, angle) == pytest.approx(wanted, abs=1e-13)  # rounding of lengths below 0.5 m
+
+
+def test_the_answer_to_leg_1_is_that_of_finite_changes() -> None:
+    """A change of legs 1 and 2 by halves is the symmetric part of one of leg 1: strokes 2 um apart."""
+    layout, step = identify.fitted(*TAKEN), 1e-6
+    for extension in (0.0, 0.03, 0.06):
+        (below, above), angles = poses(layout, extension + np.array([-step, step]))
+        z, angle = poses(layout, np.array([extension]))
+        move = np.linalg.solve(jacobians(layout, z, angle)[0], [1.0, 0.0, 0.0, 0.0])
+        # central differences: error step^2 / leg^2, and rounding over the step
+        assert move[0] == pytest.approx((above - below) / (4.0 * step), rel=1e-7)
+        assert move[2] == pytest.approx(np.diff(angles)[0] / (4.0 * step), rel=1e-7)
+
+
+def test_fitted_layouts_have_table_8_s_sensitivities() -> None:
+    for numbers in (TAKEN, (0.04, 0.3, 0.24), (0.06, 0.06, 0.36)):
+        told = answer(identify.fitted(*numbers))
+        assert told.dz * identify.CLEARANCE == pytest.approx(1e-3 * TABLE8.displacement, rel=1e-9)
+        assert told.dangle * identify.CLEARANCE == pytest.approx(TABLE8.angle, rel=1e-9)
+
+
+def test_other_layouts_do_not() -> None:
+    first = answer(Layout(0.086603, 0.05, 0.1, 0.173205, 0.35))
+    assert abs(first.dz / DZ - 1.0) > 0.3
+    assert abs(first.dangle / DANGLE - 1.0) < 0.05
+
+
+def test_crossing_legs_have_no_room() -> None:
+    a, b = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]])
+    up = np.array([[0.0, 0.0, 1.0]])
+    below, above = np.array([[0.5, 0.3, -1.0]]), np.array([[0.5, 0.3, 1.0]])
+    assert kinematics._apart(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
+    aside = np.array([[0.4, 0.0, 0.0]])
+    assert kinematics._apart(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
+
+
+def _ends() -> float:
+    """Least distance of the end (1, 0, 0) to the segment from (1.4, 0, 0.5) to (1, 0, 1), by its formula."""
+    p, c, d = np.array([1.0, 0.0, 0.0]), np.array([1.4, 0.0, 0.5]), np.array([1.0, 0.0, 1.0])
+    t = np.clip((p - c) @ (d - c) / ((d - c) @ (d - c)), 0.0, 1.0)
+    return float(np.linalg.norm(p - c - t * (d - c)))
+
+
+def test_the_scene_is_that_of_the_layout_that_the_log_takes() -> None:
+    records = [json.loads(line) for line in (TREE / "benchmarks" / "log" / "geometry.jsonl").read_text().splitlines()]
+    taken = [r for r in records if r.get("case") == "members"][-1]
+    layout = identify.fitted(taken["ay"], taken["bx"], taken["by"])
+    assert layout.height == pytest.approx(taken["height"], abs=1e-12)
+    text = (TREE / "scenes" / "sps4" / "variants" / "identified.toml").read_text()
+    assert text == scenes.file_text(layout)
+    for name in ("far_cb", "far_csj_free", "far_csj_fixed", "far_csj_cb"):
+        flexible = (TREE / "scenes" / "sps4" / "variants" / f"identified_{name}.toml").read_text()
+        assert f"pose = {scenes.flexible_pose(layout)}" in flexible
