@@ -315,6 +315,7 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, caps
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")  # of a library that is not ours, in whatever version there is
 def test_a_cluster_gives_the_same_bytes(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     distributed = pytest.importorskip("distributed")
     found = []
