@@ -15,6 +15,7 @@ from pipeline.core.scene.drives import PathDrive
 from pipeline.core.scene.kept import Kept, parse_kept
 from pipeline.core.scene.load import edited, with_numbers
 from pipeline.core.workflow.task import Task, facts, key
+from pipeline.core.workflow.workers import without_main
 from stages import s4_simulate
 from stages.graph import Graph
 from stages.run import Workplace, check
@@ -199,12 +200,13 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
     points = wanted.design.points()
     groups = _groups(wanted.scene, points)
     graphs = {text: Graph(edited(wanted.scene, first), shown=False) for text, first in groups.items()}
-    outcome = place.bring([task for graph in graphs.values() for task in graph.bundle.values()])
+    with without_main():
+        outcome = place.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
     modules = _modules(wanted)
     families = {}
     for text, graph in graphs.items():
-        records = {body: outcome.records[id(task)] for body, task in graph.bundle.items()}
+        records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
         simulate = s4_simulate.params(graph.scene)
         task = Task(
             stage="sweep",
@@ -219,21 +221,24 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
             folder="",
             modules=modules,
         )
-        found = facts(task, {f"bundle/{body}": record.digest for body, record in records.items()}, place.sources)
-        bundles = {body: place.store.load(record) for body, record in records.items()}
+        found = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
+        inputs = {name: place.store.load(record) for name, record in records.items()}
         keep = tuple(one.name for one in wanted.kept)
-        work = Work(key(found), simulate, bundles, keep, wanted.sweep.members or 0, wanted.sweep.error)
+        work = Work(key(found), simulate, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
         families[text] = Family(work, found)
     jobs = []
     for point in points:
-        family = families[_group(wanted.scene, point)[0]].key
-        jobs.append(Job(_point_key(family, point), family, point))
+        text, own = _group(wanted.scene, point)
+        family = families[text].key
+        # what decides the bodies is in the family's scene, whose bodies are numbers by now
+        rest = {name: value for name, value in point.items() if name not in own}
+        jobs.append(Job(_point_key(family, point), family, rest))
     return replace(wanted, families=tuple(families.values()), jobs=tuple(jobs))
 
 
 def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
-    """Those values of a point that decide its flexible bodies, and their text."""
-    bodies = tuple(f"body.{name}." for name in scene.flexible())
+    """Those values of a point that decide the bodies which recipes describe, and their text."""
+    bodies = tuple(f"body.{name}." for name in scene.recipes())
     mine = {place: value for place, value in point.items() if place.startswith(bodies)} if bodies else {}
     return json.dumps(mine, sort_keys=True, default=str), mine
 

@@ -21,13 +21,13 @@ RUNNERS = 8
 class Family:
     """Points that share a scene and its flexible bodies.
 
-    simulate: the scene, as of the simulate stage.  bundles: reduced flexible bodies by name.  keep: names of what is
+    simulate: the scene, as of the simulate stage.  inputs: those of that stage by name.  keep: names of what is
     kept.  members: of each point, 0 for the scene's own start.  error: whether errors are estimated.
     """
 
     key: str
     simulate: Mapping[str, Any]
-    bundles: Mapping[str, xr.Dataset]
+    inputs: Mapping[str, xr.Dataset]
     keep: tuple[str, ...]
     members: int
     error: bool
@@ -40,12 +40,12 @@ def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
 
     from pipeline.core.scene.kept import parse_kept
     from pipeline.dynamics.record.point import Runner
-    from stages.s4_simulate import rebuild
+    from stages.s4_simulate import bundles, rebuild
 
     family: Family = pickle.loads(packed)
-    scene = rebuild(family.simulate)
+    scene = rebuild(family.simulate, family.inputs)
     kept = [parse_kept(name, scene.owners()) for name in family.keep]
-    return scene, Runner(family.bundles, kept, family.members, family.error)
+    return scene, Runner(bundles(family.inputs), kept, family.members, family.error)
 
 
 def work(key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool) -> tuple[list[Point], float]:
