@@ -33,6 +33,5 @@ METHOD = Method(
     dense=hermite.ROWS,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,
-    gap=0.25,
     stability=2.512,  # where its stability polynomial 1 + z + z^2/2 + z^3/6 is -1
 )
