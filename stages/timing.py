@@ -101,7 +101,7 @@ def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool)
         dynamics.simulate(_edited(scene, {"time.end": _share(scene, WARM)}), bundles, silent)
         return dynamics.cost(scene, bundles, silent, checked=checked), ""
     except SolverError as error:
-        return None, str(error)
+        return None, str(error).partition(";")[0]  # what else is to be doubted of such a run is of no use here
 
 
 def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[float, Cost]:
