@@ -97,13 +97,14 @@ def where(measured: Mapping[str, list[Session]]) -> str:
                 if len(sessions) == 1
                 else f"{name} ({', '.join(dict.fromkeys(r['case'] for r in session.records))})"
             )
-            told.setdefault(_session(session), []).append(part)
+            told.setdefault(session_words(session), []).append(part)
     if len(told) == 1:
         return f"Measured {next(iter(told))}."
     return "Measured:\n\n" + "\n".join(f"- {', '.join(parts)}: {session}" for session, parts in told.items())
 
 
-def _session(session: Session) -> str:
+def session_words(session: Session) -> str:
+    """When, on what machine and with what versions a session measured."""
     versions = "".join(f", {name} {number}" for name, number in session.versions.items())
     machine = f"{session.measured} on {session.cpu or 'a machine that nobody noted'}{versions}"
     return f"{machine} ({session.note})" if session.note else machine

@@ -16,6 +16,7 @@ from pipeline.core.artifacts.store import write_dataset
 from pipeline.core.errors import InputError
 from pipeline.core.progress import silent
 from pipeline.core.scene.parts import FlexibleBody, Modes
+from pipeline.core.workflow import opened
 from pipeline.structure.fe.exchange import files
 from pipeline.structure.kinds.kind import of_mesh
 from stages import s1_mesh, s2_modes, s3_bundle
@@ -62,12 +63,15 @@ def test_files_of_a_recipe_count_by_their_content(tmp_path: Path) -> None:
         '[shape]\ntype = "matrices"\nunits = "m-kg-s"\nfile = "body.npz"\n[frames]\nfoot = { nodes = [1, 2, 3] }\n'
     )
     params = s1_mesh.params(recipe)
-    again = stored(s1_mesh.run(params, {}, silent)["nc"], tmp_path / "mesh.nc")
+    with opened.watched(tmp_path) as read:
+        made = s1_mesh.run({**params, "folder": str(tmp_path)}, {}, silent)["nc"]
+    again = stored(made, tmp_path / "mesh.nc")
     assert of_mesh(again).assemble(again).size == 36
     assert s1_mesh.params(recipe) == params
+    assert opened.digests(["body.npz"], tmp_path) == {"body.npz": read["body.npz"]}
     with (tmp_path / "body.npz").open("ab") as file:
         file.write(b"\0")
-    assert s1_mesh.params(recipe) != params
+    assert opened.digests(["body.npz"], tmp_path) != {"body.npz": read["body.npz"]}
     (tmp_path / "body.npz").unlink()
     with pytest.raises(InputError, match=r"there is no file .*body\.npz"):
         s1_mesh.params(recipe)
@@ -106,7 +110,7 @@ def test_one_choice_says_how_many_modes(choice: dict[str, Any], value: object) -
 
 
 @pytest.mark.parametrize(
-    "choice", [{}, {"count": 7, "mass": 0.9}, {"count": 0}, {"up_to": "5 mm"}, {"compliance": 1.1}]
+    "choice", [{}, {"count": 7, "mass": 0.9}, {"count": -1}, {"up_to": "5 mm"}, {"compliance": 1.1}]
 )
 def test_two_choices_or_none_are_refused(choice: dict[str, Any]) -> None:
     with pytest.raises(ValidationError):

@@ -40,10 +40,13 @@ def test_time_is_measured_alone_and_over_all_scenes_of_a_folder():
 
 def test_what_only_the_timing_runs_on_is_compiled_beside_other_tasks_and_once_for_each_topology():
     ahead = [task for name, task in Scenes().timing("sps4").inputs.items() if name.startswith("kernels/")]
-    # rigid or flexible, with or without clearance
-    assert len(ahead) == 4
+    # rigid or flexible, with or without clearance, by the paper's method and by a damped one
+    assert len(ahead) == 4 * 2
     assert not any(task.exclusive for task in ahead)
-    assert {task.params["simulate"]["scene"]["solver"]["integrator"] for task in ahead} == {"adams-bashforth-moulton"}
+    assert {task.params["simulate"]["scene"]["solver"]["integrator"] for task in ahead} == {
+        "adams-bashforth-moulton",
+        "radau",
+    }
 
 
 @pytest.mark.parametrize(

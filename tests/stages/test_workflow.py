@@ -209,9 +209,10 @@ def test_out_copies_the_run(project: Project):
     assert project.run("run", "tiny/ideal", "tiny/contact", "--out", "mine.nc").returncode == 2
 
 
-def test_progress_goes_to_stderr_only(project: Project):
+def test_progress_goes_to_stderr_and_what_was_written_to_stdout(project: Project):
     done = project.run("run", "tiny/ideal")
-    assert done.stdout == ""
+    told = "run.nc (the run), post.nc (derived from it)"
+    assert done.stdout == f"{project.results.relative_to(project.folder)}/runs/tiny/ideal: {told}\n"
     assert "flexclear: [0/2] tiny/ideal: simulate" in done.stderr.splitlines()
     json.loads(project.run("schema").stdout)
 
