@@ -97,7 +97,7 @@ normal = { law = "lankarani-nikravesh", restitution = 0.9, stiffness = 1e11 }
 """
 
 
-def _interruptible() -> None:
+def interruptible() -> None:
     """Tests that a shell put into the background ignore Ctrl-C, and so would what they start."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
@@ -126,7 +126,7 @@ class Project:
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            preexec_fn=_interruptible,
+            preexec_fn=interruptible,
         )
         self.started.append(process)
         return process

@@ -28,6 +28,7 @@ from pipeline.post.sweep import figures
 from stages import run, sweep, sweep_engine, sweep_plan
 from stages.__main__ import main
 from stages.s4_simulate import modules
+from tests.stages.conftest import interruptible
 
 GRAVITY = 9.81
 #: a process that is silent for so long hangs, however busy the machine is [s]
@@ -73,7 +74,13 @@ def flexclear(*arguments: str, cwd: Path, results: Path) -> subprocess.Popen[str
     environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd)}
     command = [sys.executable, "-m", "stages", *arguments]
     return subprocess.Popen(
-        command, cwd=cwd, env=environment, text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        command,
+        cwd=cwd,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        preexec_fn=interruptible,
     )
 
 
