@@ -64,6 +64,7 @@ class Verdict:
     return_distance: float
     contraction: float
     few_lines: float
+    principal: np.ndarray  #: states along their directions of largest variance, shape (n, components)
 
 
 def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) -> Verdict:
@@ -83,7 +84,7 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     if len(states) < ENOUGH and kind != "periodic":
         kind, reasons = "undecided", (f"{len(states)} sections are too few, {ENOUGH} are needed", *reasons)
     return Verdict(
-        kind, reasons, rate, least, zero_one, after, distance, chaos.contraction(states, after or 1), discrete
+        kind, reasons, rate, least, zero_one, after, distance, chaos.contraction(states, after or 1), discrete, shown
     )
 
 
@@ -110,7 +111,7 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
     states, size = features(sections)
     period = float(sections.attrs["period"])
     verdict = judge(states, sections.growth.values, period, size)
-    shown = chaos.principal(states)
+    shown = verdict.principal
     lines = [chaos.spectrum(component) for component in shown.T]
     scalars = {
         "exponent": verdict.exponent.mean,

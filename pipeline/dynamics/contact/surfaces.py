@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from pipeline.core.scene.clearance import BallOnPlane as OnPlane
 from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
+
+#: joints whose surfaces meet along a line
+Pin = ClearanceRevolute | ClearanceSlot
 
 
 def compliance(joint: Clearance) -> float:
@@ -61,6 +65,27 @@ class BallInSocket:
         return math.sqrt(relative_radius(joint) * depth)
 
 
+def _of_pin(joint: Pin, exponent: float, of_spheres: Callable[[Pin], float]) -> float:
+    """Stiffness of a pin: given, of parallel cylinders, or `of_spheres`; ValueError where nothing is published."""
+    if joint.normal.stiffness is not None:
+        return joint.normal.stiffness
+    if exponent == 1.0:
+        return joint.length / (4.0 * compliance(joint))
+    if exponent == 1.5:
+        return of_spheres(joint)
+    raise ValueError(
+        f"radii and materials give the stiffness of the exponents 1 and 1.5, not of {exponent:g}; "
+        f"give normal.stiffness [N/m^{exponent:g}]"
+    )
+
+
+def _half_width(joint: Pin, radius: float, depth: float, force: float) -> float:
+    """Half-width of a pin's contact [m]; radius: relative one of the surfaces [m]."""
+    if None in joint.materials:
+        return math.sqrt(radius * depth)
+    return math.sqrt(4.0 * force * radius * compliance(joint) / joint.length)
+
+
 class PinInJournal:
     r"""Pin in a journal of parallel axis.
 
@@ -74,16 +99,7 @@ class PinInJournal:
     @staticmethod
     def stiffness(joint: ClearanceRevolute, exponent: float) -> float:
         """K [N/m^exponent], given or as above; ValueError where nothing is published."""
-        if joint.normal.stiffness is not None:
-            return joint.normal.stiffness
-        if exponent == 1.0:
-            return joint.length / (4.0 * compliance(joint))
-        if exponent == 1.5:
-            return sphere_stiffness(joint)
-        raise ValueError(
-            f"radii and materials give the stiffness of the exponents 1 and 1.5, not of {exponent:g}; "
-            f"give normal.stiffness [N/m^{exponent:g}]"
-        )
+        return _of_pin(joint, exponent, sphere_stiffness)
 
     @staticmethod
     def contact_size(joint: ClearanceRevolute, depth: float, force: float) -> float:
@@ -91,9 +107,7 @@ class PinInJournal:
 
         Without materials: sqrt(R d), the width that a parabolic gap would leave.
         """
-        if None in joint.materials:
-            return math.sqrt(relative_radius(joint) * depth)
-        return math.sqrt(4.0 * force * relative_radius(joint) * compliance(joint) / joint.length)
+        return _half_width(joint, relative_radius(joint), depth, force)
 
 
 class PinInSlot:
@@ -106,16 +120,7 @@ class PinInSlot:
     @staticmethod
     def stiffness(joint: ClearanceSlot, exponent: float) -> float:
         """K [N/m^exponent], given or as above; ValueError where nothing is published."""
-        if joint.normal.stiffness is not None:
-            return joint.normal.stiffness
-        if exponent == 1.0:
-            return joint.length / (4.0 * compliance(joint))
-        if exponent == 1.5:
-            return plane_stiffness(joint)
-        raise ValueError(
-            f"radii and materials give the stiffness of the exponents 1 and 1.5, not of {exponent:g}; "
-            f"give normal.stiffness [N/m^{exponent:g}]"
-        )
+        return _of_pin(joint, exponent, plane_stiffness)
 
     @staticmethod
     def contact_size(joint: ClearanceSlot, depth: float, force: float) -> float:
@@ -123,9 +128,7 @@ class PinInSlot:
 
         Without materials: sqrt(R d), the width that a parabolic gap would leave.
         """
-        if None in joint.materials:
-            return math.sqrt(joint.radius * depth)
-        return math.sqrt(4.0 * force * joint.radius * compliance(joint) / joint.length)
+        return _half_width(joint, joint.radius, depth, force)
 
 
 class BallOnPlane:
