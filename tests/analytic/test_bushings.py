@@ -33,6 +33,7 @@ def test_a_block_on_a_bushing_moves_as_the_linear_equations_say() -> None:
     assert dataset.bushing_displacement.values[:, 0, :2] == pytest.approx(known[:, :2], abs=1e-9)
     assert dataset.bushing_rotation.values[:, 0, 2] == pytest.approx(known[:, 2], abs=1e-8)
     force = -(known[:, :3] @ K + known[:, 3:] @ C)
+    # forces err by stiffness and damping times what positions and rates err by: 1e-8 of the largest, ten times and more
     assert dataset.load_force.values[:, 0, :2] == pytest.approx(force[:, :2], abs=1e-6 * np.abs(force).max())
     assert dataset.load_moment.values[:, 0, 2] == pytest.approx(force[:, 2], abs=1e-6 * np.abs(force).max())
     stored = 0.5 * np.einsum("ti,ij,tj->t", known[:, :3], K, known[:, :3])
