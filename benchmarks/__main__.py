@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 # first of all: it pins BLAS to one thread, which NumPy reads when it is imported
-import pipeline  # noqa: F401  isort: skip
+from flexclear import pipeline  # noqa: F401  isort: skip
 
 import argparse
 import os
@@ -16,11 +16,11 @@ from pathlib import Path
 
 from benchmarks import families, log, page
 from benchmarks.family import WRONG, Case, Family, Record
-from pipeline.core.errors import FlexclearError, InputError
-from pipeline.core.registry import suggestion
-from pipeline.core.workflow.progress import Monitor, duration
-from pipeline.post.plotting.table import pipe_table
-from stages.__main__ import INTERRUPTED
+from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.workflow.progress import Monitor, duration
+from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.stages.__main__ import INTERRUPTED
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -10,12 +10,12 @@ import xarray as xr
 
 from benchmarks.mechanisms import Mechanism
 from benchmarks.timing import once
-from pipeline import dynamics
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import edited
-from pipeline.dynamics.run.run import observed
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.dynamics.run.run import observed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 #: two codes are compared at multiples of this [s]
 SAMPLING = 1e-3

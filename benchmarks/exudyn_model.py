@@ -22,11 +22,19 @@ from numpy.polynomial.polynomial import polyder
 from benchmarks.errors import SAMPLING, Samples
 from benchmarks.mechanisms import Mechanism, joint_laws
 from benchmarks.timing import once
-from pipeline.core.scene.clearance import ClearanceSpherical
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.contact.surfaces import BallInSocket
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.model.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
+from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.contact.surfaces import BallInSocket
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.model.merge import (
+    Frame,
+    Group,
+    Placement,
+    frames_of,
+    merge,
+    rigid_inertia,
+    start_places,
+)
 
 EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
 #: axes with x along the old z: Exudyn's prismatic joint slides along x

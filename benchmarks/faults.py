@@ -18,10 +18,10 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from pipeline.core.artifacts import upkeep
-from pipeline.core.artifacts.disk import read_checked
-from pipeline.core.artifacts.store import Store, read_record
-from pipeline.dynamics.compile.files import compiled
+from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts.disk import read_checked
+from flexclear.pipeline.core.artifacts.store import Store, read_record
+from flexclear.pipeline.dynamics.compile.files import compiled
 
 SCENE = "checks/pendulum"
 #: by which share of a whole run a command is killed
@@ -51,7 +51,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(environment: dict[str, str]) -> float:
     """Bring the scene up to date; how long that took [s]."""
     begun = time.monotonic()
-    subprocess.run([sys.executable, "-m", "stages", "run", SCENE], env=environment, check=True, capture_output=True)
+    subprocess.run([sys.executable, "-m", "flexclear", "run", SCENE], env=environment, check=True, capture_output=True)
     return time.monotonic() - begun
 
 
@@ -109,7 +109,7 @@ def _kills(folder: Path, environment: dict[str, str], rng: random.Random, count:
     for k in range(count):
         here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/killed{k}"}
         process = subprocess.Popen(
-            [sys.executable, "-m", "stages", "run", SCENE],
+            [sys.executable, "-m", "flexclear", "run", SCENE],
             env=here,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -20,9 +20,17 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.mechanisms import joint_laws
-from pipeline.core.algebra import skew
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.merge import Frame, Group, Placement, frames_of, merge, rigid_inertia, start_places
+from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.merge import (
+    Frame,
+    Group,
+    Placement,
+    frames_of,
+    merge,
+    rigid_inertia,
+    start_places,
+)
 
 #: rows of a joint: directions of relative translation and of relative rotation that it stops, axes of its first frame
 ROWS = {

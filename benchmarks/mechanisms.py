@@ -9,19 +9,19 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.timing import once
-from pipeline.core.progress import silent
-from pipeline.core.scene.clearance import ClearanceSpherical
-from pipeline.core.scene.drives import JointDrive
-from pipeline.core.scene.load import edited, load_scene
-from pipeline.core.scene.parts import IdealJoint
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.run import engine_of, observed
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import Trajectory, integrate
-from stages.run import bundles, find_scene
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
+from flexclear.pipeline.core.scene.drives import JointDrive
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.parts import IdealJoint
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.run import engine_of, observed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.stages.run import bundles, find_scene
 
 #: the scenes of the paper, from the least to the fullest
 SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")

@@ -17,10 +17,10 @@ from typing import Any
 from benchmarks import families, log
 from benchmarks.family import Family, Record
 from benchmarks.log import Session
-from pipeline.core.errors import InputError
-from pipeline.core.registry import lookup
-from pipeline.core.workflow.fingerprint import TREE
-from pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 DOCS = TREE / "docs"
 #: of a table: heading, and the cell of a record

@@ -1,6 +1,10 @@
-"""flexclear from Python: ``import flexclear as fc``."""
+"""flexclear from Python: ``import flexclear as fc``.
 
-from pipeline import (
+``flexclear.pipeline`` and ``flexclear.stages`` are the folders of these names at the top of the repository: links in
+a checkout, plain folders where flexclear is installed.
+"""
+
+from flexclear.pipeline import (
     compare,
     cost,
     edited,
@@ -12,6 +16,7 @@ from pipeline import (
     report,
     run,
     sections,
+    sweep,
 )
 
 __all__ = [
@@ -27,11 +32,12 @@ __all__ = [
     "report",
     "run",
     "sections",
+    "sweep",
 ]
 
 
 def __getattr__(name: str) -> object:
     """`Scene` and the version, which are found when they are asked for."""
-    import pipeline
+    from flexclear import pipeline
 
     return getattr(pipeline, name)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
 # One thread in BLAS and OpenMP, before NumPy is loaded: the matrices are small, and sums whose
 # order depends on the number of cores would break the promise of equal bytes for equal inputs.
@@ -47,9 +47,9 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """`Scene`, imported when it is asked for, and the version."""
     if name == "Scene":
-        return import_module("pipeline.core.scene.schema").Scene
+        return import_module("flexclear.pipeline.core.scene.schema").Scene
     if name == "__version__":
-        from pipeline.core.version import version
+        from flexclear.pipeline.core.version import version
 
         return version()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -61,8 +61,8 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
     override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
     """
-    from pipeline.core.scene.load import load_scene as load
-    from pipeline.core.scene.load import scene_of
+    from flexclear.pipeline.core.scene.load import load_scene as load
+    from flexclear.pipeline.core.scene.load import scene_of
 
     return scene_of(source, override) if isinstance(source, Mapping) else load(source, override)
 
@@ -72,7 +72,7 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
 
     Raises InputError.
     """
-    from pipeline.core.scene.load import edited as changed
+    from flexclear.pipeline.core.scene.load import edited as changed
 
     return changed(scene, changes)
 
@@ -214,4 +214,4 @@ def _loaded(scene: Scene | str | Path) -> Scene:
 def _stages(name: str) -> Any:
     """A module of the stages. They stand above this package and may import it, not the other way round: this is the
     one door upwards, and it opens at a call, when everything is loaded."""
-    return import_module(f"stages.{name}")
+    return import_module(f"flexclear.stages.{name}")

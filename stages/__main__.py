@@ -10,7 +10,7 @@ import os
 import sys
 from importlib import import_module
 
-from pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.errors import FlexclearError
 
 INTERRUPTED = 130
 CLOSED_PIPE = 141
@@ -57,7 +57,7 @@ class Version(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print it and end."""
-        from pipeline.core.version import version
+        from flexclear.pipeline.core.version import version
 
         print(f"flexclear {version()}")
         parser.exit()
@@ -71,7 +71,7 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
     for verb, text in COMMANDS.items():
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if verb in arguments[:1]:
-            module = import_module(f"stages.{verb}")
+            module = import_module(f"flexclear.stages.{verb}")
             module.arguments(below)
             below.set_defaults(command=module.command)
     return top

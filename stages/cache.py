@@ -5,10 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pipeline.core.artifacts import upkeep
-from pipeline.core.artifacts.paths import kernel_root
-from pipeline.core.errors import InputError, ResourceError
-from stages import run
+from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.errors import InputError, ResourceError
+from flexclear.stages import run
 
 ACTIONS = {
     "size": "how much is kept, by stage",
@@ -66,7 +66,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _kernel_whole(path: Path) -> bool:
-    from pipeline.dynamics.compile.files import compiled
+    from flexclear.pipeline.dynamics.compile.files import compiled
 
     return compiled(path)
 
@@ -107,7 +107,7 @@ def _prune(options: argparse.Namespace) -> None:
 
 
 def _prune_kernels() -> int:
-    from pipeline.dynamics.compile.folder import prune
+    from flexclear.pipeline.dynamics.compile.folder import prune
 
     return sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
 

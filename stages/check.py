@@ -10,15 +10,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.errors import InputError, InputErrors
-from pipeline.core.scene import lines
-from pipeline.core.scene.load import compose, load_scene
-from pipeline.core.scene.references import dangling
-from stages import run, s1_mesh
-from stages.graph import Graph
+from flexclear.pipeline.core.errors import InputError, InputErrors
+from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.scene.load import compose, load_scene
+from flexclear.pipeline.core.scene.references import dangling
+from flexclear.stages import run, s1_mesh
+from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,19 +76,19 @@ def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
 
 def _recipe(path: Path) -> None:
     """Read a mesh recipe; of a beam, the nodes at which frames and masses have to lie are laid out, too."""
-    from pipeline.structure.fe.recipe import read_recipe
+    from flexclear.pipeline.structure.fe.recipe import read_recipe
 
     table = read_recipe(path)
     if s1_mesh.kind_of(path) == "beam":
-        from pipeline.structure.fe import mesh
+        from flexclear.pipeline.structure.fe import mesh
 
         mesh.build(table, place=str(path))
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
     """A check for each prescribed coordinate: whether there is such a one, and its values fit."""
-    from pipeline.dynamics.model.driving import prescribed
-    from pipeline.dynamics.model.laws import checked_law
+    from flexclear.pipeline.dynamics.model.driving import prescribed
+    from flexclear.pipeline.dynamics.model.laws import checked_law
 
     for name, drive in scene.drive.items():
         if getattr(drive, "joint", None) in (None, *scene.joint):
@@ -103,8 +103,8 @@ def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
 
 def _assembled(scene: Scene) -> None:
     """Build the mechanism of a scene of rigid bodies: poses, axes and loads are then checked against the joints."""
-    from pipeline.dynamics.model.mechanism import build
-    from pipeline.dynamics.model.model import tabulate
+    from flexclear.pipeline.dynamics.model.mechanism import build
+    from flexclear.pipeline.dynamics.model.model import tabulate
 
     tabulate(build(scene, {}))
 

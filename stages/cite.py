@@ -7,10 +7,10 @@ import ast
 import re
 from collections.abc import Iterator
 
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import in_order
-from stages import run
-from stages.graph import Graph
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.stages import run
+from flexclear.stages.graph import Graph
 
 #: a paragraph that starts like this names where a method is from
 SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)

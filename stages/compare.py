@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.core.artifacts.store import Record, publish
-from pipeline.core.errors import InputError
-from pipeline.core.scene.ideal import EFFECTS, ideal, loose
-from pipeline.core.workflow.task import Task
-from stages import run
-from stages.graph import Graph
-from stages.run import Workplace, check
+from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import run
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import Workplace, check
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
-    from pipeline.post.overview.page import Part
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.overview.page import Part
 
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
@@ -120,15 +120,15 @@ def twins(scene: Scene, without: str) -> list[Scene]:
 
 def page(found: Comparison, title: str) -> bytes:
     """The page of a comparison, all pictures inside."""
-    from pipeline.post.overview.page import page as written
+    from flexclear.pipeline.post.overview.page import page as written
 
     return written(f"Compared: {title}", "The first run is the reference.", parts(found))
 
 
 def parts(found: Comparison) -> list[Part]:
     """What a page shows of a comparison."""
-    from pipeline.post.overview.page import Part, media
-    from pipeline.post.plotting.table import as_html, from_markdown
+    from flexclear.pipeline.post.overview.page import Part, media
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     tables = "".join(as_html(from_markdown(found.file(name).read_text())) for name in TABLES)
     pictures = [
@@ -155,7 +155,7 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
     return Task(
         stage="comparison",
         scene=labels[-1],
-        run="stages.s8_comparison:run",
+        run="flexclear.stages.s8_comparison:run",
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
         folder=f"compare/{name}",

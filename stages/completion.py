@@ -34,7 +34,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print it."""
-    from stages.__main__ import COMMANDS, parser
+    from flexclear.stages.__main__ import COMMANDS, parser
 
     cases = []
     for verb in COMMANDS:

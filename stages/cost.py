@@ -7,18 +7,18 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.core.scene.load import edited
-from pipeline.core.workflow.task import Task
-from stages import cost_design, cost_peers, kernels, run, s4_simulate
-from stages.cost_peers import Track
-from stages.graph import Graph
-from stages.run import Workplace, bundles, check
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import cost_design, cost_peers, kernels, run, s4_simulate
+from flexclear.stages.cost_peers import Track
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import Workplace, bundles, check
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
-    from pipeline.post.cost.page import Studied
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.cost.page import Studied
 
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
@@ -81,7 +81,7 @@ def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrato
     return Task(
         stage="cost",
         scene=scene.name,
-        run="stages.cost_study:run",
+        run="flexclear.stages.cost_study:run",
         params={
             "points": listed,
             "quantities": [[q.owner, q.kind] for q in chosen],
@@ -109,7 +109,7 @@ def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Stu
 
     study, folder: as `bring` returned them.  pictures: folder for them beside the page.
     """
-    from pipeline.post.cost.page import Studied, advice
+    from flexclear.pipeline.post.cost.page import Studied, advice
 
     tables = tuple((folder / file).read_text() for file in PRINTED if (folder / file).is_file())
     files = {stem: folder / f"{stem}.png" for stem in FIGURES}
@@ -123,7 +123,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
 
     studies: what `bring` returned, by scene.  options: what else the command was told.
     """
-    from pipeline.post.cost.page import markdown
+    from flexclear.pipeline.post.cost.page import markdown
 
     (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
     found = []
@@ -163,7 +163,7 @@ def _measured(
         stage="cost-ensemble" if ensemble else "cost-point",
         scene=design.scene.name,
         part=design.key,
-        run=f"stages.cost_point:{function}",
+        run=f"flexclear.stages.cost_point:{function}",
         params={"simulate": s4_simulate.params(design.scene, ensemble=ensemble), **more},
         inputs={**_bundles(design), "kernels": compiled[kernels.shared(design.scene)]},
         modules=s4_simulate.modules(design.scene),

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.load import edited, read_toml
-from pipeline.core.scene.schema import Scene
-from stages.timing import paper_solver
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.stages.timing import paper_solver
 
 REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
 #: another family of methods

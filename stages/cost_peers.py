@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pipeline.core.errors import InputError
+from flexclear.pipeline.core.errors import InputError
 
 Track = dict[str, Any]
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.progress import Progress, silent
-from stages.kernels import warm
-from stages.s4_simulate import bundles, rebuild
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.stages.kernels import warm
+from flexclear.stages.s4_simulate import bundles, rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -29,10 +29,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     import numpy as np
     import xarray as xr
 
-    from pipeline import dynamics
-    from pipeline.core import quantities
-    from pipeline.core.errors import SolverError
-    from pipeline.core.scene.wanted import parse
+    from flexclear.pipeline import dynamics
+    from flexclear.pipeline.core import quantities
+    from flexclear.pipeline.core.errors import SolverError
+    from flexclear.pipeline.core.scene.wanted import parse
 
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
@@ -61,10 +61,10 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     import numpy as np
     import xarray as xr
 
-    from pipeline import dynamics
-    from pipeline.core import quantities
-    from pipeline.core.errors import SolverError
-    from pipeline.core.scene.wanted import parse
+    from flexclear.pipeline import dynamics
+    from flexclear.pipeline.core import quantities
+    from flexclear.pipeline.core.errors import SolverError
+    from flexclear.pipeline.core.scene.wanted import parse
 
     scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)

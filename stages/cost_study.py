@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
-#: contact events are located to this share of the clearance (pipeline.dynamics.integrate.contact_events)
+#: contact events are located to this share of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
 
 
@@ -20,10 +20,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, and `peers`, as of
     `stages.cost_peers`.
     """
-    from pipeline.core.scene.wanted import Quantity
-    from pipeline.post.cost import causes, price, statistics, work_precision
-    from pipeline.post.cost.study import Point, assemble
-    from pipeline.post.plotting.table import files
+    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.post.cost import causes, price, statistics, work_precision
+    from flexclear.pipeline.post.cost.study import Point, assemble
+    from flexclear.pipeline.post.plotting.table import files
 
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
@@ -58,8 +58,8 @@ def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:
     """The paper's own choice of method and step, as a marked point."""
-    from pipeline.post.cost.study import cost, relative_errors
-    from pipeline.post.cost.work_precision import Mark
+    from flexclear.pipeline.post.cost.study import cost, relative_errors
+    from flexclear.pipeline.post.cost.work_precision import Mark
 
     mine = [p for p in points if p.group == "paper" and "refused" not in runs[p.key].attrs]
     if not mine:
@@ -73,6 +73,6 @@ def split_of(
     points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
 ) -> dict[str, dict[str, float]]:
     """Relative error of the scene as it stands, by quantity and cause."""
-    from pipeline.post.cost.split import causes_of
+    from flexclear.pipeline.post.cost.split import causes_of
 
     return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

@@ -11,10 +11,10 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from pipeline.core import machine
-from pipeline.core.artifacts.paths import kernel_root, results_root
-from pipeline.core.errors import FlexclearError
-from pipeline.core.workflow.fingerprint import TREE, library_version
+from flexclear.pipeline.core import machine
+from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
+from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 
 LIBRARIES = (
     "numpy",
@@ -50,7 +50,7 @@ pose = {{}}
 """
 #: run apart, where nothing is compiled: that would take longer than all else
 RUN = """import sys
-import pipeline
+from flexclear import pipeline
 found = pipeline.run(sys.argv[1])
 print(float(found.position.sel(body="ball", axis="z")[-1]))
 """
@@ -104,7 +104,7 @@ def _writable(folder: Path) -> bool:
 
 
 def _kernels() -> tuple[str, bool]:
-    from pipeline.dynamics.compile.folder import writable
+    from flexclear.pipeline.dynamics.compile.folder import writable
 
     said: list[str] = []
     try:
@@ -116,7 +116,7 @@ def _kernels() -> tuple[str, bool]:
 
 def _graphics() -> tuple[str, bool]:
     """Without the system's GL libraries only pictures of shapes are missing: that is no fault."""
-    from pipeline.post.render import gl
+    from flexclear.pipeline.post.render import gl
 
     state = gl.state()
     return (f"{state}; {gl.REMEDY}" if state.endswith("none") else state), True

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
-FIGURES = "pipeline.post.figures"
+FIGURES = "flexclear.pipeline.post.figures"
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

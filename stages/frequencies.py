@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from pipeline.core.errors import InputError
-from pipeline.core.units import quantity
-from stages import run
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.units import quantity
+from flexclear.stages import run
 
 if TYPE_CHECKING:
     import xarray as xr

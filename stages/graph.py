@@ -8,12 +8,22 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.task import Task
-from stages import s1_mesh, s2_modes, s3_bundle, s3_rigid, s4_linear, s4_sections, s4_simulate, s6_render, s7_overview
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import (
+    s1_mesh,
+    s2_modes,
+    s3_bundle,
+    s3_rigid,
+    s4_linear,
+    s4_sections,
+    s4_simulate,
+    s6_render,
+    s7_overview,
+)
 
 #: stages in order, as `--to` names them
 STAGES = ("mesh", "modes", "bundle", "simulate", "ensemble", "post", "render")
@@ -51,7 +61,7 @@ class Graph:
             body: self._body_task(
                 "mesh",
                 body,
-                "stages.s1_mesh:run",
+                "flexclear.stages.s1_mesh:run",
                 s1_mesh.params(Path(recipe), self.recipe),
                 modules=s1_mesh.modules(Path(recipe)),
                 context={"folder": str(Path(recipe).parent.resolve())},
@@ -66,7 +76,7 @@ class Graph:
             body: self._body_task(
                 "modes",
                 body,
-                "stages.s2_modes:run",
+                "flexclear.stages.s2_modes:run",
                 s2_modes.params(part),
                 {"mesh": self.mesh[body]},
                 s2_modes.modules(part, f"{self.scene.path or self.scene.name} [body.{body}.modes]"),
@@ -81,7 +91,7 @@ class Graph:
             body: self._body_task(
                 "bundle",
                 body,
-                "stages.s3_bundle:run",
+                "flexclear.stages.s3_bundle:run",
                 s3_bundle.params(self.scene, body),
                 {"mesh": self.mesh[body], "modes": self.modes[body]},
                 (
@@ -99,7 +109,7 @@ class Graph:
             body: self._body_task(
                 "rigid",
                 body,
-                "stages.s3_rigid:run",
+                "flexclear.stages.s3_rigid:run",
                 {},
                 {"mesh": self.mesh[body]},
                 s1_mesh.modules(Path(part.mesh)),
@@ -110,21 +120,26 @@ class Graph:
     @cached_property
     def simulate(self) -> Task:
         """One run; shown as ``run.nc``."""
-        return self._simulation("simulate", "stages.s4_simulate:run", "run.nc", ensemble=False)
+        return self._simulation("simulate", "flexclear.stages.s4_simulate:run", "run.nc", ensemble=False)
 
     @cached_property
     def ensemble(self) -> Task | None:
         """Members of the ensemble, if the scene asks for one."""
         if self.scene.ensemble is None:
             return None
-        return self._simulation("ensemble", "stages.s4_simulate:run_ensemble", "ensemble.nc", ensemble=True)
+        return self._simulation("ensemble", "flexclear.stages.s4_simulate:run_ensemble", "ensemble.nc", ensemble=True)
 
     @cached_property
     def sections(self) -> Task:
         """The motion looked at once in each period of its laws; shown as ``sections.nc``."""
         params, modules = s4_sections.params(self.scene), s4_simulate.modules(self.scene)
         return self._scene_task(
-            "sections", "stages.s4_sections:run", params, self.bodies(), names={"nc": "sections.nc"}, modules=modules
+            "sections",
+            "flexclear.stages.s4_sections:run",
+            params,
+            self.bodies(),
+            names={"nc": "sections.nc"},
+            modules=modules,
         )
 
     @cached_property
@@ -133,19 +148,21 @@ class Graph:
         inputs = {"sections": self.sections}
         # the figure is headed by the name, which is a fact for once
         params: dict[str, object] = {"scene": self.scene.name}
-        return self._scene_task("verdict", "stages.s5_verdict:run", params, inputs, names={"nc": "verdict.nc"})
+        return self._scene_task(
+            "verdict", "flexclear.stages.s5_verdict:run", params, inputs, names={"nc": "verdict.nc"}
+        )
 
     @cached_property
     def post(self) -> Task:
         """What is derived from the run."""
         inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
-        return self._scene_task("post", "stages.s5_post:run", {}, inputs, names={"nc": "post.nc"})
+        return self._scene_task("post", "flexclear.stages.s5_post:run", {}, inputs, names={"nc": "post.nc"})
 
     @cached_property
     def render(self) -> Task:
         """Pictures and film."""
         inputs = {"run": self.simulate, **self.bodies()}
-        return self._scene_task("render", "stages.s6_render:run", s6_render.params(self.scene), inputs)
+        return self._scene_task("render", "flexclear.stages.s6_render:run", s6_render.params(self.scene), inputs)
 
     def linear(
         self,
@@ -160,7 +177,7 @@ class Graph:
         name = "linear" if vibrations else "equilibrium"
         modules = s4_simulate.modules(self.scene)
         return self._scene_task(
-            name, "stages.s4_linear:run", params, self.bodies(), names={"nc": f"{name}.nc"}, modules=modules
+            name, "flexclear.stages.s4_linear:run", params, self.bodies(), names={"nc": f"{name}.nc"}, modules=modules
         )
 
     def up_to(self, stage: str) -> list[Task]:
@@ -202,7 +219,7 @@ class Graph:
     def overview(self) -> Task:
         """General figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
-        task = self._scene_task("overview", "stages.s7_overview:run", s7_overview.params(self.scene), inputs)
+        task = self._scene_task("overview", "flexclear.stages.s7_overview:run", s7_overview.params(self.scene), inputs)
         return replace(task, part="figures", folder=self._folder("figures"))
 
     @cached_property

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.workflow.task import Task
-from stages import s4_simulate
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import s4_simulate
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
@@ -24,7 +24,7 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
         stage="kernels",
         scene=scene.name,
         part=f"{scene.solver.integrator} {'chosen' if scene.solver.step is None else 'fixed'} {scene.solver.events}",
-        run="stages.kernels:run",
+        run="flexclear.stages.kernels:run",
         params={"simulate": s4_simulate.params(scene)},
         inputs=bundles,
         modules=s4_simulate.modules(scene),
@@ -58,7 +58,7 @@ def _processor_time() -> float:
 
 def warm(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
     """Compile or fetch the kernels and call them, so that no measurement contains it."""
-    from pipeline.dynamics.run.run import engine_of
-    from pipeline.dynamics.run.start import consistent_start
+    from flexclear.pipeline.dynamics.run.run import engine_of
+    from flexclear.pipeline.dynamics.run.start import consistent_start
 
     consistent_start(engine_of(scene, reduced, progress))

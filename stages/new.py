@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pipeline.core.errors import InputError, ResourceError
+from flexclear.pipeline.core.errors import InputError, ResourceError
 
 TEMPLATES = Path(__file__).with_name("templates")
 #: kinds of mechanisms -> what they are

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.artifacts.store import Record, publish
-from pipeline.core.scene.ideal import loose
-from pipeline.core.workflow.task import Task
-from stages import compare
-from stages.graph import Graph
-from stages.run import Workplace, check, in_file
+from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.scene.ideal import loose
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import compare
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import Workplace, check, in_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,7 +56,7 @@ def _page(
     compared: compare.Comparison | None,
     run: xr.Dataset | None,
 ) -> bytes:
-    from pipeline.post.overview.page import Part, listed, page
+    from flexclear.pipeline.post.overview.page import Part, listed, page
 
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
@@ -83,7 +83,7 @@ def _films(render: Task, records: Mapping[int, Record]) -> dict[str, str]:
 
 
 def _media(place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, str]) -> str:
-    from pipeline.post.overview.page import media
+    from flexclear.pipeline.post.overview.page import media
 
     record = records.get(id(task))
     if record is None:

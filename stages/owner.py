@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked
-from pipeline.core.artifacts.store import Store
-from pipeline.core.errors import InputError
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.schema import Scene
 
 
 def refuse_namesakes(scenes: list[Scene]) -> None:

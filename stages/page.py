@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -18,7 +18,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: the folder, the run of each scene below it, the scene whose film and pictures are shown, and the digest of
     everything that is shown, so that the page is written again when any of it changes.
     """
-    from pipeline.post import report
+    from flexclear.pipeline.post import report
 
     results = Path(params["results"])
     attributes = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})

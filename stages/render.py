@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from stages import run
+from flexclear.stages import run
 
 #: what is told of the files that are made
 FILES = {

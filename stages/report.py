@@ -13,15 +13,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from pipeline.core.artifacts.store import Record
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import TREE
-from pipeline.core.workflow.task import Task
-from stages import kernels, run, s4_simulate, s6_render, timing
-from stages.figure import FIGURES
-from stages.graph import Graph
-from stages.run import Workplace, check
+from flexclear.pipeline.core.artifacts.store import Record
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import kernels, run, s4_simulate, s6_render, timing
+from flexclear.stages.figure import FIGURES
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import DATA, Workplace, check
 
 #: the scene whose film and pictures the page shows: the paper's full model
 HEADLINE = "sps4/far_csj_cb"
@@ -41,7 +40,7 @@ def command(options: argparse.Namespace) -> None:
     if not options.scenes:
         print(make(place))
         return
-    from stages import own_report
+    from flexclear.stages import own_report
 
     for graph in run.graphs(options.scenes, options.set):
         print(run.near(own_report.make(graph, place)))
@@ -66,14 +65,14 @@ class Scenes:
 
     def timing(self, family: str) -> Task:
         """Measured times of all scenes that lie directly in a folder below scenes/."""
-        files = sorted((TREE / "scenes" / family).glob("*.toml"))
+        files = sorted((DATA / "scenes" / family).glob("*.toml"))
         if not files:
             raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
         graphs = [self.graph(f"{family}/{path.stem}") for path in files]
         return Task(
             stage="timing",
             scene=family,
-            run="stages.timing:run",
+            run="flexclear.stages.timing:run",
             params={g.scene.name: s4_simulate.params(g.scene) for g in graphs},
             inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
             | _paper_kernels(graphs),
@@ -105,7 +104,7 @@ def make(place: Workplace) -> Path:
     page = place.bring([page_task(place, shown.records, graphs)])
     check(page)
     if s6_render.gl_state().endswith("none"):
-        from pipeline.post.render import gl
+        from flexclear.pipeline.post.render import gl
 
         place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(shown)
@@ -124,7 +123,7 @@ def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
         stage="figures",
         scene="report",
         part="index",
-        run="stages.figure:index",
+        run="flexclear.stages.figure:index",
         params={"names": names},
         modules=tuple(f"{FIGURES}.{name}" for name in names),
         folder="",
@@ -142,7 +141,7 @@ def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Grap
         stage="report",
         scene="report",
         part="page",
-        run="stages.page:run",
+        run="flexclear.stages.page:run",
         params={
             "results": str(place.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
@@ -155,7 +154,7 @@ def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Grap
 
 def scene_file(name: str) -> Path:
     """Where a scene of the project is."""
-    return TREE / "scenes" / f"{name}.toml"
+    return DATA / "scenes" / f"{name}.toml"
 
 
 def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
@@ -163,7 +162,7 @@ def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
         stage="figures",
         scene="report",
         part=name,
-        run="stages.figure:run",
+        run="flexclear.stages.figure:run",
         params={"figure": name},
         inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
         modules=(f"{FIGURES}.{name}",),

@@ -12,25 +12,28 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.core.artifacts.disk import disk_limits
-from pipeline.core.artifacts.paths import results_root
-from pipeline.core.artifacts.store import Store, write_dataset
-from pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
-from pipeline.core.scene import lines
-from pipeline.core.scene.demand import check_run
-from pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
-from pipeline.core.scene.references import dangling
-from pipeline.core.workflow.fingerprint import TREE, Sources
-from pipeline.core.workflow.progress import WARNING, Monitor
-from pipeline.core.workflow.schedule import Failure, Outcome, bring
-from pipeline.core.workflow.task import Task
-from stages import owner
-from stages.graph import STAGES, Graph
+from flexclear.pipeline.core.artifacts.disk import disk_limits
+from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.artifacts.store import Store, write_dataset
+from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
+from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.scene.demand import check_run
+from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
+from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
+from flexclear.pipeline.core.workflow.progress import WARNING, Monitor
+from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import owner
+from flexclear.stages.graph import STAGES, Graph
+
+#: folder with the scenes and meshes of the project, which are installed with it
+DATA = TREE / "flexclear"
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -143,16 +146,16 @@ def find_scene(name: str) -> Path:
     path = Path(name)
     if path.suffix == ".toml" or is_file(path):
         return path
-    named = TREE / "scenes" / f"{name}.toml"
+    named = DATA / "scenes" / f"{name}.toml"
     if is_file(named):
         return named
     raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
 
 
 def _known(name: str) -> str:
-    from pipeline.core.registry import suggestion
+    from flexclear.pipeline.core.registry import suggestion
 
-    scenes = TREE / "scenes"
+    scenes = DATA / "scenes"
     return suggestion(name, sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml")))
 
 
@@ -164,7 +167,7 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     """
     require_names(scene)
     place = place or workplace()
-    import_module("pipeline.core.artifacts.modal")  # gives the dataset its accessor
+    import_module("flexclear.pipeline.core.artifacts.modal")  # gives the dataset its accessor
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
@@ -190,7 +193,7 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
     import xarray as xr
 
-    import_module("pipeline.core.artifacts.modal")
+    import_module("flexclear.pipeline.core.artifacts.modal")
     name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
     name = scene_name(Path(name)) if name.endswith(".toml") else name
     folder = results_root() / "runs" / name
@@ -219,7 +222,7 @@ def _loaded(graph: Graph, place: Workplace, outcome: Outcome) -> dict[str, xr.Da
 
 def deficits(graph: Graph, place: Workplace, outcome: Outcome) -> str:
     """What the scene's bundles lack, one table for each flexible body."""
-    from pipeline.core.artifacts.deficits import table
+    from flexclear.pipeline.core.artifacts.deficits import table
 
     found = _loaded(graph, place, outcome)
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in found.items())

@@ -8,18 +8,18 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import module_of
-from pipeline.core.scene.limits import Limits, check_cells
-from pipeline.core.scene.load import is_file, read_toml
-from pipeline.core.workflow import opened
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene.limits import Limits, check_cells
+from flexclear.pipeline.core.scene.load import is_file, read_toml
+from flexclear.pipeline.core.workflow import opened
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
-KINDS = "pipeline.structure.kinds"
+KINDS = "flexclear.pipeline.structure.kinds"
 #: keys of a recipe's shape that name files
 FILES = ("file", "stiffness", "mass", "unknowns")
 
@@ -69,7 +69,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: besides the recipe its folder, which the files that it names are relative to.
     """
-    from pipeline.structure.kinds import kind
+    from flexclear.pipeline.structure.kinds import kind
 
     folder = Path(params.get("folder", "."))
     for path in _files(params["recipe"], folder):

@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.registry import module_of
-from stages import s1_mesh
+from flexclear.pipeline.core.registry import module_of
+from flexclear.stages import s1_mesh
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.parts import FlexibleBody
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.parts import FlexibleBody
 
-CONDITIONS = "pipeline.structure.modes.reference"
+CONDITIONS = "flexclear.pipeline.structure.modes.reference"
 
 
 def params(body: FlexibleBody) -> dict[str, Any]:
@@ -31,9 +31,9 @@ def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
-    from pipeline.structure.modes import paraview
-    from pipeline.structure.modes.select import Wanted
-    from pipeline.structure.modes.solution import solve
+    from flexclear.pipeline.structure.modes import paraview
+    from flexclear.pipeline.structure.modes.select import Wanted
+    from flexclear.pipeline.structure.modes.solution import solve
 
     count = params.get("count")
     result = solve(

@@ -6,16 +6,16 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.registry import lookup, module_of
+from flexclear.pipeline.core.registry import lookup, module_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
-STRESS = "pipeline.structure.stress"
-SHORTENING = "pipeline.structure.modes.geometric_stiffness"
+STRESS = "flexclear.pipeline.structure.stress"
+SHORTENING = "flexclear.pipeline.structure.modes.geometric_stiffness"
 WHERE = "[output] stress"
 
 
@@ -34,7 +34,7 @@ def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The bundle (schema BUNDLE)."""
-    from pipeline.structure.modes import bundle
+    from flexclear.pipeline.structure.modes import bundle
 
     progress(None, "inertia integrals")
     mesh, modes = inputs["mesh"], inputs["modes"]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
 #: how inputs are called that hold such bodies, before the body's name
 PREFIX = "rigid/"
@@ -16,7 +16,7 @@ PREFIX = "rigid/"
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The rigid body (schema RIGID)."""
-    from pipeline.structure.modes import rigid
+    from flexclear.pipeline.structure.modes import rigid
 
     progress(None, "mass and inertia")
     return {"nc": rigid.build(inputs["mesh"])}
@@ -24,7 +24,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def filled(bodies: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> dict[str, Any]:
     """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe in place of their recipes."""
-    from pipeline.core.algebra import matrix_to_quaternion
+    from flexclear.pipeline.core.algebra import matrix_to_quaternion
 
     result = dict(bodies)
     for name, data in inputs.items():

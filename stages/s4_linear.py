@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from stages import s4_simulate
+from flexclear.stages import s4_simulate
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 #: what the vibrations do not depend on
 LEFT_OUT = ("output", "ensemble")
@@ -29,7 +29,7 @@ def params(
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The equilibrium (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); inputs are ``bundle/<body>``."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     pose = params["pose"]
     solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium

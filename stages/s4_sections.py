@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from stages import s4_simulate
+from flexclear.stages import s4_simulate
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 #: what sections do not depend on
 LEFT_OUT = ("output", "ensemble", "accuracy")
@@ -25,6 +25,6 @@ def params(scene: Scene) -> dict[str, Any]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Sections (schema SECTIONS); inputs are ``bundle/<body>``."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     return {"nc": dynamics.sections(s4_simulate.rebuild(params, inputs), s4_simulate.bundles(inputs), progress)}

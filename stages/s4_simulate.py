@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.artifacts.paths import results_root
-from pipeline.core.scene.demand import check_run
-from stages import s3_rigid
+from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.scene.demand import check_run
+from flexclear.stages import s3_rigid
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
@@ -45,14 +45,14 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
-    from pipeline.dynamics.compile import sources
+    from flexclear.pipeline.dynamics.compile import sources
 
     return sources.modules(scene)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     scene, reduced = rebuild(params, inputs), bundles(inputs)
     check_run(scene, results_root())
@@ -66,7 +66,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
     """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
-    from pipeline.core.artifacts import deficits
+    from flexclear.pipeline.core.artifacts import deficits
 
     found = []
     for body, bundle in reduced.items():
@@ -79,7 +79,7 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     scene = rebuild(params, inputs)
     check_run(scene, results_root())
@@ -96,7 +96,7 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None =
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
     """
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = s3_rigid.filled(table["body"], inputs or {})

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The post dataset (schema POST)."""
-    from pipeline.post import derive
+    from flexclear.pipeline.post import derive
 
     return {"nc": derive(inputs["run"], inputs.get("ensemble"))}

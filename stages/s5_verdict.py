@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Verdict (schema VERDICT) and its figure; the input is ``sections``, and `params` names their scene."""
-    from pipeline.post.plotting import section_figure
-    from pipeline.post.verdict import derive
+    from flexclear.pipeline.post.plotting import section_figure
+    from flexclear.pipeline.post.verdict import derive
 
     sections = inputs["sections"].assign_attrs(scene=params["scene"])
     judged = derive(sections)

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from stages.s4_simulate import bundles
+from flexclear.stages.s4_simulate import bundles
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def gl_state() -> str:
     """Which GL libraries this machine has; part of the key of everything that is rendered."""
-    from pipeline.post.render import gl
+    from flexclear.pipeline.post.render import gl
 
     return gl.state()
 
@@ -30,7 +30,7 @@ def params(scene: Scene) -> dict[str, Any]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Pictures by file name; inputs are ``run`` and ``bundle/<body>``."""
-    from pipeline.post.render.pictures import pictures
+    from flexclear.pipeline.post.render.pictures import pictures
 
     view = {"watched": params["watched"], "direction": params.get("direction")}
     return dict(pictures(inputs["run"], bundles(inputs), progress=progress, **view))

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
 def params(scene: Scene) -> dict[str, Any]:
@@ -19,8 +19,8 @@ def params(scene: Scene) -> dict[str, Any]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """PNG and SVG by file name; inputs are ``run`` and ``post``."""
-    from pipeline.core.scene.wanted import Quantity
-    from pipeline.post.overview import figures
+    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.post.overview import figures
 
     progress(None, "figures")
     return dict(figures.make(inputs["run"], [Quantity(*pair) for pair in params["watched"]], inputs["post"]))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
+    from flexclear.pipeline.core.progress import Progress
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -17,9 +17,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: `labels` of the runs, the reference first; `quantities` (owner, kind).  inputs: ``run<k>``, and ``tight<k>``
     where there is one.
     """
-    from pipeline.core.scene.wanted import Quantity
-    from pipeline.post.overview import comparison, overlay
-    from pipeline.post.plotting.table import files
+    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.post.overview import comparison, overlay
+    from flexclear.pipeline.post.plotting.table import files
 
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}
     tighter = {label: inputs[f"tight{k}"] for k, label in enumerate(params["labels"]) if f"tight{k}" in inputs}

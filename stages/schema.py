@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Print it."""
     if options.kind == "scene":
-        from pipeline.core.scene.json_schema import scene_schema as schema
+        from flexclear.pipeline.core.scene.json_schema import scene_schema as schema
     else:
-        from pipeline.structure.fe.json_schema import recipe_schema as schema
+        from flexclear.pipeline.structure.fe.json_schema import recipe_schema as schema
     print(json.dumps(schema(), indent=2))

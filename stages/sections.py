@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.core.scene.load import edited
-from stages import run
-from stages.graph import Graph
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.stages import run
+from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
 #: options and the keys of `[sections]` that they replace
 COUNTS = {"periods": "periods that are kept", "transient": "periods before them that are not"}
@@ -61,7 +61,7 @@ def write_page(
     verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
 ) -> None:
     """The verdicts as a page, with the figures (PNG) in a folder of its name beside it."""
-    from pipeline.post.verdict_page import markdown
+    from flexclear.pipeline.post.verdict_page import markdown
 
     folder = page.parent / page.stem
     folder.mkdir(exist_ok=True)

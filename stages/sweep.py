@@ -10,20 +10,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.artifacts.store import disk_limits, write_dataset
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.scene.load import load_scene, scene_name
-from pipeline.core.scene.sweep import Sweep, load_sweep
-from pipeline.core.workflow import cores
-from stages import run, sweep_plan
-from stages.run import Workplace
-from stages.sweep_engine import Engine, Job, engine, now
+from flexclear.pipeline.core.artifacts.store import disk_limits, write_dataset
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.scene.load import load_scene, scene_name
+from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
+from flexclear.pipeline.core.workflow import cores
+from flexclear.stages import run, sweep_plan
+from flexclear.stages.run import Workplace
+from flexclear.stages.sweep_engine import Engine, Job, engine, now
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.artifacts.points import Point
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.artifacts.points import Point
+    from flexclear.pipeline.core.scene.schema import Scene
 
 #: finished points are stored after so many seconds, later after that share of the time so far
 OFTEN, SHARE = 2.0, 0.01
@@ -74,7 +74,7 @@ def of_scene(
     scene: Scene, table: Mapping[str, Any], workers: int | None = None, scheduler: str | None = None
 ) -> xr.Dataset:
     """The dataset of a sweep that a table describes as a file does, but for its scene; see `pipeline.sweep`."""
-    from pipeline.core.scene.sweep import read_sweep
+    from flexclear.pipeline.core.scene.sweep import read_sweep
 
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, "sweep"), scene, "sweep")
     with engine(width(workers), scheduler) as found:
@@ -166,8 +166,8 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
 
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
     """Figures beside the dataset, and a summary on the screen."""
-    from pipeline.core.artifacts.store import publish
-    from pipeline.post.sweep import figures
+    from flexclear.pipeline.core.artifacts.store import publish
+    from flexclear.pipeline.post.sweep import figures
 
     for name, content in figures(result).items():
         publish(folder / name, content)

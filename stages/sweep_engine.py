@@ -10,11 +10,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.core.artifacts.points import Point
-from pipeline.core.errors import InputError, ResourceError
-from pipeline.core.workflow import workers
-from pipeline.core.workflow.schedule import TICK
-from stages.sweep_points import source_digest, work
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.errors import InputError, ResourceError
+from flexclear.pipeline.core.workflow import workers
+from flexclear.pipeline.core.workflow.schedule import TICK
+from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 SHARE, MOST, QUEUED = 0.5, 1000, 2

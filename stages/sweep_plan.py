@@ -9,26 +9,26 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.design import Axis, Design, design
-from pipeline.core.scene.drives import PathDrive
-from pipeline.core.scene.kept import Kept, parse_kept
-from pipeline.core.scene.load import edited, with_numbers
-from pipeline.core.workflow.task import Task, facts, key
-from pipeline.core.workflow.workers import without_main
-from stages import s4_simulate
-from stages.graph import Graph
-from stages.run import Workplace, check
-from stages.sweep_engine import Job
-from stages.sweep_points import Family as Work
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.design import Axis, Design, design
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.kept import Kept, parse_kept
+from flexclear.pipeline.core.scene.load import edited, with_numbers
+from flexclear.pipeline.core.workflow.task import Task, facts, key
+from flexclear.pipeline.core.workflow.workers import without_main
+from flexclear.stages import s4_simulate
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import Workplace, check
+from flexclear.stages.sweep_engine import Job
+from flexclear.stages.sweep_points import Family as Work
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.artifacts.points import Point
-    from pipeline.core.artifacts.store import Store
-    from pipeline.core.scene.schema import Scene
-    from pipeline.core.scene.sweep import Sweep
+    from flexclear.pipeline.core.artifacts.points import Point
+    from flexclear.pipeline.core.artifacts.store import Store
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.sweep import Sweep
 
 #: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
 CHECKED = 200
@@ -57,14 +57,14 @@ class Family:
 
     def keep(self, points: Mapping[str, Point], store: Store, kept: Sequence[Kept]) -> None:
         """Store finished points as one artifact."""
-        from pipeline.core.artifacts.points import batch
+        from flexclear.pipeline.core.artifacts.points import batch
 
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
         store.put(self.folder[0], name, {"nc": batch(points, kept)}, self.facts)
 
     def find(self, store: Store, kept: Sequence[Kept]) -> dict[str, Point]:
         """All points of the family that are stored and sound."""
-        from pipeline.core.artifacts.points import unpacked
+        from flexclear.pipeline.core.artifacts.points import unpacked
 
         found: dict[str, Point] = {}
         for path in sorted((store.root / "cache" / self.folder[0]).glob("*.json")):
@@ -90,8 +90,8 @@ class Plan:
 
     def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
         """The sweep's dataset of the points that are finished."""
-        from pipeline.core.artifacts import points as results
-        from pipeline.core.quantities import regular_times
+        from flexclear.pipeline.core.artifacts import points as results
+        from flexclear.pipeline.core.quantities import regular_times
 
         attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
         attributes |= {"title": self.sweep.title} if self.sweep.title else {}
@@ -211,7 +211,7 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
         task = Task(
             stage="sweep",
             scene=graph.scene.name,
-            run="stages.sweep_points:work",
+            run="flexclear.stages.sweep_points:work",
             params={
                 "simulate": _without_varied(simulate, points[0], groups[text]),
                 "keep": [one.name for one in wanted.kept],

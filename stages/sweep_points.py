@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.artifacts.points import Point
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,9 +38,9 @@ def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
     """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
     import pickle
 
-    from pipeline.core.scene.kept import parse_kept
-    from pipeline.dynamics.record.point import Runner
-    from stages.s4_simulate import bundles, rebuild
+    from flexclear.pipeline.core.scene.kept import parse_kept
+    from flexclear.pipeline.dynamics.record.point import Runner
+    from flexclear.stages.s4_simulate import bundles, rebuild
 
     family: Family = pickle.loads(packed)
     scene = rebuild(family.simulate, family.inputs)
@@ -53,9 +53,9 @@ def work(key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bo
 
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
     """
-    from pipeline.core.errors import InputError
-    from pipeline.core.scene.load import with_numbers
-    from pipeline.core.workflow import cores
+    from flexclear.pipeline.core.errors import InputError
+    from flexclear.pipeline.core.scene.load import with_numbers
+    from flexclear.pipeline.core.workflow import cores
 
     cores.tell(alone)
     scene, runner = _opened(key, packed)
@@ -74,10 +74,10 @@ def source_digest() -> str:
     """Digest of the sources that a worker runs, to be compared with those of who asks it."""
     import hashlib
 
-    from pipeline.core.workflow.fingerprint import TREE
+    from flexclear.pipeline.core.workflow.fingerprint import TREE
 
     digest = hashlib.sha256()
-    for folder in ("pipeline", "stages"):
+    for folder in ("flexclear", "pipeline", "stages"):
         for path in sorted((TREE / folder).rglob("*.py")):
             digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()

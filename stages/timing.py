@@ -6,14 +6,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.progress import Progress, silent
-from stages.s4_simulate import bundles, rebuild
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.stages.s4_simulate import bundles, rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
-    from pipeline.dynamics.record.cost import Cost
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.record.cost import Cost
 
 #: equal error: of the velocity of the body with most joints, relative, over this first share of the run, where
 #: all scenes can still be predicted point by point
@@ -93,8 +93,8 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
 
 def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool) -> tuple[Cost | None, str]:
     """The cost of a run, and why there is none."""
-    from pipeline import dynamics
-    from pipeline.core.errors import SolverError
+    from flexclear.pipeline import dynamics
+    from flexclear.pipeline.core.errors import SolverError
 
     try:
         # an unmeasured start fetches the code; reports would be part of what is measured
@@ -106,7 +106,7 @@ def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool)
 
 def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[float, Cost]:
     """Tolerance and cost at equal error; decade by decade tighter where the whole run is refused."""
-    from pipeline.core.errors import SolverError
+    from flexclear.pipeline.core.errors import SolverError
 
     rtol = equal_tolerance(scene, bundles)
     while True:
@@ -120,7 +120,7 @@ def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[fl
 
 def equal_tolerance(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> float:
     """The tolerance at which a scene has the common error over the first share of its run."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     velocity = next(q.name for q in scene.wanted() if q.kind == "velocity")
     wanted = {"time.end": _share(scene, SHARE), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
@@ -133,7 +133,7 @@ def _share(scene: Scene, share: float) -> float:
 
 
 def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:
-    from pipeline.core.scene.load import edited
+    from flexclear.pipeline.core.scene.load import edited
 
     return edited(scene, {"accuracy": None, "ensemble": None, **edit})
 

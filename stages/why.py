@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from pipeline.core.workflow.execute import states
-from stages import run
-from stages.graph import STAGES
+from flexclear.pipeline.core.workflow.execute import states
+from flexclear.stages import run
+from flexclear.stages.graph import STAGES
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

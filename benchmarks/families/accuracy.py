@@ -13,12 +13,12 @@ from dataclasses import asdict
 from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
-from pipeline.core.artifacts.paths import results_root
-from pipeline.core.scene.load import load_scene
-from pipeline.post.cost.page import Studied, sections
-from pipeline.post.plotting.table import Table, as_markdown, from_markdown
-from stages import cost
-from stages.run import find_scene, workplace
+from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.post.cost.page import Studied, sections
+from flexclear.pipeline.post.plotting.table import Table, as_markdown, from_markdown
+from flexclear.stages import cost
+from flexclear.stages.run import find_scene, workplace
 
 SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_damped", "sps4/far_csj_cb")
 

@@ -12,7 +12,7 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import SCENES, evaluation_time, mechanism, states, trajectory
 from benchmarks.page import spread
 from benchmarks.timing import interleaved, once
-from pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 #: of a round, some milliseconds each: short against the drift of the machine, long against the clock
 EVALUATIONS, SOLUTIONS, ROUNDS = 2000, 30, 25

@@ -21,8 +21,8 @@ from benchmarks.exudyn_model import METHODS, Outcome, solve
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
 from benchmarks.page import short
-from pipeline.core.scene.schema import Scene
-from pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 BODY = "platform"
 #: shares of the largest speed for which the times needed are compared

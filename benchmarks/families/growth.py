@@ -14,9 +14,9 @@ from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, slope
-from pipeline.core.errors import FlexclearError
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 LOOPS = (5, 10, 20, 40, 80)
 #: what the fullest scene loses, and the scene that never had it

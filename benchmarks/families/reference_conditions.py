@@ -11,7 +11,7 @@ from benchmarks.page import Columns, table
 from benchmarks.reference_conditions import claims, figures, runs
 from benchmarks.reference_conditions.claims import at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
-from pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 #: a share of the compliance from which on a set counts as complete, and frequencies of the mechanism as right
 COMPLETE, RESOLVED = 0.99, 0.01

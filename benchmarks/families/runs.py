@@ -8,10 +8,10 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import SCENES, Mechanism, mechanism
 from benchmarks.page import Columns, spread, table
 from benchmarks.timing import interleaved, once
-from pipeline import dynamics
-from pipeline.core.progress import silent
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 ROUNDS = 5
 

@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.family import Case, Family, Measured, Record
-from pipeline.core.artifacts.store import write_dataset
-from pipeline.post.plotting.table import pipe_table
-from pipeline.structure.kinds.kind import of_recipe
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
-from stages.cost_point import peak_memory
+from flexclear.pipeline.core.artifacts.store import write_dataset
+from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.stages.cost_point import peak_memory
 
 MATERIAL = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
 FRAMES = {name: {"on": {"region": region}, "tie": "mean"} for name, region in (("bottom", "start"), ("top", "end"))}

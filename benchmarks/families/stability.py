@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.family import FINISHED, REFUSED, WRONG, Family, Record
 from benchmarks.stability import figures, runs, scenes
 from benchmarks.stability.runs import CLOSURE, DEVIATION, LEDGER
-from pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 TEXT = """{seeds}Parameters and results of every case, to the last digit: [its log](../benchmarks/log/stability.jsonl).
 

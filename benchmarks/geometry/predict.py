@@ -11,12 +11,12 @@ import xarray as xr
 from benchmarks.family import REFUSED, Record
 from benchmarks.geometry import scenes
 from benchmarks.geometry.kinematics import Layout
-from pipeline import dynamics
-from pipeline.core.errors import SolverError
-from pipeline.core.progress import silent
-from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from pipeline.post.models import JOINT, PLATFORM
-from stages import run as stages
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from flexclear.pipeline.post.models import JOINT, PLATFORM
+from flexclear.stages import run as stages
 
 #: coefficients of restitution, none of which the paper prints
 RESTITUTION = (0.5, 0.7, 0.9)

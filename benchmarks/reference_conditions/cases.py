@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.dynamics.record.cost import Cost
-from stages.s4_simulate import bundles, rebuild
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.dynamics.record.cost import Cost
+from flexclear.stages.s4_simulate import bundles, rebuild
 
 Files = dict[str, Any]
 JOINT, BODY = "A1", "platform"

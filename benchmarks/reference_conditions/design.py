@@ -9,15 +9,15 @@ from typing import Any
 
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene, read_toml
-from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.task import Task
-from pipeline.structure.fe import mesh
-from pipeline.structure.modes.solution import solve
-from stages import s4_simulate
-from stages.graph import Graph
-from stages.run import find_scene
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene, read_toml
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.stages import s4_simulate
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import find_scene
 
 ROD = "rod1"
 #: frame of the rod that carries the prismatic joint, by its distance from the rod's lower end [mm]

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-import pipeline
 from benchmarks import family
 from benchmarks.family import Measured
 from benchmarks.family import Record as Row
@@ -26,8 +25,9 @@ from benchmarks.reference_conditions.design import (
     TOP,
     Case,
 )
-from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from stages.run import Workplace, check, workplace
+from flexclear import pipeline
+from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from flexclear.stages.run import Workplace, check, workplace
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
 DIRECTIONS = ("z", "x", "rz")

@@ -14,22 +14,22 @@ import numpy as np
 from benchmarks import crew
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.stability.scenes import Parameters, scene, sweep
-from pipeline import dynamics
-from pipeline.core import quantities
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.errors import FlexclearError, SolverError
-from pipeline.core.progress import silent
-from pipeline.core.scene.wanted import parse
-from pipeline.core.workflow.progress import Monitor
-from pipeline.core.workflow.task import in_order
-from pipeline.dynamics.run.run import engine_of
-from stages.graph import Graph
-from stages.run import Workplace, bundles, workplace
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.errors import FlexclearError, SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.wanted import parse
+from flexclear.pipeline.core.workflow.progress import Monitor
+from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.stages.graph import Graph
+from flexclear.stages.run import Workplace, bundles, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
 #: processor time of a case after which it counts as hanging [s]; the dearest takes a fifth of it
 LIMIT = 600
@@ -49,7 +49,7 @@ def modules(case: Case) -> set[str]:
     """What decides about a case: its scene, the dynamics, the stages before them, and the parts that it names."""
     tasks = in_order([Graph(scene(case.of), shown=False).simulate])
     named = {name for task in tasks for name in (*task.modules, task.run.partition(":")[0])}
-    return {scene.__module__, "pipeline.dynamics", *named}
+    return {scene.__module__, "flexclear.pipeline.dynamics", *named}
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.family import Case
-from pipeline.core.scene.load import compose
-from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.fingerprint import TREE
+from flexclear.pipeline.core.scene.load import compose
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 CLEARANCE, STIFFNESS = 0.5e-3, 1.3631e11  # Table 3 [m], eq. (26) with its data [N/m^1.5]
 #: radii of the joint circles, start height [m], and the angles of the joints that are far from singular [deg]

@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-import pipeline
+from flexclear import pipeline
 
 #: speeds [rad/s] of the rotor; of the blade in units of sqrt(E I / (rho A)) / L^2
 ROTOR_SPEEDS, BLADE_SPEEDS = np.linspace(0.0, 300.0, 13), np.linspace(0.0, 12.0, 9)

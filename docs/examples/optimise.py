@@ -7,7 +7,7 @@ from pathlib import Path
 
 from scipy.optimize import brentq
 
-import pipeline
+from flexclear import pipeline
 
 SCENE = Path(__file__).parents[2] / "scenes/checks/oscillator.toml"
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.core.axes import check_axes, check_axis
+from flexclear.pipeline.core.axes import check_axes, check_axis
 
 #: square of the sine of the angle to -z below which a direction counts as that
 _OPPOSITE = 1e-18

@@ -7,7 +7,7 @@ import resource
 import shutil
 from pathlib import Path
 
-from pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.errors import ResourceError
 
 #: share of what is left that one piece of work may take
 SHARE = 0.8

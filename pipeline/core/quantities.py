@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import rotation_between
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.scene.wanted import KINDS, Quantity
+from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
 if TYPE_CHECKING:
-    from pipeline.core.scene.output import Output
-    from pipeline.core.scene.schema import TimeSpan
+    from flexclear.pipeline.core.scene.output import Output
+    from flexclear.pipeline.core.scene.schema import TimeSpan
 
 #: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
 #: only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure would take

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, get_args
 
-from pipeline.core.errors import InputError
+from flexclear.pipeline.core.errors import InputError
 
 #: most names that a hint lists
 LISTED = 40

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import xarray as xr
 
-    from pipeline.core.progress import Progress
-    from pipeline.core.scene.schema import Scene
-    from pipeline.dynamics.record.cost import Cost
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.record.cost import Cost
 
 __all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 
@@ -22,8 +22,8 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
     """
-    from pipeline.dynamics.record.dataset import dataset, warnings
-    from pipeline.dynamics.run.run import integrate
+    from flexclear.pipeline.dynamics.record.dataset import dataset, warnings
+    from flexclear.pipeline.dynamics.run.run import integrate
 
     def once(edited: Scene) -> xr.Dataset:
         done = integrate(edited, bundles, progress)
@@ -33,28 +33,28 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     if scene.accuracy is None or not scene.accuracy.quantities:
         return once(scene)
-    from pipeline.dynamics.run.accuracy import deliver
+    from flexclear.pipeline.dynamics.run.accuracy import deliver
 
     return deliver(scene, once, progress)
 
 
 def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
-    from pipeline.dynamics.record.cost import measure
+    from flexclear.pipeline.dynamics.record.cost import measure
 
     return measure(scene, bundles, progress, checked=checked)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
-    from pipeline.dynamics.record.ensemble import ensemble as run
+    from flexclear.pipeline.dynamics.record.ensemble import ensemble as run
 
     return run(scene, bundles, progress)
 
 
 def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """A scene whose laws repeat, looked at once in each period (schema SECTIONS)."""
-    from pipeline.dynamics.record.sections import sections as run
+    from flexclear.pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)
 
@@ -73,8 +73,8 @@ def equilibrium(
     name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
     """
-    from pipeline.dynamics.linear import dataset
-    from pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from flexclear.pipeline.dynamics.linear import dataset
+    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as find
 
     return dataset.equilibrium(*find(scene, bundles, progress, time, drives, moving), moving)
 
@@ -88,9 +88,9 @@ def frequencies(
     moving: bool = False,
 ) -> xr.Dataset:
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
-    from pipeline.dynamics.linear import dataset
-    from pipeline.dynamics.linear.equilibrium import equilibrium as find
-    from pipeline.dynamics.linear.vibrations import vibrations
+    from flexclear.pipeline.dynamics.linear import dataset
+    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from flexclear.pipeline.dynamics.linear.vibrations import vibrations
 
     bench, rest = find(scene, bundles, progress, time, drives, moving)
     return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)

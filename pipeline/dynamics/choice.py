@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def choose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:

@@ -11,16 +11,17 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core import integrators
-from pipeline.core.registry import module_of
+from flexclear.pipeline.core import integrators
+from flexclear.pipeline.core.registry import module_of
 
 if TYPE_CHECKING:
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
-JOINTS, CONTACTS = "pipeline.dynamics.joints", "pipeline.dynamics.contact"
+JOINTS, CONTACTS = "flexclear.pipeline.dynamics.joints", "flexclear.pipeline.dynamics.contact"
 NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
-LOADS, LAWS, RECORDS = "pipeline.dynamics.loads", "pipeline.dynamics.drives", "pipeline.dynamics.record"
-INTEGRATORS, STARTS = "pipeline.dynamics.integrate", "pipeline.dynamics.starts"
+LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.drives"
+RECORDS = "flexclear.pipeline.dynamics.record"
+INTEGRATORS, STARTS = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.starts"
 #: laws of time that are polynomials throughout, or made of others
 WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated"}
 
@@ -98,7 +99,7 @@ def most_parts(scene: Scene) -> Parts:
 
 
 def _laws(scene: Scene) -> set[str]:
-    from pipeline.core.scene.laws import law_types
+    from flexclear.pipeline.core.scene.laws import law_types
 
     return {law for part in (*scene.drive.values(), *scene.load.values()) for law in law_types(part)}
 

@@ -33,12 +33,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pipeline.core.artifacts.event_kinds import CLOSING as CLOSING
-from pipeline.core.artifacts.event_kinds import COMPRESSION as COMPRESSION
-from pipeline.core.artifacts.event_kinds import OPENING as OPENING
-from pipeline.core.artifacts.event_kinds import SLIPPING as SLIPPING
-from pipeline.core.artifacts.event_kinds import STICKING as STICKING
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING as CLOSING
+from flexclear.pipeline.core.artifacts.event_kinds import COMPRESSION as COMPRESSION
+from flexclear.pipeline.core.artifacts.event_kinds import OPENING as OPENING
+from flexclear.pipeline.core.artifacts.event_kinds import SLIPPING as SLIPPING
+from flexclear.pipeline.core.artifacts.event_kinds import STICKING as STICKING
+from flexclear.pipeline.dynamics.kernels import kernel
 
 _place = count()
 #: tables in h, f and w, in their order there

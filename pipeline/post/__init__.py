@@ -15,6 +15,6 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
 
     Imported when it is called: a command that only asks what is fresh needs no xarray.
     """
-    from pipeline.post.series import derive as series
+    from flexclear.pipeline.post.series import derive as series
 
     return series(run, ensemble)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post import rod_shape
+from flexclear.pipeline.post import rod_shape
 
 
 def is_rod(bundle: xr.Dataset) -> bool:

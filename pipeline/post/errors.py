@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import rotation_between
-from pipeline.core.quantities import SAME_TIME, common_times
-from pipeline.post.rotations import angle_about_y
+from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.quantities import SAME_TIME, common_times
+from flexclear.pipeline.post.rotations import angle_about_y
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.quantities import PARTED
-from pipeline.post.rotations import angle_about_y
+from flexclear.pipeline.core.quantities import PARTED
+from flexclear.pipeline.post.rotations import angle_about_y
 
 #: shares of the members below the quantiles that are kept: of so few, the middle and the bulk
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)

@@ -7,9 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from pipeline.post.discrepancies import DISCREPANCIES
-from pipeline.post.paper import CITATION
-from pipeline.post.plotting.table import Table, as_html
+from flexclear.pipeline.post.discrepancies import DISCREPANCIES
+from flexclear.pipeline.post.paper import CITATION
+from flexclear.pipeline.post.plotting.table import Table, as_html
 
 STYLE = """
 :root { --ink: #1f2933; --soft: #5b6570; --line: #dde3ea; --back: #f7f9fb; --accent: #0072B2; }

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import xarray as xr
 
-from pipeline.post import figures
-from pipeline.post.discrepancies import DISCREPANCIES
-from pipeline.post.page import Content, html_page
-from pipeline.post.paper import CITATION
-from pipeline.post.plotting.table import Table, from_markdown
+from flexclear.pipeline.post import figures
+from flexclear.pipeline.post.discrepancies import DISCREPANCIES
+from flexclear.pipeline.post.page import Content, html_page
+from flexclear.pipeline.post.paper import CITATION
+from flexclear.pipeline.post.plotting.table import Table, from_markdown
 
 
 def collect(results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str) -> Content:

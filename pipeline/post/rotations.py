@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
 
 
 def angle_about_y(quaternion: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.core.artifacts.schema import Schema, Variable
+from flexclear.pipeline.core.artifacts.schema import Schema, Variable
 
 _V = Variable
 

@@ -7,13 +7,13 @@ import json
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import rotation_between
-from pipeline.core.artifacts.schema import conform
-from pipeline.core.quantities import IMPACT, PARTED
-from pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
-from pipeline.post.impacts import impacts, of_kind
-from pipeline.post.rotations import angle_about_y
-from pipeline.post.schema import POST
+from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.artifacts.schema import conform
+from flexclear.pipeline.core.quantities import IMPACT, PARTED
+from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
+from flexclear.pipeline.post.impacts import impacts, of_kind
+from flexclear.pipeline.post.rotations import angle_about_y
+from flexclear.pipeline.post.schema import POST
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:

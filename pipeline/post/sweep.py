@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.post.plotting.style import INK, SOFT, files, grid, heading, plain, style
+from flexclear.pipeline.post.plotting.style import INK, SOFT, files, grid, heading, plain, style
 
 COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"

@@ -20,9 +20,9 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.artifacts.schema import Schema, Variable, conform
-from pipeline.post import chaos
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.artifacts.schema import Schema, Variable, conform
+from flexclear.pipeline.post import chaos
 
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 #: K of the 0-1 test below which a motion is regular, and above which chaotic; in between a finite series cannot tell

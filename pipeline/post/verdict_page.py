@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import xarray as xr
 
-from pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 INTRODUCTION = """# Periodic, quasi-periodic or chaotic
 

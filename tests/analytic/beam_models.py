@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 import xarray as xr
 
-from pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam, mesh
 from tests.analytic.beam_solutions import PAPER_ROD
 
 RECIPE = {

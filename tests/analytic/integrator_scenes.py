@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.run.engine import Engine, prepare
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: a tolerance at which no projection is made within these short runs, so that the method alone is seen
 NO_PROJECTION = 1e-2

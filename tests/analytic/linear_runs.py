@@ -6,14 +6,14 @@ from functools import cache
 
 import xarray as xr
 
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.mechanism_runs import TREE, Overrides, bundles
 
 
 @cache
 def frequencies(name: str, overrides: Overrides = (), time: float | None = None, *, moving: bool = False) -> xr.Dataset:
     """The vibrations of a scene; overrides as ((place, value), ...)."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
     return dynamics.frequencies(scene, bundles(scene), lambda share, text: None, time, None, moving)

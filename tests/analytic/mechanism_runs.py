@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from stages import run as stages
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.stages import run as stages
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
@@ -35,7 +35,7 @@ def _table(value: object) -> object:
 @cache
 def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
     """The run of a scene; overrides as ((place, value), ...), a table as pairs too."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override={place: _table(value) for place, value in overrides})
     return dynamics.simulate(scene, bundles(scene), silent)

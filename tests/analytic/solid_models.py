@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.kinds.kind import of_recipe
 
 #: Wang & Wang (2019), Table 2
 ALUMINIUM = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}

@@ -6,9 +6,9 @@ from typing import Any
 
 import xarray as xr
 
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import edited, load_scene
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 
 
@@ -21,7 +21,7 @@ def recorded(name: str, changes: dict[str, Any]) -> tuple[Scene, dict[str, xr.Da
 
 def run(name: str, changes: dict[str, Any]) -> xr.Dataset:
     """The run of such a scene."""
-    from pipeline import dynamics
+    from flexclear.pipeline import dynamics
 
     return dynamics.simulate(*recorded(name, changes), silent)
 

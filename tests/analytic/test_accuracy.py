@@ -6,10 +6,10 @@ import json
 
 import pytest
 
-from pipeline import dynamics, load_scene
-from pipeline.core import quantities
-from pipeline.core.errors import InputError
-from pipeline.core.scene.wanted import parse
+from flexclear.pipeline import dynamics, load_scene
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.wanted import parse
 from tests.analytic.mechanism_runs import TREE, bundles
 
 CSJ = TREE / "scenes" / "sps4" / "csj.toml"

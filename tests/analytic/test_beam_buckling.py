@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam, mesh
 from tests.analytic.beam_models import BENDING, HELD, RECIPE, build, frequencies, order
 from tests.analytic.beam_solutions import PAPER_ROD
 

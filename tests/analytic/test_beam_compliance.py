@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.beam_solutions import PAPER_ROD, cantilever_compliance
 

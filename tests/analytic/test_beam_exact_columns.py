@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.structure.closed_form import beside
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.closed_form import beside
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import build
 
 FINE: dict[str, Any] = {"elements": 24, "torsion": "quadratic", "extension": "quadratic"}

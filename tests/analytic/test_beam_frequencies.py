@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.structure.closed_form import frequencies as closed_form
-from pipeline.structure.fe import beam
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, build, frequencies
 from tests.analytic.beam_solutions import PAPER_ROD, Rod, element_stiffness, rayleigh_frequencies
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from pipeline.structure.closed_form import frequencies as closed_form
-from pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure.fe import beam, mesh
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
 
 CHECKS = Path(__file__).parents[2] / "meshes" / "checks"

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 
 MESHES = Path(__file__).parents[2] / "meshes"
 #: Hz, elastic modes

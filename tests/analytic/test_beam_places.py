@@ -9,10 +9,10 @@ import pytest
 import scipy.linalg
 import xarray as xr
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.structure.fe import beam, mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
 
 POSES: dict[str, dict[str, Any]] = {

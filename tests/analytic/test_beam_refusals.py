@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import mesh
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import mesh
 from tests.analytic.beam_models import RECIPE
 
 CIRCLE = {"type": "circle", "radius": "10 mm"}

@@ -10,9 +10,9 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from pipeline.structure.fe import beam, mesh, section
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.fe import beam, mesh, section
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE, build
 
 # Timoshenko & Goodier, *Theory of Elasticity*, sec. 109: J = k1 b a^3 by b/a, printed digits

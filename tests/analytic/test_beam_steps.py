@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from pipeline.structure.closed_form import frequencies as closed_form
-from pipeline.structure.fe import beam, mesh
-from pipeline.structure.fe.slices import slices
+from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe.slices import slices
 from tests.analytic.beam_models import RECIPE, build, order
 from tests.analytic.beam_solutions import PAPER_ROD
 from tests.analytic.stepped_rods import Lump, Piece, frequencies

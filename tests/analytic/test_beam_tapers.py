@@ -12,8 +12,8 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import iv, jv, kv, yv
 
-from pipeline.structure.fe import beam, mesh
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, BENDING_Z, EXTENSION, RECIPE, TORSION, frequencies, order
 from tests.analytic.beam_solutions import PAPER_ROD
 

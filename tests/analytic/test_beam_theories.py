@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from pipeline.structure.closed_form import frequencies as closed_form
-from pipeline.structure.closed_form.frequencies import Span
-from pipeline.structure.fe import beam
-from pipeline.structure.fe.section import circle_shear_coefficient
+from flexclear.pipeline.structure.closed_form import frequencies as closed_form
+from flexclear.pipeline.structure.closed_form.frequencies import Span
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.fe.section import circle_shear_coefficient
 from tests.analytic.beam_models import (
     BENDING,
     BENDING_Z,

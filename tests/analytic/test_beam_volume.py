@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.beam_solutions import PAPER_ROD
 

@@ -9,16 +9,16 @@ import pytest
 import scipy.sparse.linalg
 import xarray as xr
 
-from pipeline.core.artifacts import compliance as core
-from pipeline.core.artifacts import deficits as words
-from pipeline.core.artifacts import modal
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import mesh
-from pipeline.structure.fe.model import Model
-from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import bundle, deficits
-from pipeline.structure.modes.solution import solve
-from pipeline.structure.modes.statics import support
+from flexclear.pipeline.core.artifacts import compliance as core
+from flexclear.pipeline.core.artifacts import deficits as words
+from flexclear.pipeline.core.artifacts import modal
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.structure.modes import bundle, deficits
+from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.modes.statics import support
 
 MESHES = Path(__file__).parents[2] / "meshes"
 BASES = [("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 13), ("cantilever", 8), ("craig-chang", 19)]

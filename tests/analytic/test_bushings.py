@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import run
 

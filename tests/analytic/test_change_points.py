@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import silent
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.run.run import integrate
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import change_points as cp
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, simulate

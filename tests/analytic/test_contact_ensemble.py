@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.errors import InputError
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.post import derive
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
 

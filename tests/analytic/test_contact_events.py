@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import simulate
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import simulate
 from tests.analytic.mechanism_runs import Overrides, run
 
 BOUNCE, ROLLING = "checks/bounce", "checks/socket_rolling"

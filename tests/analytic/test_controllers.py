@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, run
 
 SCENE = "checks/controllers"

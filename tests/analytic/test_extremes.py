@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.artifacts.event_kinds import EVENT_KINDS
-from pipeline.post import derive
+from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import run
 
 DENSER = 50

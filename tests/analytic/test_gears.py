@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.errors import InputError
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.mobility import analyse
-from pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.mobility import analyse
+from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, bundles, run
 
 SCENE = "checks/gears"

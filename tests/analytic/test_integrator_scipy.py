@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.run.start import consistent_start
 from tests.analytic.integrator_scenes import double_pendulum, engine_with, ledger_free, trajectory
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.run import trajectory
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.run import trajectory
 from tests.analytic.mechanism_runs import TREE
 
 ROLLING, END = "checks/socket_rolling.toml", "3 ms"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline import dynamics
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import TREE, bundles
 

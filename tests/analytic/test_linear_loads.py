@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 
 G, MASS, STIFFNESS, COUNT, REST = 9.81, 0.4, 900.0, 5, 0.1

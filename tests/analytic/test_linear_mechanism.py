@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline import dynamics
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.linear.bench import state
-from pipeline.dynamics.linear.equilibrium import equilibrium
-from pipeline.dynamics.linear.vibrations import vibrations
-from pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.linear.bench import state
+from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium
+from flexclear.pipeline.dynamics.linear.vibrations import vibrations
+from flexclear.pipeline.dynamics.run.trajectory import integrate
 from tests.analytic.mechanism_runs import TREE, bundles
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from tests.analytic.mechanism_runs import impacts, run
 from tests.reference import contact_solutions as exact
 from tests.reference import sps4

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run
 
 REFERENCE = Path(__file__).resolve().parents[1] / "reference"

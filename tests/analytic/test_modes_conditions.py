@@ -11,14 +11,14 @@ import pytest
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import mesh
-from pipeline.structure.fe.model import Model
-from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import compliance, eigen
-from pipeline.structure.modes.select import Wanted
-from pipeline.structure.modes.solution import solve
-from pipeline.structure.modes.statics import Flexibility, support
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.structure.modes import compliance, eigen
+from flexclear.pipeline.structure.modes.select import Wanted
+from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 MESHES = Path(__file__).parents[2] / "meshes"
 #: the rod of ../../meshes/actuated_rod.toml
@@ -114,8 +114,8 @@ def means(model: Model) -> sp.csr_array:
 def test_dense_and_sparse_solvers_agree_on_held_functionals(
     monkeypatch: pytest.MonkeyPatch, body: Flexibility, rows: Callable[[Model], sp.csr_array]
 ) -> None:
-    from pipeline.core.progress import silent
-    from pipeline.structure.modes import normal
+    from flexclear.pipeline.core.progress import silent
+    from flexclear.pipeline.structure.modes import normal
 
     held = rows(body.model)
     dense = normal.lowest(body.model, held, 8, lambda: body, silent)

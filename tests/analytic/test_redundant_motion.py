@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 from scipy.special import ellipj, ellipk
 
-from pipeline import dynamics
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import run
 from tests.properties import movable

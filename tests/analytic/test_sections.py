@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-import pipeline
-from pipeline import dynamics
-from pipeline.core.errors import InputError
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Scene
-from pipeline.post.verdict import derive
-from stages.__main__ import main
+from flexclear import pipeline
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.post.verdict import derive
+from flexclear.stages.__main__ import main
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
 CHAOTIC = 0.112

@@ -7,12 +7,12 @@ import pytest
 from skfem import Basis, ElementHex1, ElementTetP2, ElementVector, MeshHex, MeshTet2
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.solid import elasticity, lattice
-from pipeline.structure.fe.solid.elasticity import Solid
-from pipeline.structure.fe.solid.elements import ELEMENTS, shape_functions
-from pipeline.structure.fe.solid.geometry import Geometry, check
-from pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.solid import elasticity, lattice
+from flexclear.pipeline.structure.fe.solid.elasticity import Solid
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, shape_functions
+from flexclear.pipeline.structure.fe.solid.geometry import Geometry, check
+from flexclear.pipeline.structure.kinds.kind import of_mesh
 from tests.analytic.solid_models import block, build
 
 LAME, SHEAR = lame_parameters(7.17e10, 0.33)

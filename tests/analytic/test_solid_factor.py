@@ -7,11 +7,11 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from pipeline.core.errors import SolverError
-from pipeline.structure.fe.solid import elasticity, lattice
-from pipeline.structure.fe.solid.elasticity import Solid
-from pipeline.structure.sparse.dissection import dissect
-from pipeline.structure.sparse.multifrontal import cholesky, negative_pivots
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.structure.fe.solid import elasticity, lattice
+from flexclear.pipeline.structure.fe.solid.elasticity import Solid
+from flexclear.pipeline.structure.sparse.dissection import dissect
+from flexclear.pipeline.structure.sparse.multifrontal import cholesky, negative_pivots
 
 
 @pytest.fixture(scope="module")

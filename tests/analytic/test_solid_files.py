@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.solid import lattice
-from pipeline.structure.fe.solid.elements import ELEMENTS
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.solid import lattice
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.solid_models import ALUMINIUM, build
 
 STEEL = {"density": 7800.0, "youngs_modulus": 2.1e11, "poisson": 0.3}

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.structure.fe.solid.elements import shape_functions
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.fe.solid.elements import shape_functions
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.solid_models import build, gauss, rod
 from tests.properties.test_bundle_integrals import kinetic
 

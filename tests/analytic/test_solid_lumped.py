@@ -11,11 +11,11 @@ import scipy.io
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import mesh
-from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.solid_models import build
 

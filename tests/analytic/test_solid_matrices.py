@@ -11,13 +11,13 @@ import scipy.io
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import mesh as beams
-from pipeline.structure.fe.exchange import files
-from pipeline.structure.fe.model import Model
-from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import mesh as beams
+from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.solid_models import block, build
 
 MESHES = Path(__file__).parents[2] / "meshes"

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.core.errors import InputError
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.solid_models import ALUMINIUM, block, build, rod
 
 #: exact Timoshenko (kappa 0.8886), torsion and axial frequencies [Hz] of the free rod, as in docs/paper.md

@@ -11,16 +11,16 @@ import pytest
 import xarray as xr
 from pydantic import ValidationError
 
-import pipeline
-from pipeline.core.artifacts.store import write_dataset
-from pipeline.core.errors import InputError
-from pipeline.core.progress import silent
-from pipeline.core.scene.parts import FlexibleBody, Modes
-from pipeline.core.workflow import opened
-from pipeline.structure.fe.exchange import files
-from pipeline.structure.kinds.kind import of_mesh
-from stages import s1_mesh, s2_modes, s3_bundle
-from stages.__main__ import main
+from flexclear import pipeline
+from flexclear.pipeline.core.artifacts.store import write_dataset
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.parts import FlexibleBody, Modes
+from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.stages import s1_mesh, s2_modes, s3_bundle
+from flexclear.stages.__main__ import main
 from tests.analytic.solid_models import block, build
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -35,8 +35,8 @@ def stored(data: xr.Dataset, path: Path) -> xr.Dataset:
 def test_a_solid_goes_through_the_stages(tmp_path: Path) -> None:
     recipe = MESHES / "checks" / "solid_rod.toml"
     body = FlexibleBody(type="flexible", mesh=str(recipe), modes=Modes(reference="craig-bampton", up_to="5000 Hz"))
-    assert s1_mesh.modules(recipe) == ("pipeline.structure.kinds.solid",)
-    assert "pipeline.structure.kinds.solid" in s2_modes.modules(body, "scene")
+    assert s1_mesh.modules(recipe) == ("flexclear.pipeline.structure.kinds.solid",)
+    assert "flexclear.pipeline.structure.kinds.solid" in s2_modes.modules(body, "scene")
     made = s1_mesh.run(s1_mesh.params(recipe), {}, silent)
     mesh = stored(made["nc"], tmp_path / "mesh.nc")
     solved = s2_modes.run(s2_modes.params(body), {"mesh": mesh}, silent)

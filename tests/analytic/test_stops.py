@@ -9,10 +9,10 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, impacts, run
 
 SCENE = "checks/stops"

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
-from pipeline.structure.fe import section as sections
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
-from pipeline.structure.stress.beam import recover
-from pipeline.structure.stress.outline import Outline, outline
-from stages.graph import Graph
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
+from flexclear.pipeline.structure.fe import section as sections
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.stress.beam import recover
+from flexclear.pipeline.structure.stress.outline import Outline, outline
+from flexclear.stages.graph import Graph
 from tests.analytic.beam_models import build
 
 NU = 0.33
@@ -102,7 +102,7 @@ def test_round_outlines_carry_no_shear_across_themselves(
 @pytest.mark.parametrize("hole", [0.0, HOLE])
 def test_shear_of_a_round_section_sums_to_its_force(hole: float) -> None:
     """Midpoint rule on rings made of the maps of thin tubes would hide the hole; so fibres of the solution itself."""
-    from pipeline.structure.stress.outline import _flexure
+    from flexclear.pipeline.structure.stress.outline import _flexure
 
     n = 200
     r = hole + (np.arange(n) + 0.5) / n * (R - hole)
@@ -196,9 +196,9 @@ def test_absent_means_not_in_any_key(root: Path) -> None:
     for graph, there in ((without, False), (asked, True)):
         bundles, simulate = graph.bundle["rod"], graph.simulate
         assert ("stress" in bundles.params) is there
-        assert ("pipeline.structure.stress.beam" in bundles.modules) is there
+        assert ("flexclear.pipeline.structure.stress.beam" in bundles.modules) is there
         assert ("stress" in simulate.params["scene"]["output"]) is there
-        assert ("pipeline.dynamics.record.stress" in simulate.modules) is there
+        assert ("flexclear.pipeline.dynamics.record.stress" in simulate.modules) is there
 
 
 @pytest.mark.parametrize("names", [["wall"], ["rod", "ground"], []])

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.errors import SolverError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.record.dataset import dataset as dataset_of
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.run import integrate
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.record.dataset import dataset as dataset_of
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import four_bars
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import Table, simulate

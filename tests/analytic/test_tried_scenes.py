@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from pipeline import dynamics
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.analytic.test_rotors import ritz
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics, load_scene
-from pipeline.core.errors import SolverError
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.run.validity import BENT, SPIN, largest
+from flexclear.pipeline import dynamics, load_scene
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.run.validity import BENT, SPIN, largest
 from tests.analytic.mechanism_runs import TREE, bundles
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it

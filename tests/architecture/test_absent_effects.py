@@ -11,41 +11,42 @@ from typing import Any
 
 import pytest
 
-from pipeline.core.registry import module_of
-from pipeline.core.scene.load import compose, load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import loads
-from pipeline.dynamics.compile import functions
-from pipeline.dynamics.compile.sources import sources
-from pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene.load import compose, load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import loads
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile.sources import sources
+from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import bundles
 
 CONTACT = (
-    "pipeline.dynamics.contact",
-    "pipeline.dynamics.joints.clearance_spherical",
-    "pipeline.dynamics.integrate.contact_events",
-    "pipeline.dynamics.integrate.contact_phases",
+    "flexclear.pipeline.dynamics.contact",
+    "flexclear.pipeline.dynamics.joints.clearance_spherical",
+    "flexclear.pipeline.dynamics.integrate.contact_events",
+    "flexclear.pipeline.dynamics.integrate.contact_phases",
 )
 APPLIED = (
-    "pipeline.dynamics.loads.fields",
-    "pipeline.dynamics.loads.composing",
-    "pipeline.dynamics.drives.oscillation",
-    "pipeline.dynamics.starts",
-    "pipeline.dynamics.linear",
+    "flexclear.pipeline.dynamics.loads.fields",
+    "flexclear.pipeline.dynamics.loads.composing",
+    "flexclear.pipeline.dynamics.drives.oscillation",
+    "flexclear.pipeline.dynamics.starts",
+    "flexclear.pipeline.dynamics.linear",
 )
-FLEXIBLE = ("pipeline.dynamics.bodies.flexible", "pipeline.dynamics.bodies.ports", "pipeline.structure")
+BODIES = "flexclear.pipeline.dynamics.bodies"
+FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.ports", "flexclear.pipeline.structure")
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 
 #: runs a scene for a moment, then says which modules of the project it took
 RUN = """
 import sys
-from pipeline import dynamics
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.load import load_scene
 dynamics.simulate(load_scene(sys.argv[1], {"time.end": "0.2 ms"}), {}, lambda share, text: None)
-print(*[name for name in sys.modules if name.startswith("pipeline.")])
+print(*[name for name in sys.modules if name.startswith("flexclear.pipeline.")])
 """
 
 
@@ -65,7 +66,7 @@ def below(names: set[str], families: tuple[str, ...]) -> set[str]:
 
 def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: Path) -> None:
     names = imported_by_a_run(root, IDEAL)
-    assert "pipeline.dynamics.joints.spherical" in names
+    assert "flexclear.pipeline.dynamics.joints.spherical" in names
     assert below(names, (*CONTACT, *FLEXIBLE, *APPLIED)) == set()
 
 
@@ -73,8 +74,9 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     """Also shows that the test above would notice."""
     names = imported_by_a_run(root, CSJ)
     laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
-    normal = {"pipeline.dynamics.contact.normal.lankarani_nikravesh"}
-    assert laws == normal | {f"pipeline.dynamics.contact.friction.{n}" for n in ("modified_coulomb", "memoryless")}
+    normal = {"flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh"}
+    friction = "flexclear.pipeline.dynamics.contact.friction"
+    assert laws == normal | {f"{friction}.{n}" for n in ("modified_coulomb", "memoryless")}
     assert below(names, FLEXIBLE) == set()
 
 
@@ -97,16 +99,16 @@ def reached(texts: dict[str, str]) -> set[str]:
 
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
-    "contact": ("clearance_spherical", "pipeline.dynamics.joints.clearance_spherical"),
-    "normal law": ("import hysteretic", "pipeline.dynamics.contact.form.hysteretic"),
-    "friction": ("modified_coulomb", "pipeline.dynamics.contact.friction.modified_coulomb"),
-    "flexible bodies": ("flexible_bodies", "pipeline.dynamics.bodies.flexible"),
-    "closures": ("closures=", "pipeline.dynamics.equations.closures"),
-    "couplings": ("closures=couplings", "pipeline.dynamics.equations.couplings"),
-    "stops": ("make_stops", "pipeline.dynamics.contact.stops"),
-    "stiffening": ("import shortening", "pipeline.dynamics.bodies.shortening"),
-    "loads": ("make_loads", "pipeline.dynamics.loads.composing"),
-    "harmonics": ("import oscillate", "pipeline.dynamics.drives.oscillation"),
+    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.joints.clearance_spherical"),
+    "normal law": ("import hysteretic", "flexclear.pipeline.dynamics.contact.form.hysteretic"),
+    "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
+    "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
+    "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
+    "couplings": ("closures=couplings", "flexclear.pipeline.dynamics.equations.couplings"),
+    "stops": ("make_stops", "flexclear.pipeline.dynamics.contact.stops"),
+    "stiffening": ("import shortening", "flexclear.pipeline.dynamics.bodies.shortening"),
+    "loads": ("make_loads", "flexclear.pipeline.dynamics.loads.composing"),
+    "harmonics": ("import oscillate", "flexclear.pipeline.dynamics.drives.oscillation"),
 }
 SPRING = ("spring-damper",)
 SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
@@ -158,10 +160,10 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     found, present = CASES[case]
     modules = reached(sources(found, SCHEME))
     wanted = {module_of(JOINTS, n) for n in found.joints}
-    wanted.add("pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
+    wanted.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
-        wanted.add("pipeline.dynamics.joints.clearance_spherical")
-    assert below(modules, ("pipeline.dynamics.joints",)) == wanted
+        wanted.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
+    assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == wanted
     if not {"contact", "stops"} & present:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
@@ -173,7 +175,7 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 
 def test_frictionless_clearance_reaches_no_friction_law() -> None:
     modules = reached(sources(CASES["smooth clearance"][0], SCHEME))
-    assert below(modules, ("pipeline.dynamics.contact.friction",)) == set()
+    assert below(modules, ("flexclear.pipeline.dynamics.contact.friction",)) == set()
 
 
 # What the machine code is keyed by ----------------------------------------------------------------------------------
@@ -185,7 +187,7 @@ def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
 
 def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
     """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
-    assert "pipeline.core.artifacts.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
+    assert "flexclear.pipeline.core.artifacts.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
 
 
 def digest(scene: Scene) -> str:
@@ -299,8 +301,8 @@ def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
 #: runs scenes one after the other in one process
 BOTH = """
 import sys
-from pipeline import dynamics
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.load import load_scene
 for path in sys.argv[1:]:
     done = dynamics.simulate(load_scene(path, {"time.end": "0.2 ms"}), {}, lambda share, text: None)
     assert abs(done.energy_error).max() < 1e-9, path

@@ -47,8 +47,8 @@ def edited(text: str, hunk: str) -> str:
 
 def installed(root: Path, tree: Path, name: str) -> Path:
     """A copy of the sources with the example in it."""
-    for package in ("pipeline", "stages"):
-        shutil.copytree(root / package, tree / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for package in ("flexclear", "pipeline", "stages"):
+        shutil.copytree(root / package, tree / package, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(examples(root) / f"{name}.py", tree / PLACES[name])
     head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")
     place = tree / head.removeprefix("--- ").strip()
@@ -60,7 +60,7 @@ def installed(root: Path, tree: Path, name: str) -> Path:
 def flexclear(tree: Path, *arguments: str) -> str:
     own = {"PYTHONPATH": str(tree), "FLEXCLEAR_RESULTS": str(tree / "results"), "NUMBA_DISABLE_JIT": "1"}
     own["FLEXCLEAR_KERNELS"] = str(tree / "kernels")
-    command = [sys.executable, "-m", "stages", *arguments]
+    command = [sys.executable, "-m", "flexclear", *arguments]
     done = subprocess.run(command, cwd=tree, env=os.environ | own, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout

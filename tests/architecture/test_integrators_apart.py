@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.core.registry import lookup
-from pipeline.core.scene.load import load_scene
-from pipeline.dynamics.compile import functions
-from pipeline.dynamics.compile.sources import sources
-from pipeline.dynamics.effects import Parts, Scheme, scheme_of
-from pipeline.dynamics.integrate import NAMES
-from pipeline.dynamics.integrate.method import keep_nothing
-from stages import s4_simulate
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile.sources import sources
+from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
+from flexclear.pipeline.dynamics.integrate import NAMES
+from flexclear.pipeline.dynamics.integrate.method import keep_nothing
+from flexclear.stages import s4_simulate
 
-PACKAGE = "pipeline.dynamics.integrate"
+PACKAGE = "flexclear.pipeline.dynamics.integrate"
 PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 #: modules of one integrator, reached by those that name it only
 PRIVATE = {
@@ -102,5 +102,5 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
 @pytest.mark.parametrize("solver", [{}, {"step": 1e-5}, {"integrator": "rk4", "step": 1e-5, "events": "at step ends"}])
 def test_the_key_of_a_run_holds_what_its_code_reaches(root: Path, solver: dict) -> None:
     scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": solver})
-    known = functions.SOURCES.closure(["stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
+    known = functions.SOURCES.closure(["flexclear.stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
     assert {f"{PACKAGE}.{name}" for name in reached(scheme_of(scene.solver))} <= set(known)

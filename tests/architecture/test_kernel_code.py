@@ -8,7 +8,7 @@ import pytest
 from numba import njit
 from numba.core.codegen import CPUCodeLibrary
 
-from pipeline.dynamics.kernels import Part, kernel
+from flexclear.pipeline.dynamics.kernels import Part, kernel
 
 
 def tower() -> tuple[Callable, Callable, Callable]:

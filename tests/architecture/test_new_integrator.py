@@ -16,13 +16,13 @@ MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 
 import numpy as np
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import hermite
-from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
-from pipeline.dynamics.integrate.norms import error_scale
-from pipeline.dynamics.integrate.runge_kutta import make_stages
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import hermite
+from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from flexclear.pipeline.dynamics.integrate.norms import error_scale
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.kernels import kernel
 
 A = np.array([[0.0, 0.0], [1.0, 0.0]])
 B, C = np.array([0.5, 0.5]), np.array([0.0, 1.0])
@@ -64,8 +64,8 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project with the module and the line, and two scenes of a pendulum."""
     folder = tmp_path_factory.mktemp("project")
-    for name in ("pipeline", "stages"):
-        shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("flexclear", "pipeline", "stages"):
+        shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     (folder / FOLDER / "heun_euler.py").write_text(MODULE)
     before, above, after = (folder / LIST).read_text().partition(ABOVE)
     assert above
@@ -98,13 +98,13 @@ def asked(python: Command, code: str) -> object:
 
 
 def test_the_schema_of_scenes_knows_it(python: Command) -> None:
-    done = python("-m", "stages", "schema")
+    done = python("-m", "flexclear", "schema")
     assert done.returncode == 0, done.stderr
     assert "heun" in json.loads(done.stdout)["$defs"]["PlainIntegrator"]["properties"]["integrator"]["enum"]
 
 
 def test_a_misspelt_name_is_told_its_name(python: Command) -> None:
-    done = python("-m", "stages", "run", "none.toml", "--to", "simulate")
+    done = python("-m", "flexclear", "run", "none.toml", "--to", "simulate")
     assert done.returncode == 2
     assert "did you mean 'heun'" in done.stderr
 
@@ -114,8 +114,8 @@ def test_a_scene_runs_with_chosen_and_with_fixed_steps(python: Command) -> None:
     found = asked(
         python,
         """
-from pipeline import dynamics
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.load import load_scene
 ends = {}
 for name, solver in {"chosen": {"rtol": 1e-6}, "fixed": {"step": 0.004}}.items():
     scene = load_scene("new.toml", {"solver": {"integrator": "heun", **solver}})
@@ -135,7 +135,7 @@ print(json.dumps(ends))
 
 def test_refusals_name_it_and_its_remedy(copy: Path, python: Command) -> None:
     (copy / "short.toml").write_text((copy / "new.toml").read_text() + "evaluations = 40\n")
-    done = python("-m", "stages", "run", "short.toml", "--to", "simulate")
+    done = python("-m", "flexclear", "run", "short.toml", "--to", "simulate")
     assert done.returncode == 3
     assert "at last by heun" in done.stderr
     assert "radau where contacts or friction are stiff" in done.stderr
@@ -145,8 +145,8 @@ def test_a_cost_study_compares_it(python: Command) -> None:
     found = asked(
         python,
         """
-from pipeline.core.scene.load import load_scene
-from stages import cost_design
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.stages import cost_design
 designs = cost_design.runs(load_scene("own.toml"), None, ("heun",))
 print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.scene.solver.step] for d in designs]))
 """,
@@ -158,7 +158,7 @@ print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.sc
 
 
 def test_figures_tell_it_from_all_others(python: Command) -> None:
-    code = "from pipeline.post.cost.work_precision import LOOKS\nprint(json.dumps(LOOKS))"
+    code = "from flexclear.pipeline.post.cost.work_precision import LOOKS\nprint(json.dumps(LOOKS))"
     looks = asked(python, code)
     assert isinstance(looks, dict)
     assert len({tuple(look) for look in looks.values()}) == len(looks)
@@ -166,15 +166,15 @@ def test_figures_tell_it_from_all_others(python: Command) -> None:
 
 
 KEYS = """
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
 from pathlib import Path
-from stages import s4_simulate
+from flexclear.stages import s4_simulate
 sources = Sources(Path.cwd())
 found = {}
 for name in ("new", "own"):
     modules = s4_simulate.modules(load_scene(f"{name}.toml"))
-    found[name] = sorted(sources.closure(["stages.s4_simulate", *modules]))
+    found[name] = sorted(sources.closure(["flexclear.stages.s4_simulate", *modules]))
 print(json.dumps(found))
 """
 
@@ -183,16 +183,16 @@ def test_keys_hold_its_module_and_what_goes_on_for_it(python: Command) -> None:
     found = asked(python, KEYS)
     assert isinstance(found, dict)
     new, own = (set(found[name]) for name in ("new", "own"))
-    package = "pipeline.dynamics.integrate"
+    package = "flexclear.pipeline.dynamics.integrate"
     assert {f"{package}.heun_euler", f"{package}.radau"} <= new
     assert f"{package}.heun_euler" not in own
 
 
 def test_it_makes_no_other_integrator_compile_anew(root: Path, python: Command) -> None:
     code = """
-from pipeline.dynamics.compile.functions import digest
-from pipeline.dynamics.compile.sources import sources
-from pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.dynamics.compile.functions import digest
+from flexclear.pipeline.dynamics.compile.sources import sources
+from flexclear.pipeline.dynamics.effects import Parts, Scheme
 parts = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 print(json.dumps({name: digest(text) for name, text in sources(parts, Scheme("dop853")).items()}))
 """

@@ -9,7 +9,7 @@ from pathlib import Path
 import grimp
 import pytest
 
-DYNAMICS = "pipeline.dynamics"
+DYNAMICS = "flexclear.pipeline.dynamics"
 Arrows = set[tuple[str, str]]
 
 
@@ -27,12 +27,12 @@ def drawn(root: Path) -> Arrows:
 
 def imports() -> Arrows:
     """The same, between folders and single modules of the tower, as it is."""
-    graph = grimp.build_graph("pipeline", cache_dir=None)
+    graph = grimp.build_graph("flexclear", cache_dir=None)
     found = set()
     for module in graph.modules:
         for other in graph.find_modules_directly_imported_by(module):
             if module.startswith(f"{DYNAMICS}.") and other.startswith(f"{DYNAMICS}."):
-                found.add((module.split(".")[2], other.split(".")[2]))
+                found.add((module.split(".")[3], other.split(".")[3]))
     return {(a, b) for a, b in found if a != b}
 
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
-from pipeline.core.scene.schema import Scene
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.dynamics import effects
-from pipeline.dynamics.compile import functions
-from pipeline.dynamics.compile.sources import modules, sources
-from pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.dynamics import effects
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile.sources import modules, sources
+from flexclear.pipeline.dynamics.effects import Parts, Scheme
 
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
 
@@ -90,7 +90,7 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     """For each type of joint, driven in part where it has several freedoms: a chain of others may take its place."""
     scene = scene_with({"type": name}, solver=solver)
     tree = Sources(root)
-    known = tree.closure(["stages.s4_simulate", *modules(scene)]).keys()
+    known = tree.closure(["flexclear.stages.s4_simulate", *modules(scene)]).keys()
     declared = import_module(module_of(effects.JOINTS, "NAMES", name))
     part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
@@ -119,12 +119,12 @@ BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
             }
         },
         Parts(("cylindrical",), forms=("hysteretic",), stops=True),
-        "pipeline.dynamics.contact.stops",
+        "flexclear.pipeline.dynamics.contact.stops",
     ),
     "gear": (
         {"gear": {"screw": {"first": "J.rotation", "second": "J.translation", "ratio": 0.1}}},
         Parts(("cylindrical",), closures=True, couplings=True),
-        "pipeline.dynamics.equations.couplings",
+        "flexclear.pipeline.dynamics.equations.couplings",
     ),
 }
 
@@ -137,9 +137,9 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     texts = sources(parts, Scheme("dop853")).values()
     reached = {found for text in texts for found in functions.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
-    known = Sources(root).closure(["stages.s4_simulate", *modules(scene)]).keys()
+    known = Sources(root).closure(["flexclear.stages.s4_simulate", *modules(scene)]).keys()
     assert module in reached
     assert reached <= set(known)
     assert module not in modules(scene_with({"type": "cylindrical"}))
     if family == "stop":
-        assert "pipeline.dynamics.contact.normal.flores" in modules(scene)
+        assert "flexclear.pipeline.dynamics.contact.normal.flores" in modules(scene)

@@ -10,20 +10,20 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.artifacts.store import Record, Store
-from pipeline.core.workflow.fingerprint import TREE, Sources
-from pipeline.core.workflow.task import Task, facts, in_order, key
-from stages import report
-from stages.run import Workplace
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
+from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key
+from flexclear.stages import report
+from flexclear.stages.run import Workplace
 
 #: what such a command may import: its own code, and what checks scenes
-ALLOWED = {"pipeline", "stages", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
+ALLOWED = {"flexclear", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
 ALLOWED |= {"typing_inspection"}
 #: what takes a tenth of a second or more, and what it brings
 SLOW = {"numpy", "xarray", "pandas", "scipy", "numba", "matplotlib", "pyvista", "skfem", "meshio", "netCDF4"}
 #: the command, and what it has imported at its end
 COMMAND = """import sys
-from stages.__main__ import main
+from flexclear.stages.__main__ import main
 code = main(sys.argv[1:])
 print(*sys.modules, file=sys.stderr)
 sys.exit(code)"""

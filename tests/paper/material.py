@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
-from pipeline.post import derive
+from flexclear.pipeline.post import derive
 from tests.paper import synthetic
 
 #: deviations of the made-up runs from the made-up ideal one: wobble of z [m]

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from benchmarks.geometry import identify
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.scene.fields import Pose
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.reference import sps4
 
 TREE = Path(__file__).resolve().parents[2]

@@ -8,10 +8,10 @@ import io
 import numpy as np
 import pytest
 
-from pipeline.post.figures import table04, table05, table07, table08, table09, table10
-from pipeline.post.plotting.error_table import number
-from pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
-from pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
+from flexclear.pipeline.post.figures import table04, table05, table07, table08, table09, table10
+from flexclear.pipeline.post.plotting.error_table import number
+from flexclear.pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
+from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
 from tests.paper.material import WOBBLE, everything
 
 

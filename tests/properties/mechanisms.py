@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.scene.schema import Scene
 
 Table = dict[str, Any]
 GRAVITY = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}}

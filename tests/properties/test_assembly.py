@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.core.errors import FlexclearError, InputError
-from pipeline.core.scene.load import edited, load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.mechanism import Mechanism, build
-from pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, body, frame, joint, scene
 from tests.properties.test_dynamics_start import CRANK, GROUND, angles, driven, start_of

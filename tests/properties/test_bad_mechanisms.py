@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.compile import functions
-from pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, frame, joint, scene, turned
 from tests.properties.mechanisms import body as rigid

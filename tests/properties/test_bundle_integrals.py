@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 
 MESHES = Path(__file__).parents[2] / "meshes"
 CASES = [

@@ -12,14 +12,14 @@ import pytest
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import silent
-from pipeline.structure.fe import beam, mesh
-from pipeline.structure.fe.model import Model
-from pipeline.structure.kinds.kind import of_mesh
-from pipeline.structure.modes import eigen, normal, reference, select
-from pipeline.structure.modes.solution import solve
-from pipeline.structure.modes.statics import Flexibility, support
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.structure.modes import eigen, normal, reference, select
+from flexclear.pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 ROOT = Path(__file__).parents[2]
 WHOLE = [
@@ -143,7 +143,7 @@ from pathlib import Path
 import hashlib
 import numpy as np
 from tests.properties.test_bundle_modes import MANY, rod
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.structure.modes.solution import solve
 np.random.seed({seed})
 shapes = [solve(rod(n), "free-free", 7)["shape"].values for n in (12, MANY)]
 print(hashlib.sha256(b"".join(s.tobytes() for s in shapes)).hexdigest())

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import mesh, section
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import mesh, section
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.solution import solve
 
 MESHES = Path(__file__).parents[2] / "meshes"
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.quantities import standard_error
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.cost import statistics
+from flexclear.pipeline.core.quantities import standard_error
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.cost import statistics
 
 POSITION = Quantity("slider", "position")
 TIMES = Quantity("pin", "impact_times")

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.errors import SolverError
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.cost import causes, page, price, split, work_precision
-from pipeline.post.cost.study import Point, assemble, resolved
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.cost import causes, page, price, split, work_precision
+from flexclear.pipeline.post.cost.study import Point, assemble, resolved
 
 POSITION = Quantity("slider", "position")
 TIMES = Quantity("pin", "impact_times")

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline import load_scene
-from pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline import load_scene
+from flexclear.pipeline.dynamics.run.run import engine_of
 
 IDEAL = Path(__file__).parents[2] / "scenes" / "sps4" / "ideal.toml"
 

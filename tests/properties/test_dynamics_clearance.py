@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.registry import module_of
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import joints
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.contact import forces, friction
-from pipeline.dynamics.contact import form as forms
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import joints
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.contact import forces, friction
+from flexclear.pipeline.dynamics.contact import form as forms
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from tests.properties.kernels import from_python
 
 FRICTION: dict[str, dict[str, Any]] = {

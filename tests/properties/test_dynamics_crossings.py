@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline import dynamics
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
 
 #: radius of the swing [m] and its rate [rad/s]; the period is 2 pi s
 SWING, RATE = 1.0, 1.0

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.dynamics.model import tree
+from flexclear.pipeline.dynamics.model import tree
 from tests.properties.mechanisms import GRAVITY, body, frame, joint, scene, simulate
 
 #: joints that may close the two loops; the tree takes the others

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
 
-from pipeline.core.scene.laws import Law, Step
-from pipeline.dynamics import drives
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.oscillation import oscillate
-from pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from pipeline.dynamics.equations.prescribed_motion import make_known_motion
-from pipeline.dynamics.model import laws
+from flexclear.pipeline.core.scene.laws import Law, Step
+from flexclear.pipeline.dynamics import drives
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.oscillation import oscillate
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from flexclear.pipeline.dynamics.equations.prescribed_motion import make_known_motion
+from flexclear.pipeline.dynamics.model import laws
 from tests.analytic.mechanism_runs import run
 from tests.properties.kernels import from_python
 

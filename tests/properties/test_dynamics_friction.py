@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from pipeline.core.registry import lookup
-from pipeline.core.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
-from pipeline.dynamics.contact import friction
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
+from flexclear.pipeline.dynamics.contact import friction
 from tests.properties.kernels import from_python
 
 LUGRE = LuGre(

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.algebra import (
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.algebra import (
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.scene.fields import Pose
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, impacts
 
 IDEAL, CSJ, BOUNCE = "sps4/ideal", "sps4/csj", "checks/bounce"

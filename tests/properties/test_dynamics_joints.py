@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.core.algebra import rotation_vector_to_quaternion, skew
-from pipeline.core.registry import lookup
-from pipeline.dynamics import joints
+from flexclear.pipeline.core.algebra import rotation_vector_to_quaternion, skew
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.dynamics import joints
 from tests.properties.kernels import from_python
 
 #: places in a work space of the tests' own

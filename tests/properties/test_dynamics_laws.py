@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.core.registry import lookup, module_of
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.dynamics.contact import form as forms
-from pipeline.dynamics.contact import normal
-from pipeline.dynamics.contact.law import Resolved
+from flexclear.pipeline.core.registry import lookup, module_of
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.dynamics.contact import form as forms
+from flexclear.pipeline.dynamics.contact import normal
+from flexclear.pipeline.dynamics.contact.law import Resolved
 from tests.properties.kernels import from_python
 
 Parameters = tuple[float, float, float, float]

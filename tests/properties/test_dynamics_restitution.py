@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.dynamics.contact import restitution
-from pipeline.dynamics.contact.normal import kelvin_voigt, lankarani_nikravesh
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.dynamics.contact import restitution
+from flexclear.pipeline.dynamics.contact.normal import kelvin_voigt, lankarani_nikravesh
 from tests.properties.test_dynamics_laws import NORMAL, Law, called, laws
 from tests.reference import contact_solutions as exact
 

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline import dynamics
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.given_start import moved
-from pipeline.dynamics.model.mechanism import Mechanism, build
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.assembly import assembled
+from flexclear.pipeline.dynamics.model.given_start import moved
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate
 from tests.properties.test_dynamics_cuts import two_loops

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.core.errors import SolverError
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.run import trajectory as stepping
-from pipeline.dynamics.run.run import observed
-from pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run import trajectory as stepping
+from flexclear.pipeline.dynamics.run.run import observed
+from flexclear.pipeline.dynamics.run.start import consistent_start
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
 ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]

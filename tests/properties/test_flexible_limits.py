@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.scene.load import load_scene, read_toml
-from pipeline.structure.fe import mesh
-from pipeline.structure.modes import bundle
-from pipeline.structure.modes.geometric_stiffness import variables
-from pipeline.structure.modes.solution import solve
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.load import load_scene, read_toml
+from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.modes import bundle
+from flexclear.pipeline.structure.modes.geometric_stiffness import variables
+from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.mechanism_runs import TREE
 
 END = 0.01

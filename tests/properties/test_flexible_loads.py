@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline import dynamics
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
 
 LOADS: dict[str, Any] = {

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.errors import InputError
-from pipeline.core.scene.fields import Inertia, Position
-from pipeline.core.scene.load import load_scene
-from pipeline.core.units import UNITS, quantity, unit
-from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.fields import Inertia, Position
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.units import UNITS, quantity, unit
+from flexclear.pipeline.dynamics.model.assembly import assembled
+from flexclear.pipeline.dynamics.model.mechanism import build
 
 BASE = """
 title = "sound"

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.core.errors import SolverError
-from pipeline.dynamics.linear.differences import Rounding, derivative
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 
 #: what a double resolves, as the callers say it
 FINE = Rounding(noise=1e-15, grain=0.0)

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.mobility import Mobility, analyse
-from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.model.rates import ZERO, rates
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.model.rates import ZERO, rates
 from tests.properties import movable
 from tests.properties.mechanisms import Table
 from tests.properties.movable import Joint, Mechanism, Random, Setting

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.errors import FlexclearError, InputError, ResourceError
-from pipeline.core.scene.limits import Limits
-from pipeline.core.scene.load import load_scene
-from pipeline.structure.kinds import kind
-from stages import s1_mesh
-from stages.graph import Graph
+from flexclear.pipeline.core.errors import FlexclearError, InputError, ResourceError
+from flexclear.pipeline.core.scene.limits import Limits
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.structure.kinds import kind
+from flexclear.stages import s1_mesh
+from flexclear.stages.graph import Graph
 from tests.properties.mutants import mutant, sound
 
 #: processor time [s], resident memory [MB] and bytes of a message at most; measured 0.4 s, 20 MB and 3.6 kB, where a
@@ -135,7 +135,7 @@ def test_a_title_is_no_formula() -> None:
     matplotlib.use("Agg")
     from matplotlib.figure import Figure
 
-    from pipeline.post.plotting.style import heading
+    from flexclear.pipeline.post.plotting.style import heading
 
     figure = Figure()
     heading(figure, r"Costs $x^{ and \frac$", "below")

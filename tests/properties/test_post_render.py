@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.post import body_shape, derive
-from pipeline.post.render import gl
-from pipeline.post.render.mechanism import mechanism, placed
-from pipeline.post.render.panel import panel
-from pipeline.post.render.pictures import pictures
-from pipeline.post.render.solids import equivalent, mesh, plate
-from pipeline.post.rod_shape import AROUND, PER_CELL, centre_line, scale_to, surface
+from flexclear.pipeline.post import body_shape, derive
+from flexclear.pipeline.post.render import gl
+from flexclear.pipeline.post.render.mechanism import mechanism, placed
+from flexclear.pipeline.post.render.panel import panel
+from flexclear.pipeline.post.render.pictures import pictures
+from flexclear.pipeline.post.render.solids import equivalent, mesh, plate
+from flexclear.pipeline.post.rod_shape import AROUND, PER_CELL, centre_line, scale_to, surface
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
@@ -185,7 +185,7 @@ def test_a_stepped_rod_is_drawn_with_each_cells_radius():
 @needs_gl
 @pytest.mark.parametrize("corners", [1, 3, 4])
 def test_shapes_of_solids_become_pages_and_files(corners, tmp_path):
-    from pipeline.post.render import shapes
+    from flexclear.pipeline.post.render import shapes
 
     plate = solid(corners)
     content = shapes.page(plate, 1)
@@ -202,7 +202,7 @@ def test_state_of_gl_is_said_without_drawing():
 
 
 def test_without_gl_there_are_no_pictures_but_a_line_that_says_why(monkeypatch, capsys):
-    monkeypatch.setattr("pipeline.post.render.gl.works", lambda: False)
+    monkeypatch.setattr("flexclear.pipeline.post.render.gl.works", lambda: False)
     assert pictures(xr.Dataset(), {}) == {}
     assert gl.REMEDY in capsys.readouterr().err
 
@@ -210,7 +210,7 @@ def test_without_gl_there_are_no_pictures_but_a_line_that_says_why(monkeypatch, 
 @needs_gl
 def test_a_film_moves():
     """Both the rod and the rigid bodies: a second picture of one scene shows what has moved since the first."""
-    from pipeline.post.render import film
+    from flexclear.pipeline.post.render import film
 
     run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
     drawn = mechanism(run, {"rod1": synthetic.bundle()})
@@ -233,7 +233,7 @@ def test_a_film_moves():
 @pytest.mark.slow
 def test_pictures_of_a_run_are_all_there_and_repeat(monkeypatch):
     # 24 pictures show as much as 168
-    monkeypatch.setattr("pipeline.post.render.film.SECONDS", 0.8)
+    monkeypatch.setattr("flexclear.pipeline.post.render.film.SECONDS", 0.8)
     run = synthetic.run("sps4/far_csj_cb", clearance=True, noise=1e-4, modes=7)
     first = pictures(run, {"rod1": synthetic.bundle()})
     assert {name.partition(".")[0] for name in first} == {"mechanism", "film", "mode_rod1", "modes_rod1"}

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.core.algebra import quaternion_product, rotation_between, rotation_vector_to_quaternion
-from pipeline.core.quantities import common_times
-from pipeline.post import derive
-from pipeline.post.errors import ensemble_deviations, max_deviation
-from pipeline.post.horizon import horizon, spread
-from pipeline.post.poincare import at_times, strobe_times
-from pipeline.post.rotations import angle_about_y
+from flexclear.pipeline.core.algebra import quaternion_product, rotation_between, rotation_vector_to_quaternion
+from flexclear.pipeline.core.quantities import common_times
+from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.errors import ensemble_deviations, max_deviation
+from flexclear.pipeline.post.horizon import horizon, spread
+from flexclear.pipeline.post.poincare import at_times, strobe_times
+from flexclear.pipeline.post.rotations import angle_about_y
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.post.render.view import plane, view
+from flexclear.pipeline.post.render.view import plane, view
 
 
 def moving(turn: np.ndarray, along: np.ndarray) -> xr.Dataset:

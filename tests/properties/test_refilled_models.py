@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import edited, load_scene, with_numbers
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.mobility import analyse
-from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.model.refill import refilled
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import edited, load_scene, with_numbers
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.mobility import analyse
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.model.refill import refilled
 
 STROKE = {"type": "step", "start": [0.0], "end": [0.1], "change": ["20 mm"]}
 #: scene, its changes, and whether refilling must do

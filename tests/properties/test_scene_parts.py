@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline import dynamics
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile import functions
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
-from stages import s4_simulate
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.stages import s4_simulate
 
 SCENE = """
 title = "wrong"

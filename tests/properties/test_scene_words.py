@@ -9,14 +9,14 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.core.algebra import quaternion_to_matrix, rotation_between
-from pipeline.core.artifacts import deficits
-from pipeline.core.errors import InputError
-from pipeline.core.scene.fields import Pose
-from pipeline.core.scene.load import load_scene
-from pipeline.core.units import any_quantity, quantity, unit
-from pipeline.structure.fe.beam_recipe import NodeFrame
-from pipeline.structure.fe.recipe_parts import TurnedFrame
+from flexclear.pipeline.core.algebra import quaternion_to_matrix, rotation_between
+from flexclear.pipeline.core.artifacts import deficits
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.units import any_quantity, quantity, unit
+from flexclear.pipeline.structure.fe.beam_recipe import NodeFrame
+from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame
 
 HEAD = """title = "words"
 [time]

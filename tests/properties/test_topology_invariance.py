@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, simulate
 from tests.properties.test_dynamics_invariance import SHIFT, TURN, largest, moved

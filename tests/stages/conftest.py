@@ -25,8 +25,8 @@ import os, time
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from pipeline.core.errors import SolverError
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.scene.schema import Scene
 
 def log(text):
     with open(os.environ["CALLS"], "a") as file:
@@ -55,7 +55,7 @@ def ensemble(scene, bundles, progress):
 """
 
 POST = """
-from pipeline.dynamics import log
+from flexclear.pipeline.dynamics import log
 
 def derive(run, ensemble):
     log(f"post {run.attrs['scene']}")
@@ -120,7 +120,7 @@ class Project:
     def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
         """The command, running."""
         process = subprocess.Popen(
-            [sys.executable, "-m", "stages", *arguments],
+            [sys.executable, "-m", "flexclear", *arguments],
             cwd=self.folder,
             env=self.environment(**environment),
             stdout=subprocess.PIPE,
@@ -168,8 +168,8 @@ def project(tmp_path: Path, root: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
     folder = tmp_path / "project"
     folder.mkdir()
-    for name in ("pipeline", "stages"):
-        shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("flexclear", "pipeline", "stages"):
+        shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(root / "pyproject.toml", folder)
     (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)
     (folder / "pipeline" / "post" / "__init__.py").write_text(POST)

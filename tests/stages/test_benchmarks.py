@@ -24,12 +24,12 @@ from benchmarks.mechanisms import (
     without_clearance,
     without_friction,
 )
-from pipeline import dynamics
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from stages import cost_peers
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.stages import cost_peers
 from tests.reference.ideal_motion import ideal
 
 UNKNOWNS = {"ideal": 116, "csj": 113, "far_cb": 129, "far_csj_cb": 126}

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.artifacts.store import Record, Store
-from stages.__main__ import main
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.stages.__main__ import main
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from stages.__main__ import main, parser
-from stages.graph import STAGES
+from flexclear.stages.__main__ import main, parser
+from flexclear.stages.graph import STAGES
 from tests.stages.conftest import CONTACT, JOINT, SCENE
 
 Said = Callable[..., tuple[int, str, str]]

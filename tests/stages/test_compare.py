@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.ideal import ideal
-from pipeline.core.scene.load import edited, load_scene
-from pipeline.core.scene.parts import MeshedRigidBody
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.overview import comparison, curves, figures, overlay, page
-from pipeline.structure.fe import mesh as meshes
-from pipeline.structure.fe.recipe import read_recipe
-from pipeline.structure.modes import rigid
-from stages import compare, s3_rigid
-from stages.graph import Graph
-from stages.new import write
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.ideal import ideal
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.parts import MeshedRigidBody
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.overview import comparison, curves, figures, overlay, page
+from flexclear.pipeline.structure.fe import mesh as meshes
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.modes import rigid
+from flexclear.stages import compare, s3_rigid
+from flexclear.stages.graph import Graph
+from flexclear.stages.new import write
 from tests.paper import synthetic
 
 

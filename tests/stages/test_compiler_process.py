@@ -11,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.artifacts.paths import kernel_root
-from pipeline.core.artifacts.store import Store
-from pipeline.core.workflow import cores, schedule
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.progress import Monitor
-from pipeline.core.workflow.task import Task
-from pipeline.dynamics.compile import compiler_process, folder, functions
-from pipeline.dynamics.compile.files import bring, claimed, compiled, take
+from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.workflow import cores, schedule
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.progress import Monitor
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.dynamics.compile import compiler_process, folder, functions
+from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, take
 from tests.stages.conftest import PATIENCE
 
 SOURCE = """from numba import njit, types
@@ -31,7 +31,7 @@ def add(x):
 #: holds the lock of a file, says so, and stays
 HOLDER = """import sys, time
 from pathlib import Path
-from pipeline.dynamics.compile.files import claimed
+from flexclear.pipeline.dynamics.compile.files import claimed
 with claimed(Path(sys.argv[1]), wait=True):
     print("held", flush=True)
     time.sleep(600.0)
@@ -162,7 +162,7 @@ def test_workers_have_no_second_process() -> None:
 
 @pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])
 def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, scenes: list[str], idle: bool) -> None:
-    tasks = [Task("simulate", name, "stages.s4_simulate:run", {"scene": name}, "") for name in scenes]
+    tasks = [Task("simulate", name, "flexclear.stages.s4_simulate:run", {"scene": name}, "") for name in scenes]
     heard: list[bool] = []
 
     class Pool:

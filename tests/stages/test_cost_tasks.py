@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.artifacts.store import Store
-from pipeline.core.errors import InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import Task, in_order
-from stages import cost, cost_design, cost_peers
-from stages.__main__ import main
-from stages.run import Workplace
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import Task, in_order
+from flexclear.stages import cost, cost_design, cost_peers
+from flexclear.stages.__main__ import main
+from flexclear.stages.run import Workplace
 
 
 @pytest.fixture

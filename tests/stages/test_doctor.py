@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from stages import doctor
-from stages.__main__ import main
+from flexclear.stages import doctor
+from flexclear.stages.__main__ import main
 
 
 def test_the_doctor_finds_this_place_well(capsys: pytest.CaptureFixture[str]):

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import STORE, in_order
-from stages.graph import Graph
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import STORE, in_order
+from flexclear.stages.graph import Graph
 
 #: runs one task in a fresh process and prints the own modules that it loaded
 LOADED = """
@@ -19,24 +19,24 @@ import json, sys
 from pathlib import Path
 from importlib import import_module
 root, label, scene, shortened = sys.argv[1], sys.argv[2], sys.argv[3], json.loads(sys.argv[4])
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.execute import execute
-from pipeline.core.artifacts.store import Store
-from pipeline.core.workflow.task import in_order
-from stages.graph import Graph
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.execute import execute
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.stages.graph import Graph
 store, sources, records = Store(Path(root)), Sources(Path.cwd()), {}
 for task in in_order(Graph(load_scene(scene, shortened), shown=False).up_to("post")):
     before = {name for name in sys.modules}
     if task.label == label:
         for name in list(sys.modules):
-            if name.startswith(("pipeline.structure", "pipeline.dynamics", "pipeline.post")):
+            if name.startswith(tuple(f"flexclear.pipeline.{t}" for t in ("structure", "dynamics", "post"))):
                 del sys.modules[name]
         before = {name for name in sys.modules}
     inputs = {name: records[id(above)] for name, above in task.inputs.items()}
     records[id(task)] = execute(task, inputs, store, sources, lambda fraction, text: None)
     if task.label == label:
-        print(*sorted(name for name in sys.modules.keys() - before if name.split(".")[0] in ("pipeline", "stages")))
+        print(*sorted(name for name in sys.modules.keys() - before if name.split(".")[0] in ("flexclear",)))
         break
 """
 

@@ -9,24 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import pipeline
-from pipeline.core.errors import FlexclearError, InputError
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import STORE
-from stages.__main__ import main
-from stages.graph import Graph
+from flexclear import pipeline
+from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import STORE
+from flexclear.stages.__main__ import main
+from flexclear.stages.graph import Graph
 
 #: makes one equilibrium in a fresh process and prints the own modules that it loaded
 LOADED = """
 import sys
-from pipeline.core.scene.load import load_scene
-from stages import s4_linear
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.stages import s4_linear
 before = set(sys.modules)
 scene = load_scene(sys.argv[1])
 params = s4_linear.params(scene, None, None, moving=False, vibrations=True)
 s4_linear.run(params, {}, lambda share, text: None)
-print(*sorted(n for n in sys.modules.keys() - before if n.split(".")[0] in ("pipeline", "stages")))
+print(*sorted(n for n in sys.modules.keys() - before if n.split(".")[0] in ("flexclear",)))
 """
 
 

@@ -11,7 +11,7 @@ import pytest
 from benchmarks.geometry import identify, kinematics, scenes
 from benchmarks.geometry.identify import DANGLE, DZ
 from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
-from pipeline.post.paper import TABLE8
+from flexclear.pipeline.post.paper import TABLE8
 
 TREE = Path(__file__).resolve().parents[2]
 TAKEN = (0.07, 0.15, 0.35)

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 from numba import config
 
-from pipeline.core.artifacts.disk import checked, publish
-from pipeline.core.artifacts.paths import kernel_root, results_root
-from pipeline.core.errors import InputError
-from pipeline.dynamics.compile import files, folder
-from pipeline.dynamics.compile.files import bring, claimed, compiled
+from flexclear.pipeline.core.artifacts.disk import checked, publish
+from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.dynamics.compile import files, folder
+from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled
 
 #: a constant that a flipped bit of the code would change
 SOURCE = """from numba import njit, types

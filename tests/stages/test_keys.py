@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow.fingerprint import Sources, imported
-from pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
-from stages import s4_simulate
-from stages.graph import Graph
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow.fingerprint import Sources, imported
+from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
+from flexclear.stages import s4_simulate
+from flexclear.stages.graph import Graph
 
 LEAVES = (
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=4)
@@ -73,7 +73,7 @@ def test_reasons_are_words():
 def test_imports_are_found_wherever_they_stand():
     text = b"""
 import numpy as np
-from pipeline.core import units
+from flexclear.pipeline.core import units
 from . import near
 from ..far import thing
 from typing import TYPE_CHECKING
@@ -83,22 +83,28 @@ else:
     import scipy.sparse
 def f():
     try:
-        import stages.run
+        import flexclear.stages.run
     except ImportError:
         match f:
             case 1:
                 from xarray import Dataset
 """
-    own, libraries = imported(text, "pipeline.post.module", package=False)
-    assert {"pipeline.core", "pipeline.core.units", "pipeline.post.near", "pipeline.far.thing", "stages.run"} <= own
+    own, libraries = imported(text, "flexclear.pipeline.post.module", package=False)
+    assert {
+        "flexclear.pipeline.core",
+        "flexclear.pipeline.core.units",
+        "flexclear.pipeline.post.near",
+        "flexclear.pipeline.far.thing",
+        "flexclear.stages.run",
+    } <= own
     assert libraries == {"numpy", "scipy", "xarray"}
-    own, _ = imported(b"from .near import x", "pipeline.post", package=True)
-    assert own == {"pipeline.post.near", "pipeline.post.near.x"}
+    own, _ = imported(b"from .near import x", "flexclear.pipeline.post", package=True)
+    assert own == {"flexclear.pipeline.post.near", "flexclear.pipeline.post.near.x"}
 
 
 def test_a_root_that_does_not_exist_is_an_error(root: Path):
-    with pytest.raises(LookupError, match=r"no module stages\.nowhere"):
-        Sources(root).closure(["stages.nowhere"])
+    with pytest.raises(LookupError, match=r"no module flexclear\.stages\.nowhere"):
+        Sources(root).closure(["flexclear.stages.nowhere"])
 
 
 def graph(root: Path, name: str) -> Graph:
@@ -128,8 +134,8 @@ def sources(root: Path) -> Sources:
 @pytest.fixture
 def copy(root: Path, tmp_path: Path) -> Path:
     """Source and scenes, to be edited."""
-    for name in ("pipeline", "stages", "scenes", "meshes"):
-        shutil.copytree(root / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("flexclear", "pipeline", "stages", "scenes", "meshes"):
+        shutil.copytree(root / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path
 
 
@@ -197,20 +203,22 @@ def test_editing_a_module_reruns_only_scenes_that_reach_it(
 def test_the_memo_of_imports_notices_edits(copy: Path):
     """Closures with and without the memo are the same before and after an edit."""
     memo = copy / "imports.json"
-    roots = ["stages.s4_simulate"]
+    roots = ["flexclear.stages.s4_simulate"]
     assert Sources(copy, memo).closure(roots) == Sources(copy).closure(roots)
     assert memo.is_file()
     path = copy / "stages" / "s4_simulate.py"
-    path.write_text(path.read_text() + "\nimport pipeline.core.algebra\nimport wave\nimport meshio\n")
+    path.write_text(path.read_text() + "\nimport flexclear.pipeline.core.algebra\nimport wave\nimport meshio\n")
     edited = Sources(copy, memo).closure(roots)
     assert edited == Sources(copy).closure(roots)
-    assert "meshio" in edited["stages.s4_simulate"].libraries
+    assert "meshio" in edited["flexclear.stages.s4_simulate"].libraries
     memo.write_text("{ not json")
     assert Sources(copy, memo).closure(roots) == edited
 
 
 def test_library_versions_count(root: Path):
-    task = Task("s", "scene", "stages.s3_bundle:run", {}, "", modules=("pipeline.structure.kinds.beam",))
+    task = Task(
+        "s", "scene", "flexclear.stages.s3_bundle:run", {}, "", modules=("flexclear.pipeline.structure.kinds.beam",)
+    )
     found = facts(task, {}, Sources(root))
     assert {"library numpy", "library scikit-fem", "library skfem", "library xarray"} & found.keys() >= {
         "library numpy",

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.core import machine
-from pipeline.core.errors import InputError, ResourceError
-from pipeline.core.scene.demand import check_run, row
-from pipeline.core.scene.limits import check_cells
-from pipeline.core.scene.load import load_scene
-from pipeline.structure.fe.exchange import files
-from stages import s4_simulate
-from stages.__main__ import main
-from stages.graph import Graph
+from flexclear.pipeline.core import machine
+from flexclear.pipeline.core.errors import InputError, ResourceError
+from flexclear.pipeline.core.scene.demand import check_run, row
+from flexclear.pipeline.core.scene.limits import check_cells
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.stages import s4_simulate
+from flexclear.stages.__main__ import main
+from flexclear.stages.graph import Graph
 from tests.stages.conftest import JOINT, SCENE
 
 

@@ -11,18 +11,18 @@ import meshio
 import numpy as np
 import pytest
 
-from pipeline.core.artifacts.store import Record, Store
-from pipeline.core.errors import ResourceError
-from pipeline.core.progress import silent
-from pipeline.core.scene.load import load_scene
-from pipeline.core.workflow import opened
-from pipeline.core.workflow.execute import execute, find, states
-from pipeline.core.workflow.fingerprint import TREE, Sources
-from pipeline.core.workflow.task import Task, facts
-from pipeline.structure.fe.exchange import files
-from pipeline.structure.kinds.kind import of_mesh
-from stages import s4_simulate
-from stages.graph import Graph
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow.execute import execute, find, states
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
+from flexclear.pipeline.core.workflow.task import Task, facts
+from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.pipeline.structure.kinds.kind import of_mesh
+from flexclear.stages import s4_simulate
+from flexclear.stages.graph import Graph
 from tests.analytic.solid_models import block, build
 
 SCENE = """
@@ -209,8 +209,8 @@ def test_names_of_files_are_no_facts(tmp_path: Path, root: Path, sources: Source
 
 def test_libraries_that_write_and_draw_count(sources: Sources) -> None:
     """Also those that are chosen by a name in a call, and those that a library needs in turn."""
-    plain = facts(Task("s", "scene", "stages.s3_bundle:run", {}, ""), {}, sources)
+    plain = facts(Task("s", "scene", "flexclear.stages.s3_bundle:run", {}, ""), {}, sources)
     assert plain["library netCDF4"][0].isdigit()
-    drawn = facts(Task("s", "scene", "stages.s6_render:run", {}, ""), {}, sources)
+    drawn = facts(Task("s", "scene", "flexclear.stages.s6_render:run", {}, ""), {}, sources)
     assert drawn["library vtk"][0].isdigit()
     assert drawn["library pillow"][0].isdigit()

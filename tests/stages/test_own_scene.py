@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene import lines
-from pipeline.core.scene.json_schema import scene_schema
-from pipeline.core.scene.load import load_scene
-from stages import run
-from stages.__main__ import main
-from stages.new import KINDS, TEMPLATES, write
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.scene.json_schema import scene_schema
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.stages import run
+from flexclear.stages.__main__ import main
+from flexclear.stages.new import KINDS, TEMPLATES, write
 from tests.stages.typical_mistakes import MISTAKES
 
 TOLD = dict(
@@ -107,7 +107,7 @@ def test_lines_are_those_of_the_text():
 @pytest.fixture(scope="module")
 def validators():
     jsonschema = pytest.importorskip("jsonschema")
-    from pipeline.structure.fe.json_schema import recipe_schema
+    from flexclear.pipeline.structure.fe.json_schema import recipe_schema
 
     found = [jsonschema.Draft202012Validator(schema) for schema in (scene_schema(), recipe_schema())]
     for one in found:

@@ -6,7 +6,7 @@ import io
 
 import pytest
 
-from pipeline.core.workflow.progress import Monitor, duration
+from flexclear.pipeline.core.workflow.progress import Monitor, duration
 
 
 class Screen(io.StringIO):

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.core.artifacts.store import Store
-from pipeline.core.errors import InputError
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import in_order
-from stages.report import Scenes, figure_tasks
-from stages.run import Workplace
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.stages.report import Scenes, figure_tasks
+from flexclear.stages.run import Workplace
 
 
 def test_every_figure_and_table_of_the_paper_has_its_inputs(root: Path, tmp_path: Path):

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from pipeline.core.artifacts import disk
-from pipeline.core.artifacts.disk import publish
-from pipeline.core.artifacts.store import Record, Store, write_dataset
-from pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.artifacts import disk
+from flexclear.pipeline.core.artifacts.disk import publish
+from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
+from flexclear.pipeline.core.errors import ResourceError
 
 KEY = "k" * 32
 
@@ -170,7 +170,7 @@ def test_what_a_killed_process_left_is_swept_and_never_read(store: Store):
 
 def test_the_lock_holds_between_processes(store: Store):
     code = (
-        "import sys; from pathlib import Path; from pipeline.core.artifacts.store import Store\n"
+        "import sys; from pathlib import Path; from flexclear.pipeline.core.artifacts.store import Store\n"
         "with Store(Path(sys.argv[1])).lock('simulate', sys.argv[2], lambda: print('waiting', flush=True)):\n"
         "    print('mine', flush=True)"
     )

@@ -17,17 +17,17 @@ import pytest
 import xarray as xr
 from scipy.special import ellipk
 
-import pipeline
-from pipeline.core.errors import InputError
-from pipeline.core.scene.design import design
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.sweep import read_sweep
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import STORE
-from pipeline.post.sweep import figures
-from stages import run, sweep, sweep_engine, sweep_plan
-from stages.__main__ import main
-from stages.s4_simulate import modules
+from flexclear import pipeline
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.design import design
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import STORE
+from flexclear.pipeline.post.sweep import figures
+from flexclear.stages import run, sweep, sweep_engine, sweep_plan
+from flexclear.stages.__main__ import main
+from flexclear.stages.s4_simulate import modules
 from tests.stages.conftest import interruptible
 
 GRAVITY = 9.81
@@ -72,7 +72,7 @@ def pendulum(folder: Path, count: int, name: str = "lengths") -> Path:
 def flexclear(*arguments: str, cwd: Path, results: Path) -> subprocess.Popen[str]:
     """The command in a process of its own."""
     environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd)}
-    command = [sys.executable, "-m", "stages", *arguments]
+    command = [sys.executable, "-m", "flexclear", *arguments]
     return subprocess.Popen(
         command,
         cwd=cwd,
@@ -398,19 +398,19 @@ def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
 LOADED = """
 import sys
 import numpy, xarray
-from pipeline.core.scene.load import load_scene
-from pipeline.core.scene.sweep import read_sweep
-from stages import run, sweep_plan
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.stages import run, sweep_plan
 table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
 plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), run.workplace())
 import pickle
 (family,), (job,) = plan.families, plan.jobs
 before = set(sys.modules)
 for name in list(before):
-    if name.startswith("pipeline.dynamics"):
+    if name.startswith("flexclear.pipeline.dynamics"):
         del sys.modules[name]
 before = set(sys.modules)
-from stages.sweep_points import work
+from flexclear.stages.sweep_points import work
 (point,), _ = work(family.key, pickle.dumps(family.work), [job.point], True)
 assert not point.refused, point.refused
 print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("pipeline", "stages")))
@@ -423,7 +423,7 @@ def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
         [sys.executable, "-c", LOADED, str(path)], cwd=root, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    known = Sources(root).closure(["stages.sweep_points", STORE, *modules(load_scene(path))]).keys()
+    known = Sources(root).closure(["flexclear.stages.sweep_points", STORE, *modules(load_scene(path))]).keys()
     loaded = set(done.stdout.split())
     assert len(loaded) > 20
     assert loaded <= known

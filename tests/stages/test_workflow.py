@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from pipeline.core.artifacts.disk import _host
+from flexclear.pipeline.core.artifacts.disk import _host
 from tests.stages.conftest import CONTACT, JOINT, PATIENCE, SCENE, Project
 
 AddScene = Callable[[str, str], None]
@@ -45,7 +45,7 @@ def test_why_says_what_changed_and_run_does_just_that(project: Project):
     lines = [line.strip() for line in project.run("why", "tiny/contact").stdout.splitlines()]
     assert lines == [
         "tiny/contact",
-        "simulate         module pipeline.dynamics.contact.normal.lankarani_nikravesh changed",
+        "simulate         module flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh changed",
         "scene.joint.J.clearance: 0.0005 -> 0.0002",
         "post             its input run would be made again",
     ]
@@ -129,7 +129,7 @@ def test_a_solver_that_gives_up_stops_only_what_depends_on_it(project: Project, 
 
 def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     code = (
-        "import resource, sys; from stages.__main__ import main;"
+        "import resource, sys; from flexclear.stages.__main__ import main;"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY)); sys.exit(main(['run', 'tiny/ideal']))"
     )
     import subprocess
@@ -182,7 +182,7 @@ def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
     shown = project.results / "runs" / "tiny" / "contact" / "run.nc"
     before = shown.read_bytes()
     code = (
-        "import pipeline\n"
+        "from flexclear import pipeline\n"
         "scene = pipeline.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
         "run = pipeline.run(scene)\n"
         "print(float(run.time[1]), run.attrs['title'])"

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from math import pi
 
-from pipeline.core.scene.laws import Cycloidal
-from pipeline.core.units import quantity
-from pipeline.dynamics.drives.pieces import Piece, Pieces
+from flexclear.pipeline.core.scene.laws import Cycloidal
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Cycloidal, dimension: str) -> Pieces:

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene.loads import QuadraticDrag as Declared
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, number
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import at, cross, dot, scale
+from flexclear.pipeline.core.scene.loads import QuadraticDrag as Declared
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act, number
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import at, cross, dot, scale
 
 
 @kernel

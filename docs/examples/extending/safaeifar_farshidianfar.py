@@ -7,7 +7,7 @@ Source: Safaeifar & Farshidianfar (2020), Multibody System Dynamics 50, 233-257.
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene import clearance
-from pipeline.dynamics.contact.friction.memoryless import sliding
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.scene import clearance
+from flexclear.pipeline.dynamics.contact.friction.memoryless import sliding
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.core.artifacts.compliance import of_bundle, shares
-from pipeline.core.errors import InputError
+from flexclear.pipeline.core.artifacts.compliance import of_bundle, shares
+from flexclear.pipeline.core.errors import InputError
 
 #: dimensions that count modes
 DIMENSIONS = ("mode", "mode2")

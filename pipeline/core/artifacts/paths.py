@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from pipeline.core.version import version
+from flexclear.pipeline.core.version import version
 
-CHECKOUT = Path(__file__).resolve().parents[3]
+CHECKOUT = Path(__file__).absolute().parents[4]
 
 
 def results_root() -> Path:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
-from pipeline.core.scene.design import Axis, Design
-from pipeline.core.scene.kept import Kept
+from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
+from flexclear.pipeline.core.scene.design import Axis, Design
+from flexclear.pipeline.core.scene.kept import Kept
 
 Values = dict[str, np.ndarray]
 #: what became of a point

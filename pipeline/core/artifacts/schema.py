@@ -9,10 +9,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
-from pipeline.core.artifacts.event_kinds import EVENT_KINDS
-from pipeline.core.scene.output import VARIABLES
-from pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
+from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.scene.output import VARIABLES
+from flexclear.pipeline.core.variable import Schema, Variable
 
 __all__ = [
     "BUNDLE",

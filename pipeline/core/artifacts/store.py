@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pipeline.core.artifacts.disk import (
+from flexclear.pipeline.core.artifacts.disk import (
     checked,
     copy,
     disk_limits,
@@ -30,7 +30,7 @@ from pipeline.core.artifacts.disk import (
     sweep,
     temporary,
 )
-from pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.errors import ResourceError
 
 if TYPE_CHECKING:
     import xarray as xr

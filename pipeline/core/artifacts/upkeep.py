@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipeline.core.artifacts.disk import read_checked
-from pipeline.core.artifacts.store import Record, Store, read_record
+from flexclear.pipeline.core.artifacts.disk import read_checked
+from flexclear.pipeline.core.artifacts.store import Record, Store, read_record
 
 #: what stands beside artifacts and is none of their files
 BESIDE = (".json", ".lock", ".names", ".tmp")

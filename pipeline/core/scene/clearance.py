@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Pressure, Speed
+from flexclear.pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Pressure, Speed
 
 Positive = Field(gt=0.0)
 Share = Field(ge=0.0, le=1.0)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.scene.sweep import Sample, Sweep, number_and_unit
+from flexclear.pipeline.core.scene.sweep import Sample, Sweep, number_and_unit
 
 #: a value of a parameter as a scene takes it: a number in SI, text with an SI unit, or anything else as it was written
 Value = Any

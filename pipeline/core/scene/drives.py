@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from pipeline.core.scene.fields import FrameName, Part
-from pipeline.core.scene.laws import Bare
+from flexclear.pipeline.core.scene.fields import FrameName, Part
+from flexclear.pipeline.core.scene.laws import Bare
 
 
 class JointDrive(Part):

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
 
-from pipeline.core.axes import check_axes, check_axis
-from pipeline.core.units import a, components, quantity
+from flexclear.pipeline.core.axes import check_axes, check_axis
+from flexclear.pipeline.core.units import a, components, quantity
 
 
 def _scalar(dimension: str) -> Any:
@@ -210,7 +210,7 @@ class Pose(Part):
         """Unit quaternion w x y z, frame to parent, shape (4,)."""
         import numpy as np
 
-        from pipeline.core.algebra import (
+        from flexclear.pipeline.core.algebra import (
             axes_to_matrix,
             axis_to_matrix,
             matrix_to_quaternion,

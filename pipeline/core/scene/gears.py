@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from pipeline.core.scene.fields import Part
-from pipeline.core.scene.laws import Value
+from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.laws import Value
 
 
 class Gear(Part):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.clearance import Clearance
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.wanted import parse
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.wanted import parse
 
 #: effects that can be taken away, and how a scene without them is called
 EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}

@@ -9,8 +9,8 @@ from __future__ import annotations
 import copy
 from typing import Any
 
-from pipeline.core.scene.load import FAMILIES, SETTINGS
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.load import FAMILIES, SETTINGS
+from flexclear.pipeline.core.scene.schema import Scene
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 #: definitions of parts of which only some keys are given, beside those of whole parts

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.wanted import KINDS, Quantity, parse
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
 
 #: reduction -> what it says of a series
 SERIES = {

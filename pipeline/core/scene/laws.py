@@ -14,8 +14,8 @@ from typing import Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
-from pipeline.core.scene.fields import Angle, Part, Rate, Time
-from pipeline.core.units import UNITS, any_quantity, quantity, unit
+from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
+from flexclear.pipeline.core.units import UNITS, any_quantity, quantity, unit
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law stands"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]

@@ -9,7 +9,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from pipeline.core.errors import InputError, InputErrors
+from flexclear.pipeline.core.errors import InputError, InputErrors
 
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
 _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"

@@ -13,13 +13,13 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.core.errors import InputError, shown
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import LONGEST_NAME
-from pipeline.core.scene.limits import check_parts
-from pipeline.core.scene.mistakes import input_errors
-from pipeline.core.scene.not_toml import not_toml
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.errors import InputError, shown
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.fields import LONGEST_NAME
+from flexclear.pipeline.core.scene.limits import check_parts
+from flexclear.pipeline.core.scene.mistakes import input_errors
+from flexclear.pipeline.core.scene.not_toml import not_toml
+from flexclear.pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")

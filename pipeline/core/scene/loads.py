@@ -9,9 +9,9 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, model_validator
 
-from pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
-from pipeline.core.scene.laws import Bare, Value
-from pipeline.core.scene.matrices import NOTHING, BushingDamping, BushingStiffness
+from flexclear.pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
+from flexclear.pipeline.core.scene.laws import Bare, Value
+from flexclear.pipeline.core.scene.matrices import NOTHING, BushingDamping, BushingStiffness
 
 Components = tuple[Bare, Bare, Bare]
 

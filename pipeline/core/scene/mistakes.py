@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from pipeline.core.errors import InputError, InputErrors
-from pipeline.core.registry import suggestion
+from flexclear.pipeline.core.errors import InputError, InputErrors
+from flexclear.pipeline.core.registry import suggestion
 
 #: findings that a value is no whole number
 WHOLE = ("int_type", "int_parsing", "int_from_float")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pipeline.core.errors import InputError
-from pipeline.core.units import unit
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.units import unit
 
 #: characters of a line that is worth mending
 LONGEST = 300

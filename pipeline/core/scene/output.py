@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from pipeline.core.scene.fields import Part, Time
-from pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.scene.fields import Part, Time
+from flexclear.pipeline.core.variable import Schema, Variable
 
 
 class Output(Part):

@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
-from pipeline.core.scene.fields import (
+from flexclear.pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
+from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
     Inertia,
@@ -21,7 +21,7 @@ from pipeline.core.scene.fields import (
     Time,
     Velocity,
 )
-from pipeline.core.units import quantity
+from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
 

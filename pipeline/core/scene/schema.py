@@ -7,14 +7,14 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
-from pipeline.core.scene.drives import Drive
-from pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
-from pipeline.core.scene.gears import Gear
-from pipeline.core.scene.limits import Limits
-from pipeline.core.scene.loads import Gravity, Load, SampledPid
-from pipeline.core.scene.output import Output
-from pipeline.core.scene.parts import (
+from flexclear.pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
+from flexclear.pipeline.core.scene.drives import Drive
+from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from flexclear.pipeline.core.scene.gears import Gear
+from flexclear.pipeline.core.scene.limits import Limits
+from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
+from flexclear.pipeline.core.scene.output import Output
+from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
     Ground,
@@ -22,11 +22,11 @@ from pipeline.core.scene.parts import (
     MeshedRigidBody,
     RigidBody,
 )
-from pipeline.core.scene.solver import PlainIntegrator, Solver
-from pipeline.core.scene.start import Start
-from pipeline.core.scene.stops import Stop
-from pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
-from pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.solver import PlainIntegrator, Solver
+from flexclear.pipeline.core.scene.start import Start
+from flexclear.pipeline.core.scene.stops import Stop
+from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
+from flexclear.pipeline.core.units import quantity
 
 #: types of joints with one freedom: driving it tells the whole relative motion
 SINGLE = ("revolute", "prismatic")

@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from pipeline.core.integrators import DEFAULT, INTEGRATORS
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.fields import Number, Part, Time
+from flexclear.pipeline.core.integrators import DEFAULT, INTEGRATORS
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.fields import Number, Part, Time
 
 
 class Stepping(Part):

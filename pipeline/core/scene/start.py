@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 
-from pipeline.core.scene.fields import Number, Part, PartName
+from flexclear.pipeline.core.scene.fields import Number, Part, PartName
 
 #: the keys of one joint coordinate
 KEYS = ("position", "near", "velocity")

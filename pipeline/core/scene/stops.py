@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pydantic import model_validator
 
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.core.scene.fields import Part
-from pipeline.core.scene.laws import Value
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.laws import Value
 
 
 class Stop(Part):

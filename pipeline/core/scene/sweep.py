@@ -8,11 +8,11 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.fields import Part
-from pipeline.core.scene.load import read_toml
-from pipeline.core.scene.mistakes import input_errors
-from pipeline.core.units import any_quantity
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.mistakes import input_errors
+from flexclear.pipeline.core.units import any_quantity
 
 #: points of one sweep; more are several sweeps
 MOST_POINTS = 1_000_000

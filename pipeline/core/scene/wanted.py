@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from pipeline.core.registry import suggestion
+from flexclear.pipeline.core.registry import suggestion
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
-from pipeline.core.artifacts.store import Record, Store
-from pipeline.core.progress import Progress
-from pipeline.core.workflow import opened
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.task import Task, facts, in_order, key, reasons
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key, reasons
 
 
 @dataclass(frozen=True)

@@ -18,15 +18,15 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
-from pipeline.core.artifacts.disk import checked, publish, read_checked
+from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
 
-OWN = ("pipeline", "stages", "benchmarks")
+OWN = ("flexclear", "benchmarks")
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
 
 
 #: folder that holds the packages; sources are read below it
-TREE = Path(__file__).resolve().parents[3]
+TREE = Path(__file__).absolute().parents[4]
 
 
 @dataclass(frozen=True, slots=True)

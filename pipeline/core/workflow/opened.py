@@ -20,8 +20,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from pipeline.core.artifacts.paths import kernel_root
-from pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.errors import ResourceError
 
 #: what stands in the facts for a file that is not there, and for what is no file
 ABSENT, SPECIAL = "absent", "no file"

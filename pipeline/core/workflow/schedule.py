@@ -11,15 +11,15 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.artifacts.store import Record, Store
-from pipeline.core.errors import FlexclearError, ResourceError
-from pipeline.core.progress import Progress
-from pipeline.core.workflow import cores, workers
-from pipeline.core.workflow.execute import execute, find, key_of
-from pipeline.core.workflow.family import follow
-from pipeline.core.workflow.fingerprint import Sources
-from pipeline.core.workflow.progress import Monitor
-from pipeline.core.workflow.task import Task, in_order
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.pipeline.core.errors import FlexclearError, ResourceError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.workflow import cores, workers
+from flexclear.pipeline.core.workflow.execute import execute, find, key_of
+from flexclear.pipeline.core.workflow.family import follow
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.progress import Monitor
+from flexclear.pipeline.core.workflow.task import Task, in_order
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from pipeline.core.workflow.fingerprint import TREE, Sources, library_versions
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, library_versions
 
 #: libraries that every artifact passes through on its way to disk
-STORE = "pipeline.core.artifacts.store"
+STORE = "flexclear.pipeline.core.artifacts.store"
 #: made once: `json.dumps` with options makes one for every value
 _JSON = json.JSONEncoder(ensure_ascii=False, default=str)
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from pipeline.core.workflow.family import follow
+from flexclear.pipeline.core.workflow.family import follow
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies.modal_terms import (
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.modal_terms import (
     RATE,
     body_mass_matrix,
     carried,
@@ -28,9 +28,9 @@ from pipeline.dynamics.bodies.modal_terms import (
     stiffness,
     tensor,
 )
-from pipeline.dynamics.bodies.ports import make_ports
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import (
+from flexclear.pipeline.dynamics.bodies.ports import make_ports
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import (
     accumulate,
     add,
     at,

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies.rigid import carry
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot, dot6, put, scale, turn_symmetric
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.rigid import carry
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot, dot6, put, scale, turn_symmetric
 
 RATE = 9  #: SCRATCH: second moment int rho r r^T (9), then D = int rho r rdot^T (9)
 

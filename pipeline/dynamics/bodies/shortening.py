@@ -15,8 +15,8 @@ International Journal for Numerical Methods in Engineering 32, 1833-1850.
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -17,13 +17,13 @@ from pathlib import Path
 
 from numba import config
 
-from pipeline.core.workflow.cores import free
-from pipeline.dynamics.compile.files import claimed, take
+from flexclear.pipeline.core.workflow.cores import free
+from flexclear.pipeline.dynamics.compile.files import claimed, take
 
 # started by a command, since multiprocessing would run the user's script again in the child
 COMMAND = """import json, sys
 sys.path[:] = json.loads(sys.argv[1])
-from pipeline.dynamics.compile.compiler_process import work
+from flexclear.pipeline.dynamics.compile.compiler_process import work
 work(sys.argv[2:])
 """
 

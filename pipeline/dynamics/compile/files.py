@@ -21,7 +21,7 @@ from types import ModuleType
 from numba import config
 from numba.core.bytecode import FunctionIdentity
 
-from pipeline.core.artifacts.disk import checked, locked, publish, read_checked
+from flexclear.pipeline.core.artifacts.disk import checked, locked, publish, read_checked
 
 #: told the file that has to be compiled, or waited for
 Tell = Callable[[Path], None]

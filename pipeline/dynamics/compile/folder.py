@@ -17,9 +17,9 @@ from tempfile import TemporaryDirectory
 import llvmlite.binding
 from numba import config
 
-from pipeline.core.artifacts.disk import sweep
-from pipeline.core.errors import InputError
-from pipeline.dynamics.compile.files import claimed, set_aside
+from flexclear.pipeline.core.artifacts.disk import sweep
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.dynamics.compile.files import claimed, set_aside
 
 #: kernels that nobody fetched for so long are removed [s], and the oldest ones beyond so many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30

@@ -21,15 +21,15 @@ import llvmlite
 import numba
 import numpy as np
 
-from pipeline.core.artifacts.disk import disk_limits, publish
-from pipeline.core.artifacts.paths import kernel_root
-from pipeline.core.workflow.fingerprint import TREE, Sources, imported
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile.compiler_process import second_process
-from pipeline.dynamics.compile.files import bring, compiled
-from pipeline.dynamics.compile.folder import prune, writable
-from pipeline.dynamics.compile.sources import sources
-from pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
+from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile.compiler_process import second_process
+from flexclear.pipeline.dynamics.compile.files import bring, compiled
+from flexclear.pipeline.dynamics.compile.folder import prune, writable
+from flexclear.pipeline.dynamics.compile.sources import sources
+from flexclear.pipeline.dynamics.effects import Parts, Scheme
 
 SOURCES = Sources(TREE)
 #: what the functions are to who waits for them
@@ -45,7 +45,7 @@ ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 #: what this process compiles first and the second one last: the others have kernels in common, compiled once each
 OURS = "advance"
 #: where the code of kernels stands, and what they number by
-CODE = ("pipeline.dynamics", "pipeline.core.artifacts.event_kinds")
+CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 
 

@@ -10,10 +10,10 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from pipeline.core import integrators
-from pipeline.core.registry import listed
-from pipeline.core.workflow.fingerprint import TREE, imported, source_file
-from pipeline.dynamics.effects import (
+from flexclear.pipeline.core import integrators
+from flexclear.pipeline.core.registry import listed
+from flexclear.pipeline.core.workflow.fingerprint import TREE, imported, source_file
+from flexclear.pipeline.dynamics.effects import (
     FORMS,
     FRICTION_LAWS,
     INTEGRATORS,
@@ -27,9 +27,9 @@ from pipeline.dynamics.effects import (
 )
 
 if TYPE_CHECKING:
-    from pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.schema import Scene
 
-DYNAMICS = "pipeline.dynamics"
+DYNAMICS = "flexclear.pipeline.dynamics"
 #: what others are called by
 CALLS = (f"{DYNAMICS}.compile", "calls")
 Imports = list[tuple[str, str]]  #: (module, name) each

@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies.rigid import apply_wrench
-from pipeline.dynamics.choice import choose
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, at9, cross, dot, put, scale, sub, turn, turn_back
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
+from flexclear.pipeline.dynamics.choice import choose
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import add, at, at9, cross, dot, put, scale, sub, turn, turn_back
 
 
 @kernel

@@ -8,8 +8,8 @@ from math import isfinite
 
 from scipy.optimize import brentq
 
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.dynamics.contact import restitution as closed_form
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.dynamics.contact import restitution as closed_form
 
 #: a law that delivers a restitution further than this from the one asked for is used outside its range
 CLOSE = 0.05

@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies.rigid import apply_wrench
-from pipeline.dynamics.contact.forces import make_normal_force
-from pipeline.dynamics.gauge import counted
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import put, scale
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
+from flexclear.pipeline.dynamics.contact.forces import make_normal_force
+from flexclear.pipeline.dynamics.gauge import counted
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import put, scale
 
 
 def make_stops(forms: tuple[Any, ...]) -> Callable:

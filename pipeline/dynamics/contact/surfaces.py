@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from pipeline.core.scene.clearance import BallOnPlane as OnPlane
-from pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
+from flexclear.pipeline.core.scene.clearance import BallOnPlane as OnPlane
+from flexclear.pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 
 #: joints whose surfaces meet along a line
 Pin = ClearanceRevolute | ClearanceSlot

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.errors import SolverError
-from pipeline.core.registry import lookup
-from pipeline.dynamics.contact.law import Resolved
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: above this share of the inner radius a contact is no longer small and Hertz's theory ends
 SMALL = 0.3
@@ -26,7 +26,7 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
     found = [] if law.warning is None else [f"{name}: {law.warning}"]
     if not joint.radius:
         return found  # the end of a coordinate has no surfaces
-    surfaces = lookup("pipeline.dynamics.contact", joint.type, where=name)
+    surfaces = lookup("flexclear.pipeline.dynamics.contact", joint.type, where=name)
     size = surfaces.contact_size(joint, depth, force)
     if joint.normal.stiffness is None and size > SMALL * joint.radius:
         found.append(

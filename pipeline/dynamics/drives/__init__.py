@@ -5,8 +5,8 @@ Each module has ``pieces(law, dimension) -> Pieces`` (see `pieces`), which raise
 words, for values that are not of that dimension.
 """
 
-from pipeline.core.registry import declared
-from pipeline.core.scene.laws import KINDS
+from flexclear.pipeline.core.registry import declared
+from flexclear.pipeline.core.scene.laws import KINDS
 
 KIND = "law"
 NAMES = declared(KINDS, made="pieces")

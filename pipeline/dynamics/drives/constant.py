@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.core.scene.laws import Constant
-from pipeline.core.units import quantity
-from pipeline.dynamics.drives.pieces import Piece, Pieces
+from flexclear.pipeline.core.scene.laws import Constant
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Constant, dimension: str) -> Pieces:

@@ -17,10 +17,10 @@ from math import comb, inf, perm, pi, sin
 
 import numpy as np
 
-from pipeline.core.registry import lookup
-from pipeline.core.scene.laws import COEFFICIENTS
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.laws import COEFFICIENTS
 
-PACKAGE = "pipeline.dynamics.drives"
+PACKAGE = "flexclear.pipeline.dynamics.drives"
 Terms = tuple[tuple[float, float, float], ...]  #: amplitude, angular frequency [rad/s], phase at the start [rad]
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from pipeline.core.scene.laws import Piecewise
-from pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from flexclear.pipeline.core.scene.laws import Piecewise
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 
 def pieces(law: Piecewise, dimension: str) -> Pieces:

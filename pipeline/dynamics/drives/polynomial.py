@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.core.scene.laws import Polynomial
-from pipeline.core.units import coefficient
-from pipeline.dynamics.drives.pieces import Piece, Pieces
+from flexclear.pipeline.core.scene.laws import Polynomial
+from flexclear.pipeline.core.units import coefficient
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 
 def pieces(law: Polynomial, dimension: str) -> Pieces:

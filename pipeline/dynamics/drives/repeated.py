@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from pipeline.core.scene.laws import Repeated
-from pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
+from flexclear.pipeline.core.scene.laws import Repeated
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
 
 
 def pieces(law: Repeated, dimension: str) -> Pieces:

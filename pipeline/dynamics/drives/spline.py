@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
-from pipeline.core.scene.laws import Ends, Spline
-from pipeline.core.units import quantity
-from pipeline.dynamics.drives.pieces import Pieces, polynomials
+from flexclear.pipeline.core.scene.laws import Ends, Spline
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 
 def pieces(law: Spline, dimension: str) -> Pieces:

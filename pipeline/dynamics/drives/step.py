@@ -8,9 +8,9 @@ Source: Wang & Wang (2019), eqs. (29) and (35).
 
 from __future__ import annotations
 
-from pipeline.core.scene.laws import Step
-from pipeline.core.units import quantity
-from pipeline.dynamics.drives.pieces import Pieces, polynomials
+from flexclear.pipeline.core.scene.laws import Step
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 
 def pieces(law: Step, dimension: str) -> Pieces:

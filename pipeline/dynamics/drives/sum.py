@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from itertools import zip_longest
 
-from pipeline.core.scene.laws import Sum
-from pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
+from flexclear.pipeline.core.scene.laws import Sum
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
 
 
 def pieces(law: Sum, dimension: str) -> Pieces:

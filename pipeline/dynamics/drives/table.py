@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from pipeline.core.scene.laws import Table
-from pipeline.core.units import quantity
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.drives.spline import through
+from flexclear.pipeline.core.scene.laws import Table
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.drives.spline import through
 
 
 def pieces(law: Table, dimension: str) -> Pieces:

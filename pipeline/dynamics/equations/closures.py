@@ -14,10 +14,10 @@ rows of a closure come first among its rows, the residuals of all are known (`as
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.envelope import backward, base, factor, forward
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, dot6, put, scale, sub
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.envelope import backward, base, factor, forward
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, dot6, put, scale, sub
 
 #: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
 SINGULAR_PIVOT = 1e-13

@@ -8,12 +8,12 @@ A coupling is one row whose wrench on the second joint is that of a unit force a
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations import closures
-from pipeline.dynamics.equations.closures import complete, finish
-from pipeline.dynamics.gauge import bias, counted
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, at, dot6, put, scale
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations import closures
+from flexclear.pipeline.dynamics.equations.closures import complete, finish
+from flexclear.pipeline.dynamics.gauge import bias, counted
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import accumulate, at, dot6, put, scale
 
 correction = closures.correction
 

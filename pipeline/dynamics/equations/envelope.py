@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.choice import choose
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import ZERO, add, at, at9, cross, product, put, put9, scale, turn
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.choice import choose
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at9, cross, product, put, put9, scale, turn
 
 
 @kernel

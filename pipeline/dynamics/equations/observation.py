@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies import rigid
-from pipeline.dynamics.equations.kinematics import make_kinematics
-from pipeline.dynamics.equations.projection import BLIND, keep_scales, largest
-from pipeline.dynamics.equations.right_hand_side import make_forces, nothing
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, at, dot
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
+from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest
+from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
 
 #: kinetic energy, potential energy of gravity, energy stored in bodies, springs and contacts [J]
 ENERGY = m.layout("kinetic potential elastic")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.retraction import make_position_rates
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.retraction import make_position_rates
+from flexclear.pipeline.dynamics.kernels import kernel
 
 ITERATIONS = 8
 #: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.choice import choose
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.choice import choose
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_position_rates(joints: tuple[Any, ...]) -> Callable:

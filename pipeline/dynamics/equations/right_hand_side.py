@@ -9,14 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies import rigid
-from pipeline.dynamics.bodies.rigid import carry
-from pipeline.dynamics.equations.envelope import backward, factor, forward
-from pipeline.dynamics.equations.kinematics import make_kinematics
-from pipeline.dynamics.equations.prescribed_motion import make_known_motion
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import accumulate, at, dot6
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.bodies.rigid import carry
+from flexclear.pipeline.dynamics.equations.envelope import backward, factor, forward
+from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
+from flexclear.pipeline.dynamics.equations.prescribed_motion import make_known_motion
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import accumulate, at, dot6
 
 #: pivots of M below this share of their diagonal mean a coordinate that moves no mass
 MASSLESS_PIVOT = 1e-15

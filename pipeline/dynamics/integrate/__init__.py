@@ -6,7 +6,7 @@ order test, and parameters of its own, if it has any, in `pipeline.core.scene.so
 poses, `recording` writes down. Methods share `runge_kutta`, `newton`, `hermite` and `norms`.
 """
 
-from pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.integrators import INTEGRATORS
 
 KIND = "integrator"
 NAMES = {name: f"{traits.module}:METHOD" for name, traits in INTEGRATORS.items()}

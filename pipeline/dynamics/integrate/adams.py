@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import hermite, rk4
-from pipeline.dynamics.integrate.method import Method, slope
-from pipeline.dynamics.integrate.runge_kutta import make_stages
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import hermite, rk4
+from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.kernels import kernel
 
 LAST = rk4.STAGES
 # memory: number of slopes kept, their distance, then the slopes themselves, the latest first

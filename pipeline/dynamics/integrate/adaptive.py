@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
-from pipeline.dynamics.integrate.stepper import FAILED
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
+from flexclear.pipeline.dynamics.integrate.stepper import FAILED
+from flexclear.pipeline.dynamics.kernels import kernel
 
 # the factor to the next step is SAFETY norm^(-exponent) last_norm^MEMORY;
 # the memory keeps steps quiet where stability, not accuracy, limits them

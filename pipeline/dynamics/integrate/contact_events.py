@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
-from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.integrate.recording import add_event
-from pipeline.dynamics.integrate.stepper import RESTART
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import at, dot, sub
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.integrate.recording import add_event
+from flexclear.pipeline.dynamics.integrate.stepper import RESTART
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import at, dot, sub
 
 #: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
 #: of the sites' positions has no digits below, which matters where clearances are of micrometres

@@ -13,10 +13,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.integrate.recording import add_event, snapshot
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.integrate.recording import add_event, snapshot
+from flexclear.pipeline.dynamics.kernels import kernel
 
 #: share of the step over which trends at its end are measured; a force's peak nearer to the end than this is
 #: the force at the end, to the square of this

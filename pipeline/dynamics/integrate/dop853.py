@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
-from pipeline.dynamics.integrate.norms import error_scale
-from pipeline.dynamics.integrate.runge_kutta import make_stages
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from flexclear.pipeline.dynamics.integrate.norms import error_scale
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.kernels import kernel
 
 #: stages of the step, and with those of its end and of the dense output
 STAGES, EXTENDED, ERROR_ORDER = 12, 16, 7

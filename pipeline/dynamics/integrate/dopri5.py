@@ -10,12 +10,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
-from pipeline.dynamics.integrate.norms import error_scale
-from pipeline.dynamics.integrate.runge_kutta import make_stages
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
+from flexclear.pipeline.dynamics.integrate.norms import error_scale
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.kernels import kernel
 
 STAGES, ERROR_ORDER = 6, 4
 A = np.zeros((STAGES, STAGES))

@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.norms import finite, set_error_scales
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.norms import finite, set_error_scales
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_step_control(

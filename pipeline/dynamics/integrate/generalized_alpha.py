@@ -29,13 +29,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import hermite
-from pipeline.dynamics.integrate.method import Method, slope
-from pipeline.dynamics.integrate.newton import PERTURBATION, converged, limit, lu_factor, lu_solve
-from pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import hermite
+from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.newton import PERTURBATION, converged, limit, lu_factor, lu_solve
+from flexclear.pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
+from flexclear.pipeline.dynamics.kernels import kernel
 
 # rows of SLOPES: start of the step, Newton's iterate, end of the step, estimates, search for events
 ITERATE, LAST, ESTIMATE, ROWS = 1, 2, 3, 5

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.kernels import kernel
 
 #: rows of DENSE: coefficients of the powers of the share of the step
 ROWS = 4

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.core.integrators import Traits
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.integrators import Traits
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

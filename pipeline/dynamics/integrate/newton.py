@@ -8,7 +8,7 @@ iteration); Golub & Van Loan, *Matrix Computations*, 4th ed. (2013), alg. 3.4.1 
 
 from __future__ import annotations
 
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.kernels import kernel
 
 #: what is left may be this share of the tolerance, or ten roundings if that is more
 SHARE, ROUNDING = 1e-2, 2.2e-15

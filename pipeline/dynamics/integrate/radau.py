@@ -14,11 +14,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate import hermite
-from pipeline.dynamics.integrate.method import Method, slope
-from pipeline.dynamics.integrate.newton import (
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import hermite
+from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.newton import (
     PERTURBATION,
     converged,
     lu_factor,
@@ -26,8 +26,8 @@ from pipeline.dynamics.integrate.newton import (
     lu_solve,
     lu_solve_complex,
 )
-from pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
+from flexclear.pipeline.dynamics.kernels import kernel
 
 # rows of SLOPES: start of the step, three stages, its end, error estimate, search for events
 LAST, ESTIMATE, ROWS, ERROR_ORDER = 4, 5, 7, 3

@@ -9,10 +9,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.dynamics.integrate import hermite
-from pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
-from pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.dynamics.integrate import hermite
+from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
 
 STAGES = 4
 A = np.array([[0.0, 0.0, 0.0, 0.0], [0.5, 0.0, 0.0, 0.0], [0.0, 0.5, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])

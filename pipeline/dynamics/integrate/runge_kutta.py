@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[Callable, Callable]:

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.envelope import base
-from pipeline.dynamics.equations.projection import BLIND
-from pipeline.dynamics.integrate.poses import Poses
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.envelope import base
+from flexclear.pipeline.dynamics.equations.projection import BLIND
+from flexclear.pipeline.dynamics.integrate.poses import Poses
+from flexclear.pipeline.dynamics.kernels import kernel
 
 NEVER = 1e300
 #: steps ahead within which the zero of a row's independence is looked for more closely; so it is, however short the

@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.contact_events import any_closed, change_mode, watch_start
-from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.integrate.stepper import RESTART
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.contact_events import any_closed, change_mode, watch_start
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.integrate.stepper import RESTART
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

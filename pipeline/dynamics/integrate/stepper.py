@@ -11,13 +11,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.projection import keep_scales, largest
-from pipeline.dynamics.integrate.norms import finite
-from pipeline.dynamics.integrate.poses import NO_POSES, Poses
-from pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
-from pipeline.dynamics.integrate.stiffness import make_detect_stiffness
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.projection import keep_scales, largest
+from flexclear.pipeline.dynamics.integrate.norms import finite
+from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses
+from flexclear.pipeline.dynamics.integrate.recording import hold_modes, make_record_outputs, snapshot
+from flexclear.pipeline.dynamics.integrate.stiffness import make_detect_stiffness
+from flexclear.pipeline.dynamics.kernels import kernel
 
 #: what resolve_events returns for an event after which integration starts afresh; another positive number only
 #: records it

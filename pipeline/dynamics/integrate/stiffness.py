@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.method import slope
-from pipeline.dynamics.integrate.norms import error_scale
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.integrate.norms import error_scale
+from flexclear.pipeline.dynamics.kernels import kernel
 
 #: changes of state below this share of the tolerance are rounding, from which no rate can be told
 LEAST_CHANGE = 1e-2

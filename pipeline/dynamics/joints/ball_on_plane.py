@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import ZERO, at9, axis, dot, scale
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, at9, axis, dot, scale
 
 
 @kernel

@@ -8,9 +8,9 @@ not modelled.
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import at9, axis, dot, radial, scale, sub
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import at9, axis, dot, radial, scale, sub
 
 
 @kernel

@@ -5,9 +5,9 @@ Nothing but the contact (`contact.forces`) joins the bodies.
 
 from __future__ import annotations
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import radial
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import radial
 
 
 @kernel

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import TRANSLATION
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import IDENTITY, ZERO
+from flexclear.pipeline.dynamics.joints.coordinate import TRANSLATION
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import IDENTITY, ZERO
 
 
 @kernel

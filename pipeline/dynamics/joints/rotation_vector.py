@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import ZERO, add, at, cross, dot, put, scale
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, add, at, cross, dot, put, scale
 
 #: angle^2 below which the functions are taken from their series; their next terms are below rounding there
 SMALL = 1e-2

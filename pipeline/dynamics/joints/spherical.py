@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import ZERO, from_quaternion, quaternion_rate
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, from_quaternion, quaternion_rate
 
 
 @kernel

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import ZERO, cross, put, scale
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, cross, put, scale
 
 
 @kernel

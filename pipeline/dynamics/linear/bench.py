@@ -8,21 +8,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import Progress
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model import initial, selection
-from pipeline.dynamics.model.driving import prescribed
-from pipeline.dynamics.model.gauges import angles
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Model, tabulate
-from pipeline.dynamics.run import observation, singular
-from pipeline.dynamics.run.engine import Engine, prepare
-from pipeline.dynamics.run.run import driven
-from pipeline.dynamics.run.start import NO_IMPACT
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model import initial, selection
+from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.model.gauges import angles
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.dynamics.run import observation, singular
+from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.run import driven
+from flexclear.pipeline.dynamics.run.start import NO_IMPACT
 
 #: drives reach the wanted pose in strides of this share of the mechanism's size, or this angle
 STRIDE = 0.05

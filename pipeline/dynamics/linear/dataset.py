@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
-from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.linear.bench import Bench, observe, rows, state
-from pipeline.dynamics.linear.equilibrium import Equilibrium
-from pipeline.dynamics.linear.vibrations import Vibrations
-from pipeline.dynamics.record.dataset import attributes, dataset
-from pipeline.dynamics.record.motion import Motion, Motions
-from pipeline.dynamics.run.run import Run
-from pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
+from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.linear.bench import Bench, observe, rows, state
+from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
+from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
+from flexclear.pipeline.dynamics.record.dataset import attributes, dataset
+from flexclear.pipeline.dynamics.record.motion import Motion, Motions
+from flexclear.pipeline.dynamics.run.run import Run
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 PARTS = ("real", "imaginary")
 

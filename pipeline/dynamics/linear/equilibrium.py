@@ -17,14 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import SolverError
-from pipeline.core.progress import Progress
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
-from pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.run.singular import built_rows
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
+from flexclear.pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run.singular import built_rows
 
 #: iterations before giving up
 MOST = 200

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from pipeline.dynamics.linear.bench import Bench, balance, displacement_map
-from pipeline.dynamics.linear.differences import Rounding, derivative
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map
+from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 
 #: singular values of the closures below this share of the largest are redundant rows
 RANK = 1e-9

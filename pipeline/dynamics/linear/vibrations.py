@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.linear.bench import Bench
-from pipeline.dynamics.linear.tangent import Tangent, damping, stiffness
+from flexclear.pipeline.dynamics.linear.bench import Bench
+from flexclear.pipeline.dynamics.linear.tangent import Tangent, damping, stiffness
 
 #: an eigenvalue of the stiffness within this many estimated errors of zero is zero
 NOTHING = 10.0

@@ -6,8 +6,8 @@ Each module but that of gravity, which is a field, holds a class, called like it
 - ``apply(h, f, w, k)``: kernel that applies load k by `fields.act`.
 """
 
-from pipeline.core.registry import declared
-from pipeline.core.scene.loads import KINDS
+from flexclear.pipeline.core.registry import declared
+from flexclear.pipeline.core.scene.loads import KINDS
 
 KIND = "load"
 NAMES = declared(KINDS) | {"gravity": "gravity:field"}

@@ -15,12 +15,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene.loads import Bushing as Declared
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, number
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import add, at, at9, cross, dot, product, scale, sub, transpose, turn, turn_back
+from flexclear.pipeline.core.scene.loads import Bushing as Declared
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act, number
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import (
+    add,
+    at,
+    at9,
+    cross,
+    dot,
+    product,
+    scale,
+    sub,
+    transpose,
+    turn,
+    turn_back,
+)
 
 #: angle^2 below which e is taken from its series; the next term is 1e-13 there
 SMALL = 1e-3

@@ -5,11 +5,11 @@ A load between two sites acts on both by one wrench, with opposite signs: it lea
 
 from __future__ import annotations
 
-from pipeline.dynamics import gauge
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.bodies.rigid import apply_wrench
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import put, scale
+from flexclear.pipeline.dynamics import gauge
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import put, scale
 
 ZERO = (0.0, 0.0, 0.0)
 

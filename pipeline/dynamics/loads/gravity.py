@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.schema import Scene
 
 
 def field(scene: Scene) -> np.ndarray:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pipeline.core.scene.loads import JointForce as Declared
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, law, measure
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import scale
+from flexclear.pipeline.core.scene.loads import JointForce as Declared
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act, law, measure
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import scale
 
 
 @kernel

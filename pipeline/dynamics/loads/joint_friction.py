@@ -6,14 +6,14 @@ regularised coefficient.
 
 from __future__ import annotations
 
-from pipeline.core.scene.loads import JointFriction as Declared
-from pipeline.core.units import quantity
-from pipeline.dynamics.contact.friction.modified_coulomb import coefficient
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, measure, number
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import scale
+from flexclear.pipeline.core.scene.loads import JointFriction as Declared
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act, measure, number
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import scale
 
 
 @kernel

@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from pipeline.core.scene.loads import Pid as Declared
-from pipeline.core.units import quantity
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.gauge import counted, internal_rate
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, law, law_rate, measure, number
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import scale
+from flexclear.pipeline.core.scene.loads import Pid as Declared
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.gauge import counted, internal_rate
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act, law, law_rate, measure, number
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import scale
 
 #: stands for a limit that is not there
 UNLIMITED = 1e300

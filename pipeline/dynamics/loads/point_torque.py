@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pipeline.core.scene.loads import PointTorque as Declared
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import ZERO, act, law
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import at, at9, dot, turn
+from flexclear.pipeline.core.scene.loads import PointTorque as Declared
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import ZERO, act, law
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import at, at9, dot, turn
 
 
 @kernel

@@ -12,15 +12,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene.loads import SampledPid as Declared
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.gauge import counted
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.loads.fields import act, measure
-from pipeline.dynamics.loads.pid import numbers
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.vectors import scale
+from flexclear.pipeline.core.scene.loads import SampledPid as Declared
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.gauge import counted
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act, measure
+from flexclear.pipeline.dynamics.loads.pid import numbers
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.vectors import scale
 
 #: places of the internal states
 FORCE, INTEGRAL, ERROR = range(3)

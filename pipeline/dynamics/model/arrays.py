@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics import memory as m
 
 
 class WorkSpace(NamedTuple):

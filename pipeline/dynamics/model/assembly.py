@@ -7,20 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.errors import InputError
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.model import given_start
-from pipeline.dynamics.model.chain import path_positions
-from pipeline.dynamics.model.closing import EXACT, apart, close, misfit, opposite
-from pipeline.dynamics.model.constraints import Constraint, constraints, demands
-from pipeline.dynamics.model.deformation import start_place
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.laws import NONE
-from pipeline.dynamics.model.mechanism import Link, Mechanism
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.placing import assemblies, chosen
-from pipeline.dynamics.model.start_table import Given, given_coordinates
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.model import given_start
+from flexclear.pipeline.dynamics.model.chain import path_positions
+from flexclear.pipeline.dynamics.model.closing import EXACT, apart, close, misfit, opposite
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
+from flexclear.pipeline.dynamics.model.deformation import start_place
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.laws import NONE
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
+from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
 #: joints that miss each other by less than this share of the mechanism's size are meant to fit
 SLIGHT = 1e-4

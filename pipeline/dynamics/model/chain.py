@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.tree import PATH, Edge
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 #: x, y and z of the origin, then Cardan angles about x, y and z
 SLIDES = tuple(Coordinate(axis, False, axis=k) for k, axis in enumerate("xyz"))

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array, diags_array, eye_array
 
-from pipeline.core.algebra import rotation_vector_to_matrix, skew
-from pipeline.core.errors import InputError
-from pipeline.dynamics.model.constraints import Constraint, demands, prescribed
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.mechanism import Link, Mechanism
-from pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix, skew
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.dynamics.model.constraints import Constraint, demands, prescribed
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
 
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05

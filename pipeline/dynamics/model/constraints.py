@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.model.deformation import start_place
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.laws import NONE, drive_laws
-from pipeline.dynamics.model.mechanism import Link, Mechanism
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.start_table import Given
-from pipeline.dynamics.model.tree import PATH, Edge
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.model.deformation import start_place
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.laws import NONE, drive_laws
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.start_table import Given
+from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 
 @dataclass(frozen=True)

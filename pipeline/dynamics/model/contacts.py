@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import lookup
-from pipeline.core.scene.clearance import Clearance
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
-from pipeline.dynamics.model.gauges import Gauges
-from pipeline.dynamics.model.mechanism import Contact, Mechanism
-from pipeline.dynamics.model.numbering import Numbering
-from pipeline.dynamics.model.stops import End
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
+from flexclear.pipeline.dynamics.model.gauges import Gauges
+from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
+from flexclear.pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.dynamics.model.stops import End
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.contact.law import Resolved
+    from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline.core.errors import InputError
-from pipeline.core.units import quantity
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.driving import named_coordinate
-from pipeline.dynamics.model.gauges import Gauges
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.driving import named_coordinate
+from flexclear.pipeline.dynamics.model.gauges import Gauges
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.model.mechanism import Mechanism, Site
+    from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
 
 
 @dataclass(frozen=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.dynamics.model.flexible_bodies import bow, frame_shapes, shift
-from pipeline.dynamics.model.mechanism import Mechanism, Site
-from pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.dynamics.model.flexible_bodies import bow, frame_shapes, shift
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
+from flexclear.pipeline.dynamics.model.merge import Placement
 
 
 def start_place(mechanism: Mechanism, site: Site) -> Placement:

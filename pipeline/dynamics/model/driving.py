@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import lookup, suggestion
-from pipeline.core.scene.drives import PathDrive
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.effects import JOINTS
-from pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import lookup, suggestion
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.effects import JOINTS
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
 
 @dataclass(frozen=True)

@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.mechanism import Mechanism
-from pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
 NEGLIGIBLE = 1e-13

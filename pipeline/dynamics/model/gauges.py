@@ -7,7 +7,7 @@ from math import atan2
 
 import numpy as np
 
-from pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
 
 @dataclass

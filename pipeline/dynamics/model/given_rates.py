@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.couplings import Coupling
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.start_table import given_coordinates, given_modal_velocities
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modal_velocities
 
 
 @dataclass(frozen=True)

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.algebra import matrix_to_quaternion, rotation_between, rotation_vector_to_matrix
-from pipeline.core.errors import InputError
-from pipeline.core.scene.drives import PathDrive
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.model.chain import path_positions
-from pipeline.dynamics.model.constraints import Constraint, prescribed
-from pipeline.dynamics.model.deformation import start_place
-from pipeline.dynamics.model.driving import coordinate_of, joint_class
-from pipeline.dynamics.model.laws import drive_laws
-from pipeline.dynamics.model.mechanism import Mechanism
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.start_table import Given
-from pipeline.dynamics.model.tree import PATH, Edge
+from flexclear.pipeline.core.algebra import matrix_to_quaternion, rotation_between, rotation_vector_to_matrix
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.model.chain import path_positions
+from flexclear.pipeline.dynamics.model.constraints import Constraint, prescribed
+from flexclear.pipeline.dynamics.model.deformation import start_place
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_class
+from flexclear.pipeline.dynamics.model.laws import drive_laws
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.start_table import Given
+from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 #: a start further from its drive's law than this, as share of the mechanism's size or in rad, is a contradiction
 FAR, FAR_ANGLE = 0.05, 0.1

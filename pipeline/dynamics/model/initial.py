@@ -7,19 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.loads import SpringDamper
-from pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import chain_positions
-from pipeline.dynamics.model.constraints import outboard_place
-from pipeline.dynamics.model.deformation import start_place
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.flexible_bodies import bow, shift
-from pipeline.dynamics.model.gauges import angles
-from pipeline.dynamics.model.given_rates import given_rates
-from pipeline.dynamics.model.mechanism import Link, Mechanism
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.loads import SpringDamper
+from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.assembly import chain_positions
+from flexclear.pipeline.dynamics.model.constraints import outboard_place
+from flexclear.pipeline.dynamics.model.deformation import start_place
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
+from flexclear.pipeline.dynamics.model.gauges import angles
+from flexclear.pipeline.dynamics.model.given_rates import given_rates
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
+from flexclear.pipeline.dynamics.model.model import Model
 
 #: state -> frames of all links and sites, named fields of LINK_FRAMES and SITE_FRAMES, and rates at which the loops
 #: open, (closure rows,)

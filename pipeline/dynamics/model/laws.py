@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
-from pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
+from flexclear.pipeline.dynamics.model.driving import prescribed
 
 #: no laws in the place of the scene's
 NONE: Mapping[str, Pieces] = MappingProxyType({})

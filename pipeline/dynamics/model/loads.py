@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import lookup
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.effects import LOADS
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.loads.row import Row
-from pipeline.dynamics.model.driving import coordinate_of, named_coordinate
-from pipeline.dynamics.model.gauges import Gauges
-from pipeline.dynamics.model.laws import checked_law
-from pipeline.dynamics.model.mechanism import Mechanism
-from pipeline.dynamics.model.merge import find_frame
-from pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.effects import LOADS
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.loads.row import Row
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
+from flexclear.pipeline.dynamics.model.gauges import Gauges
+from flexclear.pipeline.dynamics.model.laws import checked_law
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+from flexclear.pipeline.dynamics.model.merge import find_frame
+from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 #: what loads add to the ledger, before the turns that they count: work done, energy lost
 LEDGER = 2

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.clearance import Clearance
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.model.chain import InboardJoint, chain
-from pipeline.dynamics.model.driving import prescribed
-from pipeline.dynamics.model.merge import (
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
+from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.model.merge import (
     Frame,
     Group,
     Placement,
@@ -26,9 +26,9 @@ from pipeline.dynamics.model.merge import (
     rigid_inertia,
     start_places,
 )
-from pipeline.dynamics.model.start_table import given_modes
-from pipeline.dynamics.model.stops import STOP, End, ends
-from pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
+from flexclear.pipeline.dynamics.model.start_table import given_modes
+from flexclear.pipeline.dynamics.model.stops import STOP, End, ends
+from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
 
 #: share of the largest radius of gyration below which the distances of a scene are no size of it
 NOTHING = 1e-9

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.errors import InputError
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
-from pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
+from flexclear.pipeline.core.scene.schema import Scene
 
 GROUND = "ground"
 

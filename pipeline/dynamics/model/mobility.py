@@ -14,16 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.core.errors import InputError
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.assembly import settled
-from pipeline.dynamics.model.closing import LEAST_GYRATION, close
-from pipeline.dynamics.model.constraints import constraints
-from pipeline.dynamics.model.couplings import Coupling
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.assembly import settled
+from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close
+from flexclear.pipeline.dynamics.model.constraints import constraints
+from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
 
 #: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
 #: how many are enough; share of the displacement that such a pose must keep when its loops are closed

@@ -8,26 +8,26 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.effects import Parts
-from pipeline.dynamics.model import contacts as contacting
-from pipeline.dynamics.model import flexible_bodies, laws, wiring
-from pipeline.dynamics.model import loads as loading
-from pipeline.dynamics.model.arrays import Arrays, pack
-from pipeline.dynamics.model.assembly import assembled
-from pipeline.dynamics.model.couplings import Coupling, couplings, tables
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.gauges import Gauges
-from pipeline.dynamics.model.loads import Load
-from pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.numbering import Numbering, number
-from pipeline.dynamics.model.stops import STOP
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.effects import Parts
+from flexclear.pipeline.dynamics.model import contacts as contacting
+from flexclear.pipeline.dynamics.model import flexible_bodies, laws, wiring
+from flexclear.pipeline.dynamics.model import loads as loading
+from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
+from flexclear.pipeline.dynamics.model.assembly import assembled
+from flexclear.pipeline.dynamics.model.couplings import Coupling, couplings, tables
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.gauges import Gauges
+from flexclear.pipeline.dynamics.model.loads import Load
+from flexclear.pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.numbering import Numbering, number
+from flexclear.pipeline.dynamics.model.stops import STOP
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.contact.law import Resolved
+    from flexclear.pipeline.dynamics.contact.law import Resolved
 
 
 @dataclass(frozen=True)

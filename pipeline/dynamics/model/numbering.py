@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.mechanism import Link, Mechanism, Site
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, Site
 
 Route = list[tuple[int, int]]  #: (coordinate, column) pairs that move a site
 

@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.algebra import rotation_vector_to_matrix
-from pipeline.dynamics.model.closing import close, misfit, opposite
-from pipeline.dynamics.model.constraints import Constraint
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.mechanism import Mechanism
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.start_table import Given
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.dynamics.model.closing import close, misfit, opposite
+from flexclear.pipeline.dynamics.model.constraints import Constraint
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.start_table import Given
 
 #: guesses from which assemblies are looked for; the first has nothing at random
 GUESSES = 16

@@ -23,13 +23,13 @@ from functools import cached_property
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
-from pipeline.dynamics.model.couplings import Coupling, Side
-from pipeline.dynamics.model.mechanism import Closure
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.wiring import closure_route, uncommon
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
+from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
+from flexclear.pipeline.dynamics.model.mechanism import Closure
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 #: a turn counts as having at least this arm, in units of the mechanism's size: places are no more exact for being near
 LEAST_ARM = 1e-3

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.scene.drives import JointDrive
-from pipeline.core.scene.loads import Gravity
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import pieces_of
-from pipeline.dynamics.model.driving import Prescribed, prescribed
-from pipeline.dynamics.model.model import Model, filled
+from flexclear.pipeline.core.scene.drives import JointDrive
+from flexclear.pipeline.core.scene.loads import Gravity
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import pieces_of
+from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
+from flexclear.pipeline.dynamics.model.model import Model, filled
 
 
 def refilled(model: Model, scene: Scene) -> Model | None:

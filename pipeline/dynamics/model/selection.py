@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.arrays import envelope_size
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.wiring import closure_envelope
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.arrays import envelope_size
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.wiring import closure_envelope
 
 #: a row below this share of its natural length is rounding: the square root of what rounding leaves of a cancelling
 #: sum, 1e-13 at worst, with some digits to spare

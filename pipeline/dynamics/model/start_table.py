@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.schema import Scene
-from pipeline.core.units import quantity
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
 
 
 @dataclass(frozen=True)

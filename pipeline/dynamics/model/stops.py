@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.stops import Stop
-from pipeline.core.units import quantity
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.stops import Stop
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
 
 #: type of a contact that is an end of a stop
 STOP = "stop"

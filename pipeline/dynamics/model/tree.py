@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pipeline.core.errors import InputError
-from pipeline.core.scene.drives import PathDrive
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.joints import HELD
-from pipeline.dynamics.model.driving import joint_class, joint_drives
-from pipeline.dynamics.model.merge import Frame, Group, find_frame
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.joints import HELD
+from flexclear.pipeline.dynamics.model.driving import joint_class, joint_drives
+from flexclear.pipeline.dynamics.model.merge import Frame, Group, find_frame
 
 #: kind of an edge that is no joint of the scene: a frame's pose in the world, prescribed in part or whole
 PATH = "path"

@@ -9,11 +9,11 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model import arrays
-from pipeline.dynamics.model.couplings import Coupling
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model import arrays
+from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
 def mass_entries(numbering: Numbering) -> dict[Any, Any]:

@@ -5,7 +5,7 @@ core/scene/output declares together with the variables that it adds. The module 
 ``record(motions, asked)``, which returns them and their coordinates; asked is the key's value.
 """
 
-from pipeline.core.scene.output import VARIABLES
+from flexclear.pipeline.core.scene.output import VARIABLES
 
 KIND = "record on request"
 NAMES = {name: f"{name}:record" for name in VARIABLES}

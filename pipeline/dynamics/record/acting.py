@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
 
 Acting = list[tuple[str, np.ndarray, np.ndarray]]
 
@@ -14,15 +14,15 @@ def on_frames(model: Model, seen: Observed, body: str) -> Acting:
     """Everything that acts on a body: its frame, moment about the kernels' origin, force; (time, 3) each."""
     found: Acting = []
     if model.loads:
-        from pipeline.dynamics.record.loads import on_loaded_frames
+        from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
 
         found += on_loaded_frames(model, seen)
     if model.parts.stops:
-        from pipeline.dynamics.record.stops import on_stopped_frames
+        from flexclear.pipeline.dynamics.record.stops import on_stopped_frames
 
         found += on_stopped_frames(model, seen)
     if model.parts.couplings:
-        from pipeline.dynamics.record.gears import on_geared_frames
+        from flexclear.pipeline.dynamics.record.gears import on_geared_frames
 
         found += on_geared_frames(model, seen)
     return [acting for acting in found if model.mechanism.frames[acting[0]].body == body]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.core.scene.loads import Bushing
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.core.scene.loads import Bushing
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
 
 
 def give(model: Model, seen: Observed) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:

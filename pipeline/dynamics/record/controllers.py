@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene.loads import Pid, SampledPid
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.loads.sampled_pid import INTEGRAL
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.loads import along_coordinates
+from flexclear.pipeline.core.scene.loads import Pid, SampledPid
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.loads.sampled_pid import INTEGRAL
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.record.loads import along_coordinates
 
 
 def controllers(

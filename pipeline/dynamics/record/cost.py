@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import xarray as xr
 
-from pipeline.core.progress import Progress, silent
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.record.dataset import dataset
-from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.run import Run, engines, follow, observed, twin_of
-from pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.record.dataset import dataset
+from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed, twin_of
+from flexclear.pipeline.dynamics.run.start import consistent_start
 
 #: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
 #: that: a disturbance of a millisecond is a tenth of some. What has taken LONG is an average by itself [s]

@@ -8,19 +8,19 @@ from importlib.metadata import version
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import RUN, conform
-from pipeline.core.registry import lookup
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.effects import RECORDS
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.motion import Motions, quaternions
-from pipeline.dynamics.record.topology import topology
-from pipeline.dynamics.record.wrenches import joint_wrenches
-from pipeline.dynamics.run import ledger
-from pipeline.dynamics.run.coordinates import joint_coordinates
-from pipeline.dynamics.run.run import Run
-from pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.core.artifacts.schema import RUN, conform
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.effects import RECORDS
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
+from flexclear.pipeline.dynamics.record.topology import topology
+from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.run import ledger
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
+from flexclear.pipeline.dynamics.run.run import Run
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 Part = tuple[Variables, dict[str, object]]  #: variables and coordinates
@@ -34,15 +34,15 @@ def dataset(run: Run) -> xr.Dataset:
     if model.loads:
         parts.append(_loads(model, seen))
     if "bushing" in model.parts.loads:
-        from pipeline.dynamics.record.bushings import give
+        from flexclear.pipeline.dynamics.record.bushings import give
 
         parts.append(give(model, seen))
     if {"pid", "sampled-pid"} & set(model.parts.loads):
-        from pipeline.dynamics.record.controllers import controllers
+        from flexclear.pipeline.dynamics.record.controllers import controllers
 
         parts.append(controllers(model, seen))
     if model.parts.couplings:
-        from pipeline.dynamics.record.gears import gear_series
+        from flexclear.pipeline.dynamics.record.gears import gear_series
 
         parts.append(gear_series(model, seen))
     if model.contacts:
@@ -103,7 +103,7 @@ def _contact_warnings(run: Run) -> list[str]:
     """Sentences about contacts that left the range for which their laws were made."""
     if not run.model.contacts:
         return []
-    from pipeline.dynamics.contact import validity
+    from flexclear.pipeline.dynamics.contact import validity
 
     depths, forces = validity.deepest(run.trajectory.events, run.observed.touch)
     sentences = list[str]()
@@ -116,7 +116,7 @@ def _flexible_warnings(run: Run) -> list[str]:
     """Sentences about flexible bodies that left the range of linear modes."""
     if not run.model.numbering.flexible:
         return []
-    from pipeline.dynamics.run import validity
+    from flexclear.pipeline.dynamics.run import validity
 
     return validity.warnings(run.model, run.trajectory.time, run.observed)
 
@@ -143,7 +143,7 @@ def _report(run: Run) -> dict[str, float | int | str]:
         told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
     doubts = "\n".join(warnings(run))
     if run.model.contacts:
-        from pipeline.dynamics.contact import validity
+        from flexclear.pipeline.dynamics.contact import validity
 
         told["contacts"] = validity.laws(run.model.contacts, run.model.laws)
     if doubts or run.model.contacts:
@@ -201,7 +201,7 @@ def _drives(run: Run) -> Part:
     force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]
     sharing = [name for name in model.scene.forces() if name not in run.scene.load]
     if sharing:  # actuators beyond the freedoms, which the engine has as loads
-        from pipeline.dynamics.record.loads import along_coordinates
+        from flexclear.pipeline.dynamics.record.loads import along_coordinates
 
         names += sharing
         known = joint_coordinates(model, seen)
@@ -224,7 +224,7 @@ def _joint_coordinates(model: Model, seen: Observed) -> Part:
 
 
 def _loads(model: Model, seen: Observed) -> Part:
-    from pipeline.dynamics.record.loads import load_series
+    from flexclear.pipeline.dynamics.record.loads import load_series
 
     return load_series(model, seen), {"load": list(model.scene.forces())}
 

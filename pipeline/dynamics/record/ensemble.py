@@ -11,21 +11,21 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.artifacts.schema import ENSEMBLE, conform
-from pipeline.core.errors import InputError
-from pipeline.core.progress import Progress, silent
-from pipeline.core.quantities import IMPACT
-from pipeline.core.scene.schema import Ensemble, Scene
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.dataset import attributes
-from pipeline.dynamics.record.motion import Motion, Motions, quaternions
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.run import engines, follow, observed
-from pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import Trajectory, output_times
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.artifacts.schema import ENSEMBLE, conform
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.quantities import IMPACT
+from flexclear.pipeline.core.scene.schema import Ensemble, Scene
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.record.dataset import attributes
+from flexclear.pipeline.dynamics.record.motion import Motion, Motions, quaternions
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.run import engines, follow, observed
+from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.couplings import Coupling, Side
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
+from flexclear.pipeline.dynamics.model.model import Model
 
 
 def gear_series(

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
 
 
 def load_series(model: Model, seen: Observed) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:

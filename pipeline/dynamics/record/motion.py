@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.core.scene.parts import Ground, RigidBody
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.flexible_bodies import bow, shift
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.core.scene.parts import Ground, RigidBody
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.model import Model
 
 
 @dataclass(frozen=True)

@@ -8,26 +8,26 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.artifacts.points import Point, Values
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import silent
-from pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
-from pipeline.core.scene.kept import OF_CONTACTS, Kept
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Ensemble, Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.record.ensemble import ball_offsets
-from pipeline.dynamics.record.motion import Motions, quaternions
-from pipeline.dynamics.record.wrenches import joint_wrenches
-from pipeline.dynamics.run.alike import engines_alike
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.run import follow, observed, require_shallow
-from pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.artifacts.points import Point, Values
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
+from flexclear.pipeline.core.scene.kept import OF_CONTACTS, Kept
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Ensemble, Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
+from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
+from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.run.alike import engines_alike
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
+from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 #: where nothing is kept of the way, the ledger of energy is looked at so often
 LOOKS = 50

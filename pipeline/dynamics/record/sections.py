@@ -8,23 +8,23 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import SECTIONS, conform
-from pipeline.core.errors import InputError
-from pipeline.core.progress import Progress
-from pipeline.core.quantities import IMPACT
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.loads import SampledPid
-from pipeline.core.scene.schema import Scene, Sections
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.dataset import attributes
-from pipeline.dynamics.record.ensemble import kept_bodies, motion_series
-from pipeline.dynamics.record.motion import Motions
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.periods import APART, Period, periods, require_periodic, stretches
-from pipeline.dynamics.run.run import engines, observed
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.core.artifacts.schema import SECTIONS, conform
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.quantities import IMPACT
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.core.scene.schema import Scene, Sections
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.record.dataset import attributes
+from flexclear.pipeline.dynamics.record.ensemble import kept_bodies, motion_series
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.periods import APART, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.run import engines, observed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 

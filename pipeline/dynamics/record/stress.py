@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import skew
-from pipeline.core.errors import InputError
-from pipeline.dynamics.record.acting import on_frames
-from pipeline.dynamics.record.motion import Motions
-from pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
+from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.dynamics.record.acting import on_frames
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 

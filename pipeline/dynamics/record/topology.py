@@ -6,13 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model import selection
-from pipeline.dynamics.model.mobility import INFINITE
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.run import Run
-from pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.model.mobility import INFINITE
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.run import Run
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 

@@ -6,14 +6,14 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
-from pipeline.core.scene.drives import PathDrive
-from pipeline.core.scene.parts import RigidBody
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.couplings import Coupling
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.record.acting import on_body
-from pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.record.acting import on_body
+from flexclear.pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
 

@@ -16,12 +16,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import Progress
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.wanted import Quantity, parse
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.wanted import Quantity, parse
 
 #: the estimate compares with a run at this share of the tolerance
 FINER = 1e-2

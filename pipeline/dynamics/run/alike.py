@@ -7,15 +7,15 @@ from functools import cache
 
 import xarray as xr
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.core.progress import silent
-from pipeline.core.scene.drives import PathDrive
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics.effects import scheme_of
-from pipeline.dynamics.model.refill import refilled
-from pipeline.dynamics.run.engine import Engine, assemble
-from pipeline.dynamics.run.run import engine_of, engines
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.effects import scheme_of
+from flexclear.pipeline.dynamics.model.refill import refilled
+from flexclear.pipeline.dynamics.run.engine import Engine, assemble
+from flexclear.pipeline.dynamics.run.run import engine_of, engines
 
 
 def engines_alike(

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model import initial
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.collocation import Sampler
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.start import start_motions
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model import initial
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.collocation import Sampler
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.start import start_motions
 
 #: way off, in units of the coordinates, and singular values below this share of the largest, which are zero
 WAY, ZERO = 1e-2, 1e-6

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations import observation
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.observation import ROUNDING as CLOSED
-from pipeline.dynamics.run.observation import observe_with
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations import observation
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.observation import ROUNDING as CLOSED
+from flexclear.pipeline.dynamics.run.observation import observe_with
 
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1

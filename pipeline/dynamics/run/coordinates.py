@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.couplings import Coupling
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.model import Model
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.model import Model
 
 Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
 

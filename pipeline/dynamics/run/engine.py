@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import Progress
-from pipeline.core.registry import lookup
-from pipeline.core.scene.loads import SampledPid
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.compile import functions
-from pipeline.dynamics.effects import INTEGRATORS, scheme_of
-from pipeline.dynamics.integrate.method import Method
-from pipeline.dynamics.model import selection
-from pipeline.dynamics.model.driving import coordinate_of
-from pipeline.dynamics.model.given_rates import given_rates
-from pipeline.dynamics.model.mobility import Mobility, analyse, moves
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.run import singular
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.effects import INTEGRATORS, scheme_of
+from flexclear.pipeline.dynamics.integrate.method import Method
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.dynamics.model.given_rates import given_rates
+from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run import singular
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12

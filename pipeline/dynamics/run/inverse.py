@@ -23,25 +23,25 @@ import numpy as np
 import xarray as xr
 from scipy.linalg import null_space, qr
 
-from pipeline.core.errors import InputError
-from pipeline.core.progress import Progress
-from pipeline.core.scene.drives import JointDrive, PathDrive
-from pipeline.core.scene.laws import Constant
-from pipeline.core.scene.loads import JointForce
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Piece, Pieces
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.joints.coordinate import Coordinate
-from pipeline.dynamics.model.driving import coordinate_of
-from pipeline.dynamics.model.laws import NONE
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.run.coordinates import joint_coordinates, label
-from pipeline.dynamics.run.engine import Engine, prepare
-from pipeline.dynamics.run.observation import observe
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.drives import JointDrive, PathDrive
+from flexclear.pipeline.core.scene.laws import Constant
+from flexclear.pipeline.core.scene.loads import JointForce
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.dynamics.model.laws import NONE
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
+from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: singular values below this share of the largest are zero
 RANK = 1e-8

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.errors import SolverError
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.core.scene.solver import Solver
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.solver import Solver
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations import observation
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.run.engine import Engine, pieces_at
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations import observation
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.run.engine import Engine, pieces_at
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.run.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.collocation import Collocation
 
 #: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
 RECORD_SHARE, ROUNDING = 1e-3, 1e-14

@@ -19,13 +19,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import silent
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.driving import prescribed
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.start import project
-from pipeline.dynamics.run.trajectory import LASTING, Handover, Trajectory, integrate
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.start import project
+from flexclear.pipeline.dynamics.run.trajectory import LASTING, Handover, Trajectory, integrate
 
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
 WAYPOINTS = 16

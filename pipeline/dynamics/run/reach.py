@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model import selection
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: least singular value of the closures, as share of the largest, above which a pose is not yet at the end of reach; and
 #: above which it is not singular

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.reach import beyond_reach, end_in_pose
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
@@ -61,7 +61,7 @@ def _doubts(engine: Engine) -> str:
     """What flexible bodies are doubted for where the run ended, which may well be why; or nothing."""
     if not engine.model.numbering.flexible:
         return ""
-    from pipeline.dynamics.run.validity import doubts
+    from flexclear.pipeline.dynamics.run.validity import doubts
 
     return "".join(f"; {sentence}" for sentence in doubts(engine))
 

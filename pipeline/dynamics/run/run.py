@@ -10,30 +10,30 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import SolverError
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.core.progress import Progress
-from pipeline.core.registry import lookup
-from pipeline.core.scene.drives import PathDrive
-from pipeline.core.scene.load import edited
-from pipeline.core.scene.schema import Scene
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.drives.pieces import Pieces
-from pipeline.dynamics.effects import STARTS
-from pipeline.dynamics.equations import observation
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import Model, tabulate
-from pipeline.dynamics.run import trajectory as stepping
-from pipeline.dynamics.run.collocation import Collocation
-from pipeline.dynamics.run.engine import Engine, prepare
-from pipeline.dynamics.run.ledger import require_closed
-from pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
-from pipeline.dynamics.run.start import consistent_start, mends
-from pipeline.dynamics.run.trajectory import StiffError, Trajectory
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.effects import STARTS
+from flexclear.pipeline.dynamics.equations import observation
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.dynamics.run import trajectory as stepping
+from flexclear.pipeline.dynamics.run.collocation import Collocation
+from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from flexclear.pipeline.dynamics.run.start import consistent_start, mends
+from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.run.sensitivity import Twin
+    from flexclear.pipeline.dynamics.run.sensitivity import Twin
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     """The scene with actuators driven as the paths that they shall produce demand, and the laws of their motion."""
     if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
         return scene, {}
-    from pipeline.dynamics.run.inverse import actuated
+    from flexclear.pipeline.dynamics.run.inverse import actuated
 
     return actuated(scene, bundles, progress)
 
@@ -131,7 +131,7 @@ def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> Non
     """SolverError for a contact so deep that its surfaces mean nothing."""
     if not model.contacts:
         return
-    from pipeline.dynamics.contact.validity import deepest, refuse_deep
+    from flexclear.pipeline.dynamics.contact.validity import deepest, refuse_deep
 
     depths, _ = deepest(trajectory.events, seen.touch)
     for contact, depth in zip(model.contacts, depths, strict=True):
@@ -142,7 +142,7 @@ def twin_of(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin |
     """The twin of a run with contacts."""
     if not engine.model.contacts:
         return None
-    from pipeline.dynamics.run.sensitivity import twin
+    from flexclear.pipeline.dynamics.run.sensitivity import twin
 
     return twin(engine, start, trajectory)
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.registry import lookup
-from pipeline.core.scene.loads import SampledPid
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.effects import LOADS
-from pipeline.dynamics.model.gauges import values
-from pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects import LOADS
+from flexclear.pipeline.dynamics.model.gauges import values
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: a break is a sample when it is off by no more than this share of the period
 NEAR = 1e-6

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.core.artifacts.event_kinds import OPENING
-from pipeline.core.errors import SolverError
-from pipeline.core.progress import silent
-from pipeline.core.quantities import PARTED
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.observation import observe
-from pipeline.dynamics.run.start import project
-from pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
+from flexclear.pipeline.core.artifacts.event_kinds import OPENING
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.quantities import PARTED
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.start import project
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
 
 #: the two are compared at so many regular outputs, which bounds the cost, and wherever a contact of the run ends
 SAMPLES = 180

@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.projection import BLIND
-from pipeline.dynamics.integrate.singular_step import NEVER
-from pipeline.dynamics.model import selection
-from pipeline.dynamics.model.driving import joint_class
-from pipeline.dynamics.model.mobility import INFINITE
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.projection import BLIND
+from flexclear.pipeline.dynamics.integrate.singular_step import NEVER
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.mobility import INFINITE
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
-    from pipeline.dynamics.run.engine import Engine
+    from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1

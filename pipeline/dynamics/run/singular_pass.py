@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.errors import SolverError
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
-from pipeline.dynamics.model import selection
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.reach import beyond_reach, rest
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.reach import beyond_reach, rest
 
 #: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
 #: then half of that, and so on

@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.scene.start import Branch
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.driving import coordinate_of
-from pipeline.dynamics.run import branches, singular
-from pipeline.dynamics.run.branches import Direction
-from pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
-from pipeline.dynamics.run.coordinates import joint_coordinates, label
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.scene.start import Branch
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.dynamics.run import branches, singular
+from flexclear.pipeline.dynamics.run.branches import Direction
+from flexclear.pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.observation import observe
 
 #: the way is first as long as the fastest coordinate takes for this share of its unit, then half of that, and so on
 FIRST, HALVINGS = 0.3, 9

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.scene.drives import PathDrive
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model import initial
-from pipeline.dynamics.model.given_start import moved
-from pipeline.dynamics.model.merge import Placement
-from pipeline.dynamics.model.stops import End
-from pipeline.dynamics.run import singular
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model import initial
+from flexclear.pipeline.dynamics.model.given_start import moved
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.stops import End
+from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.observation import observe
 
 #: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
 NO_IMPACT = 1e300

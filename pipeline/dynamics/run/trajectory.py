@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.core.errors import SolverError
-from pipeline.core.progress import Progress
-from pipeline.core.scene.loads import SampledPid
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
-from pipeline.dynamics.run import refusal, singular
-from pipeline.dynamics.run.collocation import Collocation
-from pipeline.dynamics.run.engine import Engine
-from pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
-from pipeline.dynamics.run.singular_start import start_motion
-from pipeline.dynamics.run.start import NO_IMPACT, overlapping
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
+from flexclear.pipeline.dynamics.run import refusal, singular
+from flexclear.pipeline.dynamics.run.collocation import Collocation
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
+from flexclear.pipeline.dynamics.run.singular_start import start_motion
+from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -183,7 +183,7 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     """What gives the state after the samples of controllers, from that at a break [s] before them."""
     if not any(isinstance(load, SampledPid) for load in engine.model.scene.load.values()):
         return lambda y, t: y
-    from pipeline.dynamics.run.sampling import sampler
+    from flexclear.pipeline.dynamics.run.sampling import sampler
 
     return sampler(engine)
 
@@ -306,7 +306,7 @@ def _warn(engine: Engine, tape: _Tape, progress: Progress) -> None:
     """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
     if not engine.model.numbering.flexible:
         return
-    from pipeline.dynamics.run.validity import doubts
+    from flexclear.pipeline.dynamics.run.validity import doubts
 
     for sentence in doubts(engine):
         body = sentence.partition(":")[0]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.equations.observation import Observed
-from pipeline.dynamics.model.model import Model
-from pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: displacement of a point in its body frame, as share of the body's length, above which linear modes are doubted
 BENT = 0.05

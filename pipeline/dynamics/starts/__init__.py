@@ -7,7 +7,7 @@ coordinates of that start in the place of what it says itself.
 
 from typing import get_args
 
-from pipeline.core.scene.start import At
+from flexclear.pipeline.core.scene.start import At
 
 KIND = "start"
 NAMES = {name: f"{name}:begin" for name in get_args(At)}

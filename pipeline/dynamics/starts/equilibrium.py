@@ -7,16 +7,16 @@ from typing import Any
 
 import xarray as xr
 
-from pipeline.core.progress import Progress
-from pipeline.core.scene.drives import JointDrive
-from pipeline.core.scene.laws import Constant
-from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.start import JointStart, Start
-from pipeline.dynamics.linear.bench import state
-from pipeline.dynamics.linear.equilibrium import equilibrium
-from pipeline.dynamics.model.driving import joint_drives
-from pipeline.dynamics.model.start_table import given_coordinates
-from pipeline.dynamics.starts.snapshot import posed, resting
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.drives import JointDrive
+from flexclear.pipeline.core.scene.laws import Constant
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.start import JointStart, Start
+from flexclear.pipeline.dynamics.linear.bench import state
+from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium
+from flexclear.pipeline.dynamics.model.driving import joint_drives
+from flexclear.pipeline.dynamics.model.start_table import given_coordinates
+from flexclear.pipeline.dynamics.starts.snapshot import posed, resting
 
 
 def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Scene:

@@ -11,23 +11,23 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import SolverError
-from pipeline.core.progress import Progress
-from pipeline.core.scene.clearance import Clearance
-from pipeline.core.scene.parts import IdealJoint
-from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.start import Start
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.mechanism import build
-from pipeline.dynamics.model.model import tabulate
-from pipeline.dynamics.record.motion import Motions
-from pipeline.dynamics.record.wrenches import joint_wrenches
-from pipeline.dynamics.run.engine import Engine, prepare
-from pipeline.dynamics.run.observation import observe
-from pipeline.dynamics.run.run import driven
-from pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
-from pipeline.dynamics.run.start import consistent_start
-from pipeline.dynamics.starts.snapshot import moving, resting
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.parts import IdealJoint
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.start import Start
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.run import driven
+from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
 #: a pin is in its place when it is this share of the clearance from it; passes in which that is reached, at most
 THERE, PASSES = 1e-9, 20

@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core.algebra import matrix_to_quaternion
-from pipeline.core.scene.clearance import Clearance
-from pipeline.core.scene.fields import Pose
-from pipeline.core.scene.parts import Ground
-from pipeline.core.scene.schema import Scene
-from pipeline.core.scene.start import JointStart, ModalStart, Start
-from pipeline.dynamics import memory as m
-from pipeline.dynamics.model.initial import centre_of
-from pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.core.scene.parts import Ground
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.initial import centre_of
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 Vector = tuple[float, float, float]
 

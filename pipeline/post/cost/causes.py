@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.post.plotting.style import INK, files, grid, heading, style
-from pipeline.post.plotting.table import Table
+from flexclear.pipeline.post.plotting.style import INK, files, grid, heading, style
+from flexclear.pipeline.post.plotting.table import Table
 
 #: the causes in the order of the stages that make them, each with what a user would refine
 CAUSES = {

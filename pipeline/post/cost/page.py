@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.post.cost.causes import CAUSES, dominant
-from pipeline.post.cost.price import TARGETS, Choice, cheapest
+from flexclear.pipeline.post.cost.causes import CAUSES, dominant
+from flexclear.pipeline.post.cost.price import TARGETS, Choice, cheapest
 
 INTRODUCTION = """# What accuracy costs
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.post.cost.study import GROUPS, recording, resolved
-from pipeline.post.plotting.table import Table
+from flexclear.pipeline.post.cost.study import GROUPS, recording, resolved
+from flexclear.pipeline.post.plotting.table import Table
 
 TARGETS = (1e-3, 1e-6, 1e-9)
 #: groups that say how a run is integrated, and the factor that is a setting

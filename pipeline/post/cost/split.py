@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.artifacts.event_kinds import CLOSING
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.cost.statistics import relative_error
-from pipeline.post.cost.study import Point, horizon_of, relative
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.cost.statistics import relative_error
+from flexclear.pipeline.post.cost.study import Point, horizon_of, relative
 
 #: half the width of a normal distribution's 95 % interval, in standard deviations
 NORMAL_95 = 1.96

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.post.plotting.style import files, grid, heading, plain, style
-from pipeline.post.plotting.table import Table
+from flexclear.pipeline.post.plotting.style import files, grid, heading, plain, style
+from flexclear.pipeline.post.plotting.table import Table
 
 RESAMPLES = 2000
 SEED = 7

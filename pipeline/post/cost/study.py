@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.errors import SolverError
-from pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.scene.wanted import Quantity
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {

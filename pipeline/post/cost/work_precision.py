@@ -13,9 +13,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pipeline.core.integrators import INTEGRATORS
-from pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
-from pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
+from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
 MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")

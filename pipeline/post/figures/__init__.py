@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from pipeline.core.registry import lookup, module_of
+from flexclear.pipeline.core.registry import lookup, module_of
 
 KIND = "figure or table"
 NAMES = {

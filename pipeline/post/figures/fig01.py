@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.post.models import CSJ, FAR_CB, IDEAL, JOINT
-from pipeline.post.plotting import style
-from pipeline.post.plotting.drawing import View, shell, triad, tube, view
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.models import CSJ, FAR_CB, IDEAL, JOINT
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.drawing import View, shell, triad, tube, view
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = ("sps4/ideal:run",)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.figures import mode_shapes
-from pipeline.post.paper import TABLE4_NORMAL_MODE
+from flexclear.pipeline.post.figures import mode_shapes
+from flexclear.pipeline.post.paper import TABLE4_NORMAL_MODE
 
 NEEDS = ("sps4/frequencies/fixed_circle:bundle/rod",)
 

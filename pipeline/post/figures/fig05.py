@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.post.models import CSJ, IDEAL, JOINT
-from pipeline.post.plotting import style
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.models import CSJ, IDEAL, JOINT
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = (
     "sps4/csj:run",

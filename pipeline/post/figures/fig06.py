@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import CSJ, JOINT
-from pipeline.post.plotting import style
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.models import CSJ, JOINT
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = ("sps4/csj:run",)
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import IDEAL, motion
-from pipeline.post.plotting import style
+from flexclear.pipeline.post.models import IDEAL, motion
+from flexclear.pipeline.post.plotting import style
 
 NEEDS = (
     "sps4/ideal:run",

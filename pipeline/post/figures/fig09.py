@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import IDEAL, motion
-from pipeline.post.plotting import style
-from pipeline.post.plotting.panels import ACCELERATION, DISPLACEMENT, REACTION, VELOCITY
+from flexclear.pipeline.post.models import IDEAL, motion
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.panels import ACCELERATION, DISPLACEMENT, REACTION, VELOCITY
 
 NEEDS = (
     "sps4/ideal:run",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.post.models import FAR_CSJ_CB
-from pipeline.post.plotting import style
+from flexclear.pipeline.post.models import FAR_CSJ_CB
+from flexclear.pipeline.post.plotting import style
 
 NEEDS = ("sps4/far_csj_cb:run",)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import FAR, FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, motion
-from pipeline.post.plotting import style
-from pipeline.post.plotting.panels import DISPLACEMENT, deviation, six_panels
+from flexclear.pipeline.post.models import FAR, FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, motion
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.panels import DISPLACEMENT, deviation, six_panels
 
 NEEDS = (
     "sps4/ideal:run",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.models import CSJ, FAR_CSJ, IDEAL, JOINT, PLATFORM, motion
-from pipeline.post.plotting import style
-from pipeline.post.plotting.panels import six_panels
+from flexclear.pipeline.post.models import CSJ, FAR_CSJ, IDEAL, JOINT, PLATFORM, motion
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.panels import six_panels
 
 NEEDS = (
     "sps4/ideal:run",

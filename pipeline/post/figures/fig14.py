@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.plotting import style
-from pipeline.post.plotting.phase import Plane, maps
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.phase import Plane, maps
 
 NEEDS = (
     "sps4/ideal:run",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import CSJ, FAR_CSJ, JOINT, Model, believed_until
-from pipeline.post.plotting import style
+from flexclear.pipeline.post.models import CSJ, FAR_CSJ, JOINT, Model, believed_until
+from flexclear.pipeline.post.plotting import style
 
 NEEDS = (
     "sps4/csj:run",

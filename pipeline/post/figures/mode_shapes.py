@@ -8,9 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from pipeline.post.plotting import style
-from pipeline.post.plotting.drawing import View, shell, triad, view
-from pipeline.post.rod_shape import scale_to, surface
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.drawing import View, shell, triad, view
+from flexclear.pipeline.post.rod_shape import scale_to, surface
 
 COUNT = 4
 #: drawn size of the largest displacement, as a share of the body's length

@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.collections import PathCollection
 
-from pipeline.post import poincare
-from pipeline.post.models import JOINT, PLATFORM
-from pipeline.post.plotting import style
+from flexclear.pipeline.post import poincare
+from flexclear.pipeline.post.models import JOINT, PLATFORM
+from flexclear.pipeline.post.plotting import style
 
 NEEDS = (
     "sps4/repeated/csj:run",

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import IDEAL
-from pipeline.post.paper import TABLE1
-from pipeline.post.plotting.table import Table, files
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.models import IDEAL
+from flexclear.pipeline.post.paper import TABLE1
+from flexclear.pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = ("sps4/ideal:run",)
 

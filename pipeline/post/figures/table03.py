@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.models import CSJ, JOINT
-from pipeline.post.paper import TABLE3
-from pipeline.post.plotting.table import Table, files
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.models import CSJ, JOINT
+from flexclear.pipeline.post.paper import TABLE3
+from flexclear.pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = ("sps4/csj:run",)
 

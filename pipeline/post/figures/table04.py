@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.paper import TABLE4_ANSYS, TABLE4_NORMAL_MODE
-from pipeline.post.plotting.frequency_table import table
-from pipeline.post.plotting.table import files
+from flexclear.pipeline.post.paper import TABLE4_ANSYS, TABLE4_NORMAL_MODE
+from flexclear.pipeline.post.plotting.frequency_table import table
+from flexclear.pipeline.post.plotting.table import files
 
 NEEDS = (
     "sps4/frequencies/fixed_square:modes/rod",

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.paper import RIGID_MODES, TABLE5_ANSYS, TABLE5_NORMAL_MODE
-from pipeline.post.plotting.frequency_table import table
-from pipeline.post.plotting.table import files
+from flexclear.pipeline.post.paper import RIGID_MODES, TABLE5_ANSYS, TABLE5_NORMAL_MODE
+from flexclear.pipeline.post.plotting.frequency_table import table
+from flexclear.pipeline.post.plotting.table import files
 
 NEEDS = (
     "sps4/frequencies/free_square:modes/rod",

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.models import CSJ, JOINT
-from pipeline.post.paper import TABLE6
-from pipeline.post.plotting.table import Table, files
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.models import CSJ, JOINT
+from flexclear.pipeline.post.paper import TABLE6
+from flexclear.pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = ("sps4/csj:run",)
 

@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import xarray as xr
 
-from pipeline.post.errors import Deviation, max_deviation
-from pipeline.post.models import FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, PLATFORM
-from pipeline.post.paper import TABLE7, TABLE8
-from pipeline.post.plotting.error_table import MEANING, NOTHING, comparison, heads, paper, ratios, rows, single
-from pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.errors import Deviation, max_deviation
+from flexclear.pipeline.post.models import FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, PLATFORM
+from flexclear.pipeline.post.paper import TABLE7, TABLE8
+from flexclear.pipeline.post.plotting.error_table import (
+    MEANING,
+    NOTHING,
+    comparison,
+    heads,
+    paper,
+    ratios,
+    rows,
+    single,
+)
+from flexclear.pipeline.post.plotting.table import Table, files
 
 NEEDS = (
     "sps4/ideal:run",

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.errors import max_deviation
-from pipeline.post.models import CSJ, IDEAL, JOINT, PLATFORM, believed_until
-from pipeline.post.paper import TABLE8
-from pipeline.post.plotting.error_table import MEANING, comparison, heads, paper, rows, single
-from pipeline.post.plotting.table import Table, files
-from pipeline.post.series import parameters
+from flexclear.pipeline.post.errors import max_deviation
+from flexclear.pipeline.post.models import CSJ, IDEAL, JOINT, PLATFORM, believed_until
+from flexclear.pipeline.post.paper import TABLE8
+from flexclear.pipeline.post.plotting.error_table import MEANING, comparison, heads, paper, rows, single
+from flexclear.pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.series import parameters
 
 NEEDS = (
     "sps4/ideal:run",

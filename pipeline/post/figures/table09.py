@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from pipeline.post.models import (
+from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from flexclear.pipeline.post.models import (
     CSJ,
     FAR_CSJ,
     FAR_CSJ_CB,
@@ -18,9 +18,9 @@ from pipeline.post.models import (
     Model,
     believed_until,
 )
-from pipeline.post.paper import TABLE9
-from pipeline.post.plotting.error_table import MEANING, Column, heads, paper, rows, several, single
-from pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.paper import TABLE9
+from flexclear.pipeline.post.plotting.error_table import MEANING, Column, heads, paper, rows, several, single
+from flexclear.pipeline.post.plotting.table import Table, files
 
 NEEDS = (
     "sps4/ideal:run",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.post.paper import TABLE10
-from pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.paper import TABLE10
+from flexclear.pipeline.post.plotting.table import Table, files
 
 NEEDS = ("sps4:timing",)
 REFERENCE = "sps4/ideal"

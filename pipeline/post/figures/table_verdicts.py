@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from pipeline.post.models import (
+from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from flexclear.pipeline.post.models import (
     CSJ,
     FAR_CB,
     FAR_CSJ_CB,
@@ -22,7 +22,7 @@ from pipeline.post.models import (
     PLATFORM,
     Model,
 )
-from pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.plotting.table import Table, files
 
 NEEDS = (
     "sps4/ideal:run",

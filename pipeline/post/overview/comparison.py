@@ -11,11 +11,11 @@ from functools import reduce
 import numpy as np
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.errors import InputError
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.overview.curves import curves, has, scaled
-from pipeline.post.plotting.table import Table
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.overview.curves import curves, has, scaled
+from flexclear.pipeline.post.plotting.table import Table
 
 #: what a run tells of its price, by its attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}

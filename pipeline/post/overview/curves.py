@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.algebra import rotation_between
-from pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.scene.wanted import Quantity
 
 #: factor and unit of smaller and larger values, largest first
 PREFIXES = {
@@ -63,7 +63,7 @@ SHORT = 4.0
 
 def has(run: xr.Dataset, quantity: Quantity) -> bool:
     """Whether a run holds this quantity."""
-    from pipeline.core.scene.wanted import KINDS
+    from flexclear.pipeline.core.scene.wanted import KINDS
 
     kind = KINDS[quantity.kind]
     return kind.owner in run.coords and quantity.owner in run[kind.owner].values

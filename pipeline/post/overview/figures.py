@@ -9,10 +9,10 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.overview.curves import by_unit
-from pipeline.post.plotting import style
-from pipeline.post.series import derive
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.overview.curves import by_unit
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.series import derive
 
 #: most bodies, joints and contacts that are drawn; those that are watched come first, then those with most of it
 BODIES, JOINTS, CONTACTS = 6, 8, 4

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core import quantities
-from pipeline.core.scene.wanted import Quantity
-from pipeline.post.overview.curves import Curve, curves, has, scaled
-from pipeline.post.overview.figures import CENTRE, CONTACTS, orbit
-from pipeline.post.plotting import style
-from pipeline.post.series import derive
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.overview.curves import Curve, curves, has, scaled
+from flexclear.pipeline.post.overview.figures import CENTRE, CONTACTS, orbit
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.series import derive
 
 #: of the runs, the reference first: told apart by colour-blind readers, too
 COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

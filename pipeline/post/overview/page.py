@@ -7,7 +7,7 @@ import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pipeline.post.page import STYLE
+from flexclear.pipeline.post.page import STYLE
 
 #: media types by suffix of a file
 TYPES = {"png": "image/png", "svg": "image/svg+xml", "mp4": "video/mp4", "gif": "image/gif"}

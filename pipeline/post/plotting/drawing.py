@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
-from pipeline.post.plotting.style import INK
+from flexclear.pipeline.post.plotting.style import INK
 
 #: direction of the light, seen by the observer: from above his left shoulder
 LIGHT = np.array([-0.35, 0.65, 0.68])

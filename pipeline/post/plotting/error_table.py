@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.post.errors import Deviation
-from pipeline.post.paper import MaximumError
+from flexclear.pipeline.post.errors import Deviation
+from flexclear.pipeline.post.paper import MaximumError
 
 #: row heads, attribute of Deviation, factor to the unit, attribute of MaximumError (None: not in the paper)
 ROWS: tuple[tuple[str, str, float, str | None], ...] = (

@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-from pipeline.post.paper import TABLE4_ANSYS, TABLE5_ANSYS
-from pipeline.post.plotting.table import Table
+from flexclear.pipeline.post.paper import TABLE4_ANSYS, TABLE5_ANSYS
+from flexclear.pipeline.post.plotting.table import Table
 
 COLUMNS = (
     "mode",

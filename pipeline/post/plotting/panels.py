@@ -11,9 +11,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pipeline.core.quantities import common_times
-from pipeline.post.models import PLATFORM, Motion
-from pipeline.post.plotting import style
+from flexclear.pipeline.core.quantities import common_times
+from flexclear.pipeline.post.models import PLATFORM, Motion
+from flexclear.pipeline.post.plotting import style
 
 #: alpha of a curve inside its horizon, of one that the paper does not have, and beyond the horizon
 FIRM, ADDED, PALE = 0.95, 0.6, 0.28

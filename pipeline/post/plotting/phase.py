@@ -11,9 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
-from pipeline.post import poincare
-from pipeline.post.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
-from pipeline.post.plotting import style
+from flexclear.pipeline.post import poincare
+from flexclear.pipeline.post.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
+from flexclear.pipeline.post.plotting import style
 
 Values = Callable[[Motion], np.ndarray]
 #: of an axis that is logarithmic on both sides

@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting import style
 
 COLOR, LIGHT = "#1f6f8b", "#b9b9b9"
 POINT = {"s": 9, "lw": 0, "color": COLOR, "alpha": 0.8}

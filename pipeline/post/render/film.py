@@ -12,10 +12,10 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
-from pipeline.core.progress import Progress, silent
-from pipeline.post.body_shape import faces
-from pipeline.post.plotting import style
-from pipeline.post.render.mechanism import (
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.post.body_shape import faces
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.render.mechanism import (
     CLEARANCE_COLOR,
     IMPACT_COLOR,
     JOINT_COLOR,
@@ -24,8 +24,8 @@ from pipeline.post.render.mechanism import (
     placed,
     pose,
 )
-from pipeline.post.render.panel import panel
-from pipeline.post.render.stage import SOFT, image, plotter, shading, skin
+from flexclear.pipeline.post.render.panel import panel
+from flexclear.pipeline.post.render.stage import SOFT, image, plotter, shading, skin
 
 SECONDS, RATE = 5.6, 30
 VIEW, SIDE, HEIGHT = 800, 352, 640

@@ -10,12 +10,12 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.scene.fields import Pose
-from pipeline.post.body_shape import scale_to, surface
-from pipeline.post.render.solids import Solid, equivalent, link, mesh, plate
-from pipeline.post.render.view import View, view
-from pipeline.post.series import parameters
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.post.body_shape import scale_to, surface
+from flexclear.pipeline.post.render.solids import Solid, equivalent, link, mesh, plate
+from flexclear.pipeline.post.render.view import View, view
+from flexclear.pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
 COLORS = ("#5b7fa6", "#b9c2cc", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b")

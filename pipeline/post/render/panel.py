@@ -12,8 +12,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from pipeline.post.overview.figures import orbit
-from pipeline.post.plotting import style
+from flexclear.pipeline.post.overview.figures import orbit
+from flexclear.pipeline.post.plotting import style
 
 #: a body that turns by less does not turn [degrees]
 STILL = 1e-3

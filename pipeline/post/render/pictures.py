@@ -10,9 +10,9 @@ from typing import Any, cast
 import numpy as np
 import xarray as xr
 
-from pipeline.core.progress import Progress, silent
-from pipeline.post.render import gl
-from pipeline.post.series import derive
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.post.render import gl
+from flexclear.pipeline.post.series import derive
 
 
 def pictures(
@@ -34,7 +34,7 @@ def pictures(
         print(f"flexclear: no pictures; {gl.remedy()}", file=sys.stderr)
         return {}
     # pyvista is imported only where it can draw
-    from pipeline.post.render import film, mechanism
+    from flexclear.pipeline.post.render import film, mechanism
 
     post = derive(run) if post is None else post
     drawn = mechanism.mechanism(run, bundles, direction)
@@ -48,7 +48,7 @@ def pictures(
 
 def shape_files(body: str, bundle: xr.Dataset) -> dict[str, bytes]:
     """``mode_<body>.html`` with the first mode, and ``modes_<body>.vtu`` with all; GL must work."""
-    from pipeline.post.render import shapes
+    from flexclear.pipeline.post.render import shapes
 
     return {f"mode_{body}.html": shapes.page(bundle, 0), f"modes_{body}.vtu": shapes.vtu(bundle)}
 

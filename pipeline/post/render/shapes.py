@@ -10,10 +10,10 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
-from pipeline.post.body_shape import box, faces, is_rod, scale_to, surface
-from pipeline.post.render import offline
-from pipeline.post.render.stage import plotter, shading, skin
-from pipeline.post.rod_shape import AROUND
+from flexclear.pipeline.post.body_shape import box, faces, is_rod, scale_to, surface
+from flexclear.pipeline.post.render import offline
+from flexclear.pipeline.post.render.stage import plotter, shading, skin
+from flexclear.pipeline.post.rod_shape import AROUND
 
 #: drawn size of the largest displacement, as a share of the body's length
 SHARE = 0.16

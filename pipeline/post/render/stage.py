@@ -9,7 +9,7 @@ import pyvista as pv
 import xarray as xr
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from pipeline.post.body_shape import is_rod
+from flexclear.pipeline.post.body_shape import is_rod
 
 BACKGROUND, BACKGROUND_TOP = "#ffffff", "#e6ecf2"
 SOFT = "#5b6570"

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.closed_form import frequencies
-from pipeline.structure.closed_form.frequencies import Span
+from flexclear.pipeline.structure.closed_form import frequencies
+from flexclear.pipeline.structure.closed_form.frequencies import Span
 
 #: of bending, torsion and extension, each two words with a hyphen
 Ends = tuple[str, str, str]

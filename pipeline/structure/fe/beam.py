@@ -24,10 +24,10 @@ import scipy.sparse as sp
 import xarray as xr
 from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
-from pipeline.core.algebra import skew
-from pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
-from pipeline.structure.fe.model import rigid_motions, symmetric
-from pipeline.structure.fe.quadrature import POINTS, WEIGHTS
+from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
+from flexclear.pipeline.structure.fe.model import rigid_motions, symmetric
+from flexclear.pipeline.structure.fe.quadrature import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
 DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")

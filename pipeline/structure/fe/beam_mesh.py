@@ -7,19 +7,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.artifacts.schema import MESH, conform
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import section_recipe
-from pipeline.structure.fe.beam_recipe import (
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.artifacts.schema import MESH, conform
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import section_recipe
+from flexclear.pipeline.structure.fe.beam_recipe import (
     SAME_PLACE,
     Segment,
     SegmentedBeamRecipe,
     StraightBeamRecipe,
     segments,
 )
-from pipeline.structure.fe.quadrature import POINTS
-from pipeline.structure.fe.recipe_sources import sources
+from flexclear.pipeline.structure.fe.quadrature import POINTS
+from flexclear.pipeline.structure.fe.recipe_sources import sources
 
 #: constants that a taper changes, each with a profile
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")

@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from pipeline.core.algebra import axes_to_matrix, axis_to_matrix
-from pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
-from pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
-from pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
+from flexclear.pipeline.core.algebra import axes_to_matrix, axis_to_matrix
+from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
+from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
+from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
 #: places along a rod that differ by less than this share of its length are the same; they come from decimal text

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.structure.fe.model import Integrals
-from pipeline.structure.fe.slices import Slices
+from flexclear.pipeline.structure.fe.model import Integrals
+from flexclear.pipeline.structure.fe.slices import Slices
 
 
 def integrate(body: Slices, vectors: np.ndarray) -> Integrals:

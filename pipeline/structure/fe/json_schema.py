@@ -6,8 +6,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from pipeline.core.scene.json_schema import identified
-from pipeline.structure.fe.recipe import MODELS, Recipe
+from flexclear.pipeline.core.scene.json_schema import identified
+from flexclear.pipeline.structure.fe.recipe import MODELS, Recipe
 
 
 def recipe_schema() -> dict[str, Any]:

@@ -8,9 +8,9 @@ from typing import Any
 
 import xarray as xr
 
-from pipeline.structure.fe import beam_mesh
-from pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
-from pipeline.structure.fe.recipe import parse, read_recipe
+from flexclear.pipeline.structure.fe import beam_mesh
+from flexclear.pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
+from flexclear.pipeline.structure.fe.recipe import parse, read_recipe
 
 __all__ = ["build", "read_recipe", "write_vtu"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core.algebra import skew
+from flexclear.pipeline.core.algebra import skew
 
 #: directions of a frame's motion, in the order of every six
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

@@ -8,13 +8,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import suggestion
-from pipeline.core.scene.load import read_toml
-from pipeline.core.scene.mistakes import input_errors
-from pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
-from pipeline.structure.fe.exchange.recipe import MatricesRecipe
-from pipeline.structure.fe.solid.recipe import SolidRecipe
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.mistakes import input_errors
+from flexclear.pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
+from flexclear.pipeline.structure.fe.exchange.recipe import MatricesRecipe
+from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe
 
 #: every kind of recipe; `Recipe` is any of them
 Recipe = StraightBeamRecipe | SegmentedBeamRecipe | SolidRecipe | MatricesRecipe

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from pipeline.core.scene.fields import Part, Source
+from flexclear.pipeline.core.scene.fields import Part, Source
 
 #: parts whose sources are told first; the others follow in the order of the model
 FIRST = ("shape", "material", "section", "end_section", "inertia_section")

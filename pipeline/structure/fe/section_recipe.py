@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from pipeline.core.scene.fields import Area, Length, Number, Part, SecondMoment
-from pipeline.structure.fe import section as sections
-from pipeline.structure.fe.section import Section, Value
+from flexclear.pipeline.core.scene.fields import Area, Length, Number, Part, SecondMoment
+from flexclear.pipeline.structure.fe import section as sections
+from flexclear.pipeline.structure.fe.section import Section, Value
 
 Positive = Field(gt=0.0)
 

@@ -19,8 +19,8 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.algebra import skew
-from pipeline.structure.fe.beam import N_DOFS, Beam, at_points, per_point
+from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam, at_points, per_point
 
 Maps = tuple[sp.csr_array, sp.csr_array, sp.csr_array]
 

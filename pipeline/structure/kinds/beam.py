@@ -10,14 +10,14 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.structure.closed_form import beside
-from pipeline.structure.fe import beam as beams
-from pipeline.structure.fe import mesh as meshes
-from pipeline.structure.fe.beam import N_DOFS, Beam
-from pipeline.structure.fe.inertia_integrals import integrate
-from pipeline.structure.fe.model import Drawn, Families, Interface, Model
-from pipeline.structure.fe.slices import slices
-from pipeline.structure.kinds.kind import Kind
+from flexclear.pipeline.structure.closed_form import beside
+from flexclear.pipeline.structure.fe import beam as beams
+from flexclear.pipeline.structure.fe import mesh as meshes
+from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
+from flexclear.pipeline.structure.fe.inertia_integrals import integrate
+from flexclear.pipeline.structure.fe.model import Drawn, Families, Interface, Model
+from flexclear.pipeline.structure.fe.slices import slices
+from flexclear.pipeline.structure.kinds.kind import Kind
 
 #: components along the rod's axes by family, the one that decides the sign first
 FAMILIES: dict[str, tuple[int, ...]] = {"bending_y": (1, 5), "bending_z": (2, 4), "torsion": (3,), "axial": (0,)}

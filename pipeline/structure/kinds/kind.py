@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.registry import lookup
-from pipeline.structure.fe.model import Model
-from pipeline.structure.kinds import SHAPES
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.kinds import SHAPES
 
-FAMILY = "pipeline.structure.kinds"
+FAMILY = "flexclear.pipeline.structure.kinds"
 
 
 def no_closed_form(

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.fe.exchange import mesh as meshes
-from pipeline.structure.fe.exchange.model import assemble
-from pipeline.structure.fe.exchange.recipe import MatricesRecipe
-from pipeline.structure.fe.model import Model
-from pipeline.structure.fe.recipe import parse
-from pipeline.structure.kinds.kind import Kind
+from flexclear.pipeline.structure.fe.exchange import mesh as meshes
+from flexclear.pipeline.structure.fe.exchange.model import assemble
+from flexclear.pipeline.structure.fe.exchange.recipe import MatricesRecipe
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import parse
+from flexclear.pipeline.structure.kinds.kind import Kind
 
 PLACE = "mesh recipe"
 

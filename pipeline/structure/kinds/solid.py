@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.fe.model import Model
-from pipeline.structure.fe.recipe import parse
-from pipeline.structure.fe.solid import mesh as meshes
-from pipeline.structure.fe.solid.model import assemble
-from pipeline.structure.fe.solid.recipe import SolidRecipe
-from pipeline.structure.kinds.kind import Kind
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import parse
+from flexclear.pipeline.structure.fe.solid import mesh as meshes
+from flexclear.pipeline.structure.fe.solid.model import assemble
+from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe
+from flexclear.pipeline.structure.kinds.kind import Kind
 
 PLACE = "mesh recipe"
 #: a body is a rod where its second largest extent is below this share of the largest

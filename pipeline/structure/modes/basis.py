@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.core.errors import InputError
-from pipeline.core.progress import Progress
-from pipeline.structure.fe.model import Interface, Model
-from pipeline.structure.modes import compliance, eigen, normal, select
-from pipeline.structure.modes.condition import Condition
-from pipeline.structure.modes.normal import Normal
-from pipeline.structure.modes.select import Wanted
-from pipeline.structure.modes.statics import Flexibility, border
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.structure.fe.model import Interface, Model
+from flexclear.pipeline.structure.modes import compliance, eigen, normal, select
+from flexclear.pipeline.structure.modes.condition import Condition
+from flexclear.pipeline.structure.modes.normal import Normal
+from flexclear.pipeline.structure.modes.select import Wanted
+from flexclear.pipeline.structure.modes.statics import Flexibility, border
 
 #: normal modes tried first where a share decides how many are needed; then twice as many, and so on
 FIRST = 16

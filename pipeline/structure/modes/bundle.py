@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import BUNDLE, DEFICITS, conform
-from pipeline.structure.fe.model import Integrals, Model
-from pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.core.artifacts.schema import BUNDLE, DEFICITS, conform
+from flexclear.pipeline.structure.fe.model import Integrals, Model
+from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 
 def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None = None) -> xr.Dataset:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.core.artifacts.compliance import DIRECTIONS, reduced, shares
-from pipeline.structure.fe.model import Interface
-from pipeline.structure.modes.condition import in_own_axes
-from pipeline.structure.modes.statics import Flexibility
+from flexclear.pipeline.core.artifacts.compliance import DIRECTIONS, reduced, shares
+from flexclear.pipeline.structure.fe.model import Interface
+from flexclear.pipeline.structure.modes.condition import in_own_axes
+from flexclear.pipeline.structure.modes.statics import Flexibility
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import suggestion
-from pipeline.structure.fe.model import DIRECTIONS, Interface, Model, own_dofs
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.structure.fe.model import DIRECTIONS, Interface, Model, own_dofs
 
 WHERE = "modes.reference"
 ONCE = "hold each motion once; interfaces that are tied to the same nodes move alike"

@@ -32,11 +32,11 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from pipeline.core.artifacts.compliance import shares
-from pipeline.core.progress import Progress
-from pipeline.structure.fe.model import DIRECTIONS, Model
-from pipeline.structure.modes import compliance, eigen, normal
-from pipeline.structure.modes.statics import Flexibility
+from flexclear.pipeline.core.artifacts.compliance import shares
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model
+from flexclear.pipeline.structure.modes import compliance, eigen, normal
+from flexclear.pipeline.structure.modes.statics import Flexibility
 
 #: frequencies of the error bound, as shares of the free body's first one
 BOUND_AT = (0.0, 0.25, 0.5)

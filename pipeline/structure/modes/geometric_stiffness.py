@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe import beam as beams
-from pipeline.structure.fe.quadrature import POINTS
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe import beam as beams
+from flexclear.pipeline.structure.fe.quadrature import POINTS
 
 
 def variables(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:

@@ -10,12 +10,12 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.core.progress import Progress
-from pipeline.structure.fe.model import Model, own_dofs
-from pipeline.structure.modes import eigen, select
-from pipeline.structure.modes.statics import Flexibility, border
-from pipeline.structure.sparse.multifrontal import negative_pivots
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.structure.fe.model import Model, own_dofs
+from flexclear.pipeline.structure.modes import eigen, select
+from flexclear.pipeline.structure.modes.statics import Flexibility, border
+from flexclear.pipeline.structure.sparse.multifrontal import negative_pivots
 
 #: largest dense eigenproblem; its three matrices take about a gigabyte
 DENSE_MOST = 6000

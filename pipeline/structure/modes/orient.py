@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.select import clusters
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.select import clusters
 
 
 def orient(model: Model, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:

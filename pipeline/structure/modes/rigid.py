@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import RIGID, conform
-from pipeline.structure.kinds.kind import of_mesh
+from flexclear.pipeline.core.artifacts.schema import RIGID, conform
+from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 
 def build(mesh: xr.Dataset) -> xr.Dataset:

@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.structure.modes.eigen import EQUAL, frequency
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.structure.modes.eigen import EQUAL, frequency
 
 WHERE = "modes.count"
 #: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them

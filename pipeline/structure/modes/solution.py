@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.artifacts.schema import MODES, conform
-from pipeline.core.errors import InputError
-from pipeline.core.progress import Progress, silent
-from pipeline.core.registry import lookup, suggestion
-from pipeline.structure.fe.model import Interface, Model
-from pipeline.structure.kinds.kind import Kind, of_mesh
-from pipeline.structure.modes import basis, deficits, eigen, orient
-from pipeline.structure.modes.condition import Condition, Given, check
-from pipeline.structure.modes.select import Wanted
-from pipeline.structure.modes.statics import Flexibility, support
+from flexclear.pipeline.core.artifacts.schema import MODES, conform
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.registry import lookup, suggestion
+from flexclear.pipeline.structure.fe.model import Interface, Model
+from flexclear.pipeline.structure.kinds.kind import Kind, of_mesh
+from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient
+from flexclear.pipeline.structure.modes.condition import Condition, Given, check
+from flexclear.pipeline.structure.modes.select import Wanted
+from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
-REFERENCES = "pipeline.structure.modes.reference"
+REFERENCES = "flexclear.pipeline.structure.modes.reference"
 CARRIED = ("title", "section", "inertia_section", "source")
 
 

@@ -18,9 +18,9 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.structure.fe.model import Model, own_dofs
-from pipeline.structure.sparse.multifrontal import Factor, cholesky
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.structure.fe.model import Model, own_dofs
+from flexclear.pipeline.structure.sparse.multifrontal import Factor, cholesky
 
 #: a pivot this small beside its diagonal entry is rounding: the body moves there without strain
 PIVOT = 1e-14

@@ -14,8 +14,8 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
-from pipeline.core.errors import SolverError
-from pipeline.structure.sparse.dissection import Tree, dissect
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.structure.sparse.dissection import Tree, dissect
 
 Tell = Callable[[float], None]
 

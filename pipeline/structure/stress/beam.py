@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.structure.fe import beam as beams
-from pipeline.structure.fe.beam import N_DOFS, Beam
-from pipeline.structure.fe.quadrature import POINTS
-from pipeline.structure.fe.section import Section
-from pipeline.structure.fe.slices import Maps, slices
-from pipeline.structure.stress.outline import Outline, outline
+from flexclear.pipeline.structure.fe import beam as beams
+from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
+from flexclear.pipeline.structure.fe.quadrature import POINTS
+from flexclear.pipeline.structure.fe.section import Section
+from flexclear.pipeline.structure.fe.slices import Maps, slices
+from flexclear.pipeline.structure.stress.outline import Outline, outline
 
 CONSTANTS = ("area", "second_moment")
 

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.structure.fe import section as sections
-from pipeline.structure.fe.section import Section, Value
+from flexclear.pipeline.structure.fe import section as sections
+from flexclear.pipeline.structure.fe.section import Section, Value
 
 #: fibres around a round section, a whole step of 5 deg; one of them lies in the plane of bending (`Outline.round`)
 AROUND = 72

@@ -6,8 +6,8 @@ Source: Hunt & Crossley (1975), J. Applied Mechanics 42, 440-445.
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.form.elastic import power, stored
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.contact.form.elastic import power, stored
+from flexclear.pipeline.dynamics.kernels import kernel
 
 __all__ = ["force", "stored"]
 

@@ -6,7 +6,7 @@ begin to pull, while the surfaces still overlap; what the spring holds then is l
 
 from __future__ import annotations
 
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

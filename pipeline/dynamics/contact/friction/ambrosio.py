@@ -9,9 +9,9 @@ Source: Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO ASI 103, 57-8
 
 from __future__ import annotations
 
-from pipeline.core.scene import clearance
-from pipeline.dynamics.contact.friction.memoryless import sliding
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.scene import clearance
+from flexclear.pipeline.dynamics.contact.friction.memoryless import sliding
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -17,9 +17,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.scene import clearance
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import add, dot, scale, sub
+from flexclear.pipeline.core.scene import clearance
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
 
 
 @kernel

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.dynamics.kernels import kernel
-from pipeline.dynamics.vectors import dot, scale
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import dot, scale
 
 
 def sliding(coefficient: Callable) -> Callable:

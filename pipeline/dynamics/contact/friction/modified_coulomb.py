@@ -12,9 +12,9 @@ Source: Wang & Wang (2019), eqs. (27)-(29).
 
 from __future__ import annotations
 
-from pipeline.core.scene import clearance
-from pipeline.dynamics.contact.friction.memoryless import sliding
-from pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.core.scene import clearance
+from flexclear.pipeline.dynamics.contact.friction.memoryless import sliding
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel

@@ -9,7 +9,7 @@ Source: Carvalho & Martins (2019), Mech. Mach. Theory 139, 185-194.
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

@@ -8,7 +8,7 @@ Source: Flores, Machado, Silva & Martins (2011), Multibody System Dynamics 25, 3
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

@@ -9,7 +9,7 @@ Source: Gonthier, McPhee, Lange & Piedboeuf (2004), Multibody System Dynamics 11
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

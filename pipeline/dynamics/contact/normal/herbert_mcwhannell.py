@@ -9,7 +9,7 @@ Source: Herbert & McWhannell (1977), J. Engineering for Industry 99, 792-798; Ma
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

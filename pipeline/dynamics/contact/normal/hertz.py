@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.dynamics.contact.law import CLOSE, Resolved, refuse_linear
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.dynamics.contact.law import CLOSE, Resolved, refuse_linear
 
 
 @dataclass(frozen=True)

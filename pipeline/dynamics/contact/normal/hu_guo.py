@@ -8,7 +8,7 @@ Source: Hu & Guo (2015), Nonlinear Dynamics 82, 1617-1634.
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

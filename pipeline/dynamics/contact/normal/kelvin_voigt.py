@@ -16,9 +16,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from pipeline.core.scene.clearance import NormalLaw
-from pipeline.dynamics.contact import restitution
-from pipeline.dynamics.contact.law import Resolved
+from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.dynamics.contact import restitution
+from flexclear.pipeline.dynamics.contact.law import Resolved
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ Source: Wang & Wang (2019), eq. (25), after Lankarani & Nikravesh (1990), J. Mec
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

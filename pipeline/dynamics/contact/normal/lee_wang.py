@@ -10,7 +10,7 @@ et al. (2012), Mech. Mach. Theory 53, 99-121.
 
 from __future__ import annotations
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from math import exp
 
-from pipeline.dynamics.contact.law import Hysteresis
+from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:

@@ -12,11 +12,11 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from pipeline.core import machine
-from pipeline.core.errors import FlexclearError, InputError, shown
-from pipeline.structure.fe.exchange import market
-from pipeline.structure.fe.exchange.market import COPIES, SMALLER
-from pipeline.structure.fe.model import Model
+from flexclear.pipeline.core import machine
+from flexclear.pipeline.core.errors import FlexclearError, InputError, shown
+from flexclear.pipeline.structure.fe.exchange import market
+from flexclear.pipeline.structure.fe.exchange.market import COPIES, SMALLER
+from flexclear.pipeline.structure.fe.model import Model
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz", "internal")
 COLUMNS = ("node", "x", "y", "z", "component")

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core.algebra import skew
-from pipeline.structure.fe.slices import Slices, carried
+from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.structure.fe.slices import Slices, carried
 
 #: entries that differ by less than this share of the mass (times a length, where they do) are the same
 ALIKE = 1e-9

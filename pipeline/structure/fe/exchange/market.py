@@ -18,7 +18,7 @@ from typing import TextIO
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core import machine
+from flexclear.pipeline.core import machine
 
 #: what a file holds is in memory so many times while it is checked and brought into SI units
 COPIES = 4.0

@@ -9,14 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.artifacts.schema import MATRICES, conform
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.exchange import files
-from pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
-from pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
-from pipeline.structure.fe.model import symmetric
-from pipeline.structure.fe.recipe_sources import sources
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.artifacts.schema import MATRICES, conform
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
+from flexclear.pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
+from flexclear.pipeline.structure.fe.model import symmetric
+from flexclear.pipeline.structure.fe.recipe_sources import sources
 
 #: length [m], mass [kg] and time [s] of each consistent system
 SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}

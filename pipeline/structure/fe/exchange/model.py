@@ -10,14 +10,14 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 import xarray as xr
 
-from pipeline.core.errors import InputError, SolverError
-from pipeline.structure.fe.exchange import lumped
-from pipeline.structure.fe.exchange.files import COMPONENTS
-from pipeline.structure.fe.inertia_integrals import integrate
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
-from pipeline.structure.fe.solid import ties
-from pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
-from pipeline.structure.sparse.multifrontal import cholesky
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.structure.fe.exchange import lumped
+from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS
+from flexclear.pipeline.structure.fe.inertia_integrals import integrate
+from flexclear.pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
+from flexclear.pipeline.structure.fe.solid import ties
+from flexclear.pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
+from flexclear.pipeline.structure.sparse.multifrontal import cholesky
 
 WHERE = "mesh recipe [shape]"
 #: blocks of the mass matrix for x, y and z that differ by less, relative to the largest entry, are the same

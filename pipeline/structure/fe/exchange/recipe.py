@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from pipeline.core.scene.fields import Part
-from pipeline.structure.fe.recipe_parts import TurnedFrame, check_interfaces
+from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame, check_interfaces
 
 
 class Matrices(Part):

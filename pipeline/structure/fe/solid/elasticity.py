@@ -19,9 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.model import symmetric
-from pipeline.structure.fe.solid.elements import ELEMENTS, Sampled, sampled
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.model import symmetric
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, Sampled, sampled
 
 #: numbers of a cell matrix that are worked on at once; bounds the memory
 AT_ONCE = 20_000_000

@@ -8,11 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.solid import lattice
-from pipeline.structure.fe.solid.elasticity import check_cells
-from pipeline.structure.fe.solid.elements import ELEMENTS
-from pipeline.structure.fe.solid.recipe import Block, Cylinder
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.solid import lattice
+from flexclear.pipeline.structure.fe.solid.elasticity import check_cells
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
+from flexclear.pipeline.structure.fe.solid.recipe import Block, Cylinder
 
 #: a node that is no corner lies this near to the mean of its corners, as a share of the cell's size
 ASTRAY = 0.3

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.core import machine
-from pipeline.core.errors import InputError
-from pipeline.core.units import UNITS
-from pipeline.core.workflow import opened
-from pipeline.structure.fe.solid.elements import ELEMENTS
-from pipeline.structure.fe.solid.geometry import Geometry
-from pipeline.structure.fe.solid.recipe import MeshFile
+from flexclear.pipeline.core import machine
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.units import UNITS
+from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
+from flexclear.pipeline.structure.fe.solid.geometry import Geometry
+from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
 
 #: names of types by meshio's
 NAMES = {element.cell: name for name, element in ELEMENTS.items()}

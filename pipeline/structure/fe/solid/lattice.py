@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES, shape_functions
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES, shape_functions
 
 #: half side of the square core of a cylinder's section, as a share of the radius
 CORE = 0.55

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from pipeline.core.algebra import quaternion_to_matrix
-from pipeline.core.artifacts.schema import SOLID, conform
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.recipe_sources import sources
-from pipeline.structure.fe.solid import geometry as geometries
-from pipeline.structure.fe.solid import imported, ties
-from pipeline.structure.fe.solid.elements import ELEMENTS
-from pipeline.structure.fe.solid.geometry import Geometry
-from pipeline.structure.fe.solid.recipe import MeshFile, SolidRecipe
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.artifacts.schema import SOLID, conform
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.recipe_sources import sources
+from flexclear.pipeline.structure.fe.solid import geometry as geometries
+from flexclear.pipeline.structure.fe.solid import imported, ties
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
+from flexclear.pipeline.structure.fe.solid.geometry import Geometry
+from flexclear.pipeline.structure.fe.solid.recipe import MeshFile, SolidRecipe
 
 
 def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:

@@ -9,11 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions, symmetric
-from pipeline.structure.fe.solid import elasticity, ties
-from pipeline.structure.fe.solid.elasticity import Solid
-from pipeline.structure.fe.solid.elements import ELEMENTS
-from pipeline.structure.fe.solid.geometry import Geometry, boundary, face_nodes
+from flexclear.pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions, symmetric
+from flexclear.pipeline.structure.fe.solid import elasticity, ties
+from flexclear.pipeline.structure.fe.solid.elasticity import Solid
+from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
+from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, face_nodes
 
 #: families by direction, in the order that they take within a cluster of equal frequencies
 FAMILIES = ("y", "z", "x")

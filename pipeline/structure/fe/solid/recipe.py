@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
-from pipeline.core.scene.fields import Direction, Length, Part, Position
-from pipeline.structure.fe.recipe_parts import Isotropic, Positive, TurnedFrame, check_interfaces
+from flexclear.pipeline.core.scene.fields import Direction, Length, Part, Position
+from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, TurnedFrame, check_interfaces
 
 Cells = Annotated[int, Field(ge=1, le=1000)]
 ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]

@@ -15,12 +15,12 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core.algebra import skew
-from pipeline.core.errors import InputError
-from pipeline.core.registry import suggestion
-from pipeline.structure.fe.solid.elements import on_face
-from pipeline.structure.fe.solid.geometry import Geometry, boundary, boundary_nodes, face_nodes
-from pipeline.structure.fe.solid.recipe import On
+from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.structure.fe.solid.elements import on_face
+from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, boundary_nodes, face_nodes
+from flexclear.pipeline.structure.fe.solid.recipe import On
 
 #: default distance from a surface within which a node lies on it, as a share of the body's size
 TOLERANCE = 1e-6

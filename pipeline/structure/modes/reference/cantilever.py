@@ -5,9 +5,9 @@ Source: Shabana, *Dynamics of Multibody Systems*, ch. 5 (reference conditions of
 
 from __future__ import annotations
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.condition import Condition, Given, holding
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.condition import Condition, Given, holding
 
 
 def condition(model: Model, given: Given) -> Condition:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import scipy.sparse as sp
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.condition import Condition, Given, functional, holding
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.condition import Condition, Given, functional, holding
 
 
 def condition(model: Model, given: Given) -> Condition:

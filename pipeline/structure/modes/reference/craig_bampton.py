@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.model import Model, rows
-from pipeline.structure.modes.condition import Condition, Given, different, holding
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.model import Model, rows
+from flexclear.pipeline.structure.modes.condition import Condition, Given, different, holding
 
 
 def condition(model: Model, given: Given) -> Condition:

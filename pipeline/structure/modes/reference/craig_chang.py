@@ -8,9 +8,9 @@ Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
 
 from __future__ import annotations
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.model import Model, rows
-from pipeline.structure.modes.condition import Condition, Given, different, floating
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.model import Model, rows
+from flexclear.pipeline.structure.modes.condition import Condition, Given, different, floating
 
 NOTE = "six rigid-body modes were left out; the attachment modes' rigid motion was taken out by mass orthogonality"
 

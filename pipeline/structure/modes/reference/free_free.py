@@ -7,8 +7,8 @@ Source: Wang & Wang (2019), sec. 3.4 and Table 5; mean axes after Shabana, *Dyna
 
 from __future__ import annotations
 
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.condition import Condition, Given, floating
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.condition import Condition, Given, floating
 
 
 def condition(model: Model, given: Given) -> Condition:

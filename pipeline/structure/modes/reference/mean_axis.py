@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.core.errors import InputError
-from pipeline.core.registry import lookup
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.condition import Condition, Given
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.condition import Condition, Given
 
-FAMILY = "pipeline.structure.modes.reference"
+FAMILY = "flexclear.pipeline.structure.modes.reference"
 
 
 def condition(model: Model, given: Given) -> Condition:

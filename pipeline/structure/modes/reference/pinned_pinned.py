@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from pipeline.core.errors import InputError
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.condition import Condition, Given, holding
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.condition import Condition, Given, holding
 
 WHERE = "modes.interfaces"
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from pipeline.structure.fe.model import Model
-from pipeline.structure.modes.condition import Condition, Given
-from pipeline.structure.modes.reference import craig_chang
+from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.modes.condition import Condition, Given
+from flexclear.pipeline.structure.modes.reference import craig_chang
 
 
 def condition(model: Model, given: Given) -> Condition:
