@@ -10,9 +10,8 @@ import os
 import sys
 from importlib import import_module
 
-from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError
 
-INTERRUPTED = 130
 CLOSED_PIPE = 141
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {

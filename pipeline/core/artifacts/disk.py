@@ -25,7 +25,7 @@ from flexclear.pipeline.core.errors import ResourceError
 
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-#: temporary files of other machines that share the disk are swept when they are so old [s]
+#: temporary files of other machines that share the disk, and unfinished work, are swept when they are so old [s]
 FORGOTTEN = 7 * 86400.0
 #: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
 FICLONE = 0x40049409
@@ -180,13 +180,18 @@ def _try_lock(handle: int) -> bool:
 
 
 def sweep(root: Path) -> int:
-    """Remove temporary files and locks below `root` that processes left which are no more; how many."""
+    """Remove temporary files and locks below `root` that processes left which are no more, and unfinished work that
+    nobody has gone on with for long; how many."""
     removed = 0
     for folder, _, names in os.walk(root):
         for name in names:
             path = Path(folder, name)
             if name.endswith(".tmp") and _abandoned(path):
                 with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps
+                    path.unlink()
+                    removed += 1
+            elif name.endswith(".part") and _old(path):
+                with contextlib.suppress(OSError):
                     path.unlink()
                     removed += 1
             elif name.endswith(".lock"):
@@ -200,15 +205,19 @@ def _abandoned(path: Path) -> bool:
     if found is None:
         return False  # none of ours
     if found["host"] != _host():
-        with contextlib.suppress(OSError):
-            return time.time() - path.stat().st_mtime > FORGOTTEN
-        return False
+        return _old(path)
     try:
         os.kill(int(found["pid"]), 0)
     except ProcessLookupError:
         return True
     except (OSError, OverflowError):
         return False
+    return False
+
+
+def _old(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return time.time() - path.stat().st_mtime > FORGOTTEN
     return False
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.variable import Schema, Variable
 
@@ -28,6 +29,8 @@ __all__ = [
     "Schema",
     "Variable",
     "conform",
+    "incomplete",
+    "require_complete",
 ]
 
 CONVENTIONS = "CF-1.11"
@@ -272,3 +275,19 @@ def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float
         result["time"].attrs = {"units": "s", "long_name": "time"}
     result.attrs = {"Conventions": CONVENTIONS, **attributes}
     return result
+
+
+def incomplete(run: xr.Dataset, why: str) -> xr.Dataset:
+    """What there is of a run that was stopped, marked: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
+    return run.assign_attrs(complete=0, stopped_at=float(run["time"].values[-1]), stopped_by=why)
+
+
+def require_complete(run: xr.Dataset, what: str = "the run") -> None:
+    """InputError for what is left of a run that was stopped, which is no result."""
+    if not run.attrs.get("complete", 1):
+        raise InputError(
+            what,
+            f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
+            f"({run.attrs.get('stopped_by', 'nobody knows why')})",
+            "run the scene again, which goes on from there",
+        )

@@ -54,7 +54,9 @@ class Opened:
                 self.busy = False
 
     def _left_out(self, name: str) -> bool:
-        return name.endswith(CODE) or name.startswith(self.outside) or "/flexclear_kernels_" in name
+        # where modules are looked for there may be archives, which need not be there
+        code = name.endswith(CODE) or name in sys.path
+        return code or name.startswith(self.outside) or "/flexclear_kernels_" in name
 
 
 _current: Opened | None = None
