@@ -11,6 +11,7 @@ import sys
 from importlib import import_module
 
 from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError
+from flexclear.pipeline.core.system import plain_output
 
 CLOSED_PIPE = 141
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
@@ -36,6 +37,7 @@ COMMANDS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; mistakes of the user are told without a traceback."""
+    plain_output()
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         return int(options.command(options) or 0)

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
-from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
 from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
 from flexclear.pipeline.core.scene import lines
@@ -24,15 +24,12 @@ from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, s
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.units import quantity
 from flexclear.pipeline.core.workflow import stopping
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
+from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import WARNING, Monitor
 from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import owner
 from flexclear.stages.graph import STAGES, Graph
-
-#: folder with the scenes and meshes of the project, which are installed with it
-DATA = TREE / "flexclear"
 
 if TYPE_CHECKING:
     import xarray as xr

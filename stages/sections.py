@@ -68,7 +68,7 @@ def write_page(
     folder.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
-    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem))
+    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem), encoding="utf-8")
 
 
 def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
