@@ -50,12 +50,12 @@ def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
 
 
 def work(
-    key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool, journals: Sequence[Path | None]
+    key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool, journals: Sequence[Path | None] = ()
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
-    journals: of each point, where it keeps its unfinished work (`folder/key`), if it does.
+    journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
     """
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
@@ -64,7 +64,7 @@ def work(
     cores.tell(alone)
     scene, runner = _opened(key, packed)
     begun, found = time.process_time(), list[Point]()
-    for point, place in zip(points, journals, strict=True):
+    for point, place in zip(points, journals or [None] * len(points), strict=True):
         try:
             edited = with_numbers(scene, point)
         except InputError as error:

@@ -18,12 +18,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-from filelock import FileLock, Timeout
+from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import ResourceError
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -127,6 +128,8 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
 
     The system drops the lock of a process that dies, whatever it dies of.
     """
+    from filelock import FileLock  # here, since what finds everything fresh locks nothing
+
     lock = FileLock(path, thread_local=False, fallback_to_soft=False)
     mine = _acquire(lock, wait=False)
     if mine is None and wait:
@@ -147,6 +150,8 @@ def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
     A file system without locks counts as free: unique temporary names and atomic replacement keep results right, work
     may then be done twice.
     """
+    from filelock import Timeout
+
     try:
         lock.acquire(blocking=wait)
     except Timeout:
