@@ -51,8 +51,9 @@ def told(rows: list[Row], first: dict[str, list[Row]]) -> str:
             own = claim.test(numbers_of(first, FIRST_PLACE))[0]
         judged.append([claim.paper, _yes(own), f"{good} of {len(outcomes)}", _verdict(good, len(outcomes), own)])
     head = ("statement", "first layout", "identified layouts", "over all of them")
-    failing = "\n".join(_numbers(claim, outcomes) for claim, outcomes in verdicts(rows))
-    return f"{pipe_table(head, judged)}\n\n{_peaks(rows)}\n\nOf each statement one layout for which it holds, and one for which it does not:\n\n{failing}"
+    examples = "\n".join(_numbers(claim, outcomes) for claim, outcomes in verdicts(rows))
+    shown = "Of each statement one layout for which it holds, and one for which it does not:"
+    return f"{pipe_table(head, judged)}\n\n{_peaks(rows)}\n\n{shown}\n\n{examples}"
 
 
 def _yes(holds: bool | None) -> str:

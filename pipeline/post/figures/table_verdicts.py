@@ -69,11 +69,10 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         "Of ensembles the mean over the members. The prismatic joint is at the rod's lower end here; "
-        "[reference-conditions.md](reference-conditions.md) judges mode sets at other places, over layouts of the mechanism, and against "
-        "the full "
-        "rod, [chaos.md](chaos.md) the motion under a repeated stroke, [geometry.md](geometry.md) what Table 8 "
-        "tells of "
-        "the joint coordinates. Tables 4, 5 and 10 have verdicts of their own below them.",
+        "[reference-conditions.md](reference-conditions.md) judges mode sets at other places, over layouts of the "
+        "mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a repeated stroke, "
+        "[geometry.md](geometry.md) what Table 8 tells of the joint coordinates. Tables 4, 5 and 10 have verdicts of "
+        "their own below them.",
     )
     return files("table_verdicts", Table("Verdicts on the paper's statements (added)", HEADS, rows, notes))
 
