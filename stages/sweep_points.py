@@ -57,11 +57,14 @@ def work(
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
     journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
     """
+    from threadpoolctl import threadpool_limits
+
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
     from flexclear.pipeline.core.workflow import cores, journal
 
     cores.tell(alone)
+    threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
     scene, runner = _opened(key, packed)
     begun, found = time.process_time(), list[Point]()
     for point, place in zip(points, journals or [None] * len(points), strict=True):
