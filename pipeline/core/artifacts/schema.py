@@ -52,6 +52,20 @@ RUN: Schema = {
     "joint_moment": _V(
         ("time", "joint", "axis"), "N m", "moment on the joint's second body at its frame's origin, world axes"
     ),
+    "joint_bearing_load": _V(
+        ("time", "rubbing"), "N", "normal force in the bearings of a joint with friction", optional=True
+    ),
+    "joint_sliding_speed": _V(("time", "rubbing"), "m s-1", "sliding speed there, the largest", optional=True),
+    "joint_friction_power": _V(("time", "rubbing"), "W", "power of the joint's friction, <= 0", optional=True),
+    "joint_friction_loss": _V(
+        ("time", "rubbing"), "J", "energy lost to the friction of the joint since the start", optional=True
+    ),
+    "joint_friction_force": _V(
+        ("time", "rubbing", "axis"), "N", "friction's part of joint_force, world axes", optional=True
+    ),
+    "joint_friction_moment": _V(
+        ("time", "rubbing", "axis"), "N m", "friction's part of joint_moment, world axes", optional=True
+    ),
     "modal_coordinate": _V(("time", "mode"), "kg0.5 m", "modal coordinate", optional=True),
     "modal_velocity": _V(("time", "mode"), "kg0.5 m s-1", "rate of the modal coordinate", optional=True),
     "drive_force": _V(("time", "drive"), "N or N m", "what the drive supplies along its coordinate", optional=True),

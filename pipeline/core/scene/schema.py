@@ -18,6 +18,7 @@ from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
     Ground,
+    IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
@@ -337,6 +338,10 @@ class Scene(Part):
     def stop_ends(self) -> list[str]:
         """Names of all ends of stops, as records have them."""
         return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
+
+    def rubbing(self) -> dict[str, IdealJoint]:
+        """Ideal joints with friction, by name."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, IdealJoint) and j.friction is not None}
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""
