@@ -30,7 +30,8 @@ WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "pi
 class Parts:
     """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
 
-    surfaces, forms, frictions: of contacts.  joint_frictions: laws of ideal joints.  stops: whether joint coordinates have ends.
+    surfaces, forms, frictions: of contacts.  joint_frictions: laws of ideal joints.
+    wear: whether that of contacts is counted.  stops: whether joint coordinates have ends.
     couplings: whether they follow each other.      harmonics: whether a law of time has some.
     """
 
@@ -46,6 +47,7 @@ class Parts:
     stiffening: bool = False
     harmonics: bool = False
     joint_frictions: tuple[str, ...] = ()
+    wear: bool = False
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ def most_parts(scene: Scene) -> Parts:
         stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
         joint_frictions=joint_frictions(scene),
+        wear=bool(scene.worn()),
     )
 
 

@@ -14,6 +14,7 @@ from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_stati
 from flexclear.pipeline.post.impacts import impacts, of_kind
 from flexclear.pipeline.post.rotations import angle_about_y
 from flexclear.pipeline.post.schema import POST
+from flexclear.pipeline.post.wear import wear
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
@@ -23,13 +24,15 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     variables.  The horizon is the run's own (its end where it has none), the ensemble's is called so.
     Nothing is interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
     """
-    data: Variables = {**motion(run), **contacts(run), **impacts(run)}
+    worn, surfaces = wear(run, parameters(run).get("joint", {}))
+    data: Variables = {**motion(run), **contacts(run), **impacts(run), **worn}
     names, force = reactions(run)
     data["reaction"] = (("time", "joint"), force)
     data["peak_reaction"] = (("joint",), force.max(axis=0, initial=0.0))
     data["peak_acceleration"] = (("body", "axis"), np.abs(run.acceleration.values).max(axis=0, initial=0.0))
     end = float(run["horizon"] if "horizon" in run else run.time.values[-1])
     coords = {name: run[name].values for name in ("time", "body", "contact") if name in run.coords}
+    coords |= surfaces
     coords["joint"] = np.array(names, dtype=str)
     if ensemble is not None:
         data |= ensemble_statistics(ensemble)

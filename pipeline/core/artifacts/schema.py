@@ -125,6 +125,21 @@ RUN: Schema = {
     "contact_delivered_restitution": _V(
         ("contact",), "1", "rebound over approach speed that the contact's law gives a free impact", optional=True
     ),
+    "wear_sliding_distance": _V(
+        ("time", "worn"), "m", "distance that the surfaces in contact have slid on each other", optional=True
+    ),
+    "wear_load_path": _V(
+        ("time", "worn"), "N m", "time integral of normal force times sliding speed since the start", optional=True
+    ),
+    "wear_direction_outer": _V(
+        ("time", "worn", "axis"), "1", "direction from the socket's centre to the contact, socket axes", optional=True
+    ),
+    "wear_direction_inner": _V(
+        ("time", "worn", "axis"),
+        "1",
+        "direction from the centre of ball or pin to the contact, its axes",
+        optional=True,
+    ),
     "load_loss": _V(("time",), "J", "energy lost to the loads since the start", optional=True),
     "modal_damping_loss": _V(("time",), "J", "energy lost to modal damping since the start", optional=True),
     "contact_offset": _V(

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from flexclear.pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
+from flexclear.pipeline.core.scene.clearance import (
+    CONTACTS,
+    BallOnPlane,
+    Clearance,
+    ClearanceRevolute,
+    ClearanceSpherical,
+)
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from flexclear.pipeline.core.scene.gears import Gear
@@ -334,6 +340,11 @@ class Scene(Part):
     def contacts(self) -> dict[str, Clearance]:
         """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
+
+    def worn(self) -> dict[str, ClearanceRevolute | ClearanceSpherical]:
+        """Joints with clearance whose wear is asked for, by name."""
+        wearing = (ClearanceRevolute, ClearanceSpherical)
+        return {n: j for n, j in self.joint.items() if isinstance(j, wearing) and j.wear is not None}
 
     def stop_ends(self) -> list[str]:
         """Names of all ends of stops, as records have them."""

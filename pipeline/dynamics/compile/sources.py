@@ -142,6 +142,8 @@ def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
         forms, frictions = _family(imports, FORMS, parts.forms), _family(imports, FRICTION_LAWS, parts.frictions)
         maker = _import(imports, f"{DYNAMICS}.contact.forces", "make_contacts")
         given["contacts"] = f"{maker}(surfaces={surfaces}, forms={forms}, frictions={frictions})"
+        if parts.wear:
+            given["contacts"] = f"{_import(imports, f'{DYNAMICS}.contact.wear', 'wearing')}({given['contacts']})"
     if parts.stops:
         forms = _family(imports, FORMS, parts.forms)
         given["stops"] = f"{_import(imports, f'{DYNAMICS}.contact.stops', 'make_stops')}({forms})"

@@ -111,8 +111,9 @@ class _Tables:
     def add(self, entries: Rows, reaction: _Reaction, bearings: int) -> tuple[int, ...]:
         """Keep the rows of one joint; where they begin and how many there are, in the order of RUBBING."""
         terms, momenta, columns = len(self.terms), len(reaction.momenta), len(reaction.columns)
-        ranges = (len(self.entries), len(entries), terms, momenta, terms + momenta, columns)
-        ranges += (len(self.loops), len(reaction.loops), len(self.bearings), bearings)
+        of_terms = (terms, momenta, terms + momenta, columns)
+        loops = (len(self.loops), len(reaction.loops))
+        ranges = (len(self.entries), len(entries), *of_terms, *loops, len(self.bearings), bearings)
         self.entries += entries
         self.terms += [*reaction.momenta, *reaction.columns]
         self.loops += reaction.loops
@@ -166,6 +167,6 @@ def closure_ends(numbering: Numbering, closures: Sequence[Closure | Coupling]) -
     """(closure, part, first site, second site) of all closures; a coupling has two parts."""
     ends = []
     for c, closure in enumerate(closures):
-        sides = [side for side, _ in closure.parts] if isinstance(closure, Coupling) else [closure]
-        ends += [(c, part, numbering.site(side.a), numbering.site(side.b)) for part, side in enumerate(sides)]
+        sides = [(side.a, side.b) for side, _ in closure.parts] if isinstance(closure, Coupling) else [closure[1:]]
+        ends += [(c, part, numbering.site(a), numbering.site(b)) for part, (a, b) in enumerate(sides)]
     return ends

@@ -100,6 +100,7 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
+    wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
     ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
     rubbing = _rubbing(numbering, parts, ordered, contact_ledger + ledger)
     groups, floors = _error_groups(numbering, ledger, gauges.internal)
@@ -113,6 +114,7 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.RUBBING_SLOT: contact_ledger + ledger,
+            m.WEAR_SLOT: len(groups) - numbering.nq - numbering.nv - gauges.internal - wear_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
@@ -128,7 +130,7 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
             **loaded.tables,
             **coupling_tables,
             **rubbing,
-            m.WORN: (),
+            m.WORN: contacting.worn(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
             m.GROUPS: groups,
@@ -173,6 +175,7 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,
         joint_frictions=joint_frictions(mechanism.scene),
+        wear=bool(mechanism.scene.worn()),
     )
 
 
@@ -182,9 +185,7 @@ NO_FRICTION: dict[Any, Any] = dict.fromkeys(
 )
 
 
-def _rubbing(
-    numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupling, ...], slot: int
-) -> dict[Any, Any]:
+def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupling, ...], slot: int) -> dict[Any, Any]:
     """Tables of the ideal joints with friction; slot: of their first loss in the ledger."""
     if not parts.joint_frictions:
         return NO_FRICTION
@@ -251,6 +252,7 @@ def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.n
         from flexclear.pipeline.dynamics.model import joint_friction
 
         tail += joint_friction.ledger_groups(mechanism, energy)
+    tail += [(L, 1), (energy, 1)] * len(mechanism.scene.worn())  # sliding distance, load path
     tail += [(1.0, 1)] * internal
     for floor, count in tail:
         floors.append(floor)

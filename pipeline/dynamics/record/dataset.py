@@ -51,6 +51,10 @@ def dataset(run: Run) -> xr.Dataset:
         parts.append(friction_series(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(trajectory), {})]
+    if model.parts.wear:
+        from flexclear.pipeline.dynamics.record.wear import wear_series
+
+        parts.append(wear_series(model, seen))
     if run.twin is not None:
         horizon: Variables = {"horizon": ((), np.array(run.twin.horizon))}
         separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}

@@ -44,7 +44,7 @@ def _summed(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def warnings(model: Model, redundant: Collection[str]) -> list[str]:
-    """Sentences about friction that follows a reaction which rigid bodies leave undetermined; redundant: such joints."""
+    """Sentences about friction that follows reactions which rigid bodies leave undetermined (of joints `redundant`)."""
     doubted = [name for name in model.scene.rubbing() if name in redundant]
     if not doubted:
         return []

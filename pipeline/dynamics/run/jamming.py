@@ -22,8 +22,8 @@ def explanation(engine: Engine) -> str:
     names, gains = list(engine.model.scene.rubbing()), _gains(engine)
     worst = int(np.argmax(gains))
     return (
-        f"the friction of joint {names[worst]} presses the joint the more, the more it rubs (by {gains[worst]:.3g} of each "
-        "newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's paradox); "
+        f"the friction of joint {names[worst]} presses the joint the more, the more it rubs (by {gains[worst]:.3g} of "
+        "each newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's paradox); "
         "a smaller coefficient, a longer guide or a flexible body beside the joint is the remedy"
     )
 
@@ -36,6 +36,8 @@ def _gains(engine: Engine) -> np.ndarray:
     gains = []
     for row, mine in zip(arrays.table(m.RUBBING), reactions, strict=True):
         own = range(row["bearing0"], row["bearing0"] + row["n_bearings"])
-        felt = [np.linalg.norm(mine[1 + e]["force"]) + 2.0 * levers[e] * np.linalg.norm(mine[1 + e]["moment"]) for e in own]
+        felt = [
+            np.linalg.norm(mine[1 + e]["force"]) + 2.0 * levers[e] * np.linalg.norm(mine[1 + e]["moment"]) for e in own
+        ]
         gains.append(max(felt))
     return np.array(gains)
