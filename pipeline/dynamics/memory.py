@@ -180,13 +180,13 @@ LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: place of the angle with its full turns among the internal states or -1
 GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
-#: ideal joints with friction. site_a, site_b: of their frames; link: whose inboard joint it is, or -1; reversed: whether
-#: that link is on the side of the first frame; closure: that it is, or -1
+#: ideal joints with friction. site_a, site_b: of their frames; link: whose inboard joint it is, or -1; reversed:
+#: whether that link is on the side of the first frame; closure: that it is, or -1
 RUBBING = wiring(
     "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 n_loops bearing0 "
     "n_bearings"
 )
-#: a place where such a joint rubs. kind: see `equations.joint_friction`; side, axis: of its frame; bristle: as of CONTACTS
+#: where such a joint rubs. kind: see `equations.joint_friction`; side, axis: of its frame; bristle: as of CONTACTS
 BEARINGS = wiring("joint kind law side axis bristle")
 RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; prescribed coordinates after the free ones
 REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels

@@ -1,4 +1,4 @@
-"""Friction of ideal joints that follows the force which they carry: the laws of contacts, on a bearing of given size."""
+"""Friction of ideal joints that follows the force which they carry: laws of contacts, on a bearing of given size."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 r"""Friction of ideal joints that follows their reactions.
 
-Friction loads a bearing, and what loads a bearing makes friction. At a given state every reaction is affine in the
+What a bearing carries makes friction, and friction changes what it carries. At a given state every reaction is affine in the
 normal forces N of all bearings, since sliding velocities, and hence friction per normal force, are known:
 
 .. math:: R_j = R_{j0} + \sum_k N_k R_{jk}, \qquad N_e = g_e(R_{j(e)})
@@ -126,7 +126,7 @@ def tree_response(h, w):
 
 @kernel
 def closed_response(h, w):
-    """Accelerations in FORCE from the generalised forces there, and the multipliers that they take; loops stay closed."""
+    """Accelerations in FORCE from the generalised forces there, and their multipliers; loops stay closed."""
     forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
     for c in range(h[m.N_CLOSURES]):
         count, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
@@ -144,7 +144,7 @@ def closed_response(h, w):
 
 @kernel
 def load_coordinates(h, w, e, size):
-    """Add generalised forces of the friction of bearing e, at the normal force `size`, to FORCE and DRIVE_FORCE."""
+    """Add the generalised forces of the friction of bearing e, at the normal force `size`, to FORCE."""
     j, o = m.BEARINGS.joint(h, e), m.BEARING.row(h, e) + m.BEARING.unit_moment
     first = m.RUBBING.entry0(h, j)
     for k in range(first, first + m.RUBBING.n_entries(h, j)):
@@ -339,10 +339,10 @@ def find_loads(h, f, w):
     if iterate(h, f, w, 1.0):
         return True
     without_feedback(h, f, w)
+    found = True
     for k in range(1, STRIDES + 1):
-        if not iterate(h, f, w, k / STRIDES):
-            return False
-    return True
+        found = found and iterate(h, f, w, k / STRIDES)
+    return found
 
 
 def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callable:

@@ -23,8 +23,8 @@ def explanation(engine: Engine) -> str:
     worst = int(np.argmax(gains))
     return (
         f"the friction of joint {names[worst]} presses the joint the more, the more it rubs (by {gains[worst]:.3g} of "
-        "each newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's paradox); "
-        "a smaller coefficient, a longer guide or a flexible body beside the joint is the remedy"
+        "each newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's "
+        "paradox); a smaller coefficient, a longer guide or a flexible body beside the joint is the remedy"
     )
 
 
