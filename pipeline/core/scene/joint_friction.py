@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 
-from pydantic import Field
+from pydantic import Field, create_model
 
-from flexclear.pipeline.core.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
+from flexclear.pipeline.core.scene.clearance import FRICTIONS
 from flexclear.pipeline.core.scene.fields import Force, Length, Part
 
 Positive = Field(gt=0.0)
@@ -36,19 +36,15 @@ class _Bearing(Part):
     preload: Annotated[Force, Field(ge=0.0)] = 0.0
 
 
-class BearingModifiedCoulomb(_Bearing, ModifiedCoulomb):
-    """Wang & Wang's modified Coulomb friction in a bearing."""
+def _rubbing(law: Any) -> Any:
+    """The parameters of a friction law of contacts, and those of a bearing."""
+    return create_model(f"{law.__name__}Bearing", __base__=(_Bearing, law), __doc__=law.__doc__, __module__=__name__)
 
 
-class BearingAmbrosio(_Bearing, Ambrosio):
-    """Ambrosio's Coulomb friction in a bearing."""
-
-
-class BearingLuGre(_Bearing, LuGre):
-    """LuGre friction in a bearing."""
-
-
-JointFriction = Annotated[BearingModifiedCoulomb | BearingAmbrosio | BearingLuGre, Field(discriminator="law")]
+if TYPE_CHECKING:
+    JointFriction: TypeAlias = Any
+else:
+    JointFriction = Annotated[Union[tuple(_rubbing(law) for law in FRICTIONS)], Field(discriminator="law")]  # noqa: UP007
 
 
 def require_fitting(kind: str, friction: Any) -> None:

@@ -1,7 +1,7 @@
 r"""Friction of ideal joints that follows their reactions.
 
-What a bearing carries makes friction, and friction changes what it carries. At a given state every reaction is affine in the
-normal forces N of all bearings, since sliding velocities, and hence friction per normal force, are known:
+What a bearing carries makes friction, and friction changes what it carries. At a given state every reaction is affine
+in the normal forces N of all bearings, since sliding velocities, and hence friction per normal force, are known:
 
 .. math:: R_j = R_{j0} + \sum_k N_k R_{jk}, \qquad N_e = g_e(R_{j(e)})
 
@@ -14,12 +14,12 @@ evaluation says so.
 A bearing is a pin, a slider, both (kinds 0, 1, 2), or a ball (3). With the axis n, the force F and the moment M about
 the second frame's origin that the joint carries, and its length L,
 
-.. math:: N = |F_\perp/2 - n\times M/L| + |F_\perp/2 + n\times M/L| + a|n\cdot F| + b|n\cdot M| + N_0, \quad N = |F| + N_0
+.. math:: N = |F_\perp/2 - n\times M/L| + |F_\perp/2 + n\times M/L| + a|n\cdot F| + b|n\cdot M| + N_0
 
-for the first three, and for a ball: two ends of a pin or slider, a collar (a: its radius over that of the pin), pads
-that hold moments about the axis (b: one over their arm), and what presses always. Friction of a ball acts against its
-turning, whatever the direction of the load. What the joint carries counts as pressed, friction included, as is usual
-(a friction circle of radius mu r instead of r sin(atan mu)).
+for the first three, and N = |F| + N_0 for a ball: two ends of a pin or slider, a collar (a: its radius over that of the
+pin), pads that hold moments about the axis (b: one over their arm), and what presses always. Friction of a ball acts
+against its turning, whatever the direction of the load. What the joint carries counts as pressed, friction included,
+as is usual (a friction circle of radius mu r instead of r sin(atan mu)).
 
 Source: Haug, Wu & Yang (1986), Mechanism and Machine Theory 21, 401-425 (friction in joints, and that it depends on the
 reactions); Leine, Brogliato & Nijmeijer (2002), European Journal of Mechanics A/Solids 21, 869-896 (when not at all).

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
@@ -53,19 +52,12 @@ def fill(
     """The tables of joints with friction and their bearings.
 
     laws: names of those present.  closures: as the table CLOSURES has them.  slot: of the first loss in the ledger.
-    Raises InputError for a joint whose bodies move as one.
     """
     mechanism, tables, ends = numbering.mechanism, _Tables(), closure_ends(numbering, closures)
     bristle = numbering.nq + numbering.nv + slot + len(mechanism.scene.rubbing())
     sizes = iter(_bristles(mechanism))
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
-        if a.link == b.link:
-            raise InputError(
-                f"[joint.{name}.friction]",
-                f"the bodies of joint '{name}' move as one: nothing slides",
-                "leave its friction out",
-            )
         sites = numbering.site(a), numbering.site(b)
         link, reverse = _link(mechanism, name)
         closure = next((c for c, one in enumerate(closures) if isinstance(one, Closure) and one.name == name), -1)
