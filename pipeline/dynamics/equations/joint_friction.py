@@ -35,6 +35,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
+from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
@@ -55,8 +56,6 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_symmetric,
 )
 
-#: kinds of bearings
-PIN, SLIDER, SLEEVE, BALL = range(4)
 #: Newton's iterations for the loads, the change of a load, as share of the largest, at which they end, and in how many
 #: strides friction is turned on where they do not
 ITERATIONS, CONVERGED, STRIDES = 30, 1e-13, 32

@@ -10,21 +10,13 @@ from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
-from flexclear.pipeline.dynamics.equations.joint_friction import BALL, PIN, SLEEVE, SLIDER
+from flexclear.pipeline.dynamics.joints.bearings import BEARINGS, SLIDER
 from flexclear.pipeline.dynamics.model.couplings import Coupling
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 Rows = list[tuple[int, ...]]
-#: bearings of each type of joint: kind, side and axis of the frame along which it lies
-BEARINGS = {
-    "revolute": ((PIN, 0, 2),),
-    "prismatic": ((SLIDER, 0, 2),),
-    "cylindrical": ((SLEEVE, 0, 2),),
-    "universal": ((PIN, 0, 0), (PIN, 1, 1)),
-    "spherical": ((BALL, 0, 2),),
-}
 
 
 def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
