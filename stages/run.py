@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import json
+import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,7 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
 from flexclear.pipeline.core.artifacts.paths import results_root
@@ -90,6 +92,34 @@ def common_arguments(parser: argparse.ArgumentParser) -> None:
     said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
 
 
+def json_argument(parser: argparse.ArgumentParser) -> None:
+    """For scripts: what else is printed, as JSON."""
+    parser.add_argument("--json", action="store_true", help="print the results as JSON")
+
+
+def as_json(found: object) -> str:
+    """A result as JSON; datasets as their variables with dimensions, units and values, and their attributes."""
+    return json.dumps(found, indent=2, default=_plain, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "data_vars"):
+        variables = {
+            str(name): {"dims": list(data.dims), "units": data.attrs.get("units", ""), "values": _finite(data.values)}
+            for name, data in value.variables.items()
+        }
+        return {"attributes": dict(value.attrs), "variables": variables}
+    return _finite(value) if hasattr(value, "tolist") else str(value)
+
+
+def _finite(values: Any) -> Any:
+    """Numbers of an array as lists; those that JSON does not have are null."""
+    plain = values.tolist() if hasattr(values, "tolist") else values
+    if isinstance(plain, list):
+        return [_finite(value) for value in plain]
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
+
+
 def told(folder: Path, files: Mapping[str, str]) -> None:
     """One line on what was written where, of those files that are there."""
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
@@ -129,7 +159,7 @@ class MissedAccuracyError(SolverError):
 
 
 def workplace(options: argparse.Namespace | None = None) -> Workplace:
-    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says.
+    """The usual one, with results where `results_root` says.
 
     options: of a command, with `jobs` and how much is said.
     """
