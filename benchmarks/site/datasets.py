@@ -26,7 +26,7 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     "Mesh of a beam": ("`mesh/<body>.nc`", artifacts.MESH),
     "Mesh of a solid": ("`mesh/<body>.nc`", artifacts.SOLID),
     "Matrices of another program": ("`mesh/<body>.nc`", artifacts.MATRICES),
-    "Rigid body of a mesh": ("`rigid/<body>.nc`", artifacts.RIGID),
+    "Rigid body of a mesh": ("kept in the cache alone, for bodies of the type rigid with a mesh", artifacts.RIGID),
 }
 HEAD = """# Datasets
 
