@@ -18,13 +18,13 @@ PIECES, BANDS = 16, 18
 SURFACES = ("outer", "inner")
 
 
-def wear(run: xr.Dataset, joints: dict[str, Any]) -> tuple[Variables, dict[str, np.ndarray]]:
-    """Variables ``wear_*`` of the post artifact, and their coordinates; empty where nothing wears.
+def wear(run: xr.Dataset, joints: dict[str, Any]) -> Variables:
+    """Variables ``wear_*`` of the post artifact; empty where nothing wears.
 
     joints: what the scene says of its joints.  Depths are those that a surface alone would have; both share the volume.
     """
     if "wear_load_path" not in run:
-        return {}, {}
+        return {}
     names = [str(name) for name in run["worn"].values]
     laws = [joints[name]["wear"] for name in names]
     sectors = max(int(law["sectors"]) for law in laws)
@@ -53,7 +53,7 @@ def wear(run: xr.Dataset, joints: dict[str, Any]) -> tuple[Variables, dict[str, 
         deepest = maps[f"wear_depth_{side}"].reshape(len(names), -1).max(axis=1)
         totals[f"wear_deepest_{side}"] = (("worn",), deepest)
     mapped: Variables = {name: (("worn", "band", "sector"), values) for name, values in maps.items()}
-    return totals | mapped, {"worn": np.array(names, dtype=str), "band": np.arange(bands), "sector": np.arange(sectors)}
+    return totals | mapped
 
 
 def _area(joint: dict[str, Any], side: str) -> float:
