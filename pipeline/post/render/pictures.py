@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import sys
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.log import LOG
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.post.render import gl
 from flexclear.pipeline.post.series import derive
@@ -31,7 +31,7 @@ def pictures(
     result is empty, and one line on stderr says what to install.
     """
     if not gl.works():
-        print(f"flexclear: no pictures; {gl.remedy()}", file=sys.stderr)
+        LOG.warning("no pictures; %s", gl.remedy())
         return {}
     # pyvista is imported only where it can draw
     from flexclear.pipeline.post.render import film, mechanism
