@@ -14,6 +14,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from flexclear.pipeline.core.artifacts.coordinates import AXES, COORDINATES, QUATERNION, turning, with_names
 from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.variable import Schema, Variable
 from flexclear.pipeline.core.version import DISTRIBUTION, version
@@ -34,6 +35,8 @@ __all__ = [
     "Schema",
     "Variable",
     "conform",
+    "incomplete",
+    "require_complete",
 ]
 
 CONVENTIONS = "CF-1.11"
@@ -359,3 +362,19 @@ def _units(dataset: xr.Dataset, name: str, variable: Variable) -> tuple[str, xr.
         return variable.turning, None
     each, words = np.where(turns, variable.turning, variable.units), {"long_name": f"units of {name}"}
     return "", xr.Variable(dim, each, words)
+
+
+def incomplete(run: xr.Dataset, why: str) -> xr.Dataset:
+    """What there is of a run that was stopped, marked: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
+    return run.assign_attrs(complete=0, stopped_at=float(run["time"].values[-1]), stopped_by=why)
+
+
+def require_complete(run: xr.Dataset, what: str = "the run") -> None:
+    """InputError for what is left of a run that was stopped, which is no result."""
+    if not run.attrs.get("complete", 1):
+        raise InputError(
+            what,
+            f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
+            f"({run.attrs.get('stopped_by', 'nobody knows why')})",
+            "run the scene again, which goes on from there",
+        )
