@@ -31,6 +31,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenes", nargs="*", metavar="SCENE", help="the report of these scenes; without any, that of the paper"
     )
+    parser.add_argument(
+        "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
+    )
     run.common_arguments(parser)
 
 
@@ -38,12 +41,12 @@ def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
     place = run.workplace(options)
     if not options.scenes:
-        print(make(place))
+        print(run.near(make(place, folder=options.folder)))
         return
     from flexclear.stages import own_report
 
     for graph in run.graphs(options.scenes, options.set):
-        print(run.near(own_report.make(graph, place)))
+        print(run.near(own_report.make(graph, place, folder=options.folder)))
 
 
 @dataclass(frozen=True)

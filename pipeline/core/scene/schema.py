@@ -130,7 +130,7 @@ class View(Part):
     exaggeration: Annotated[Number, Positive] | None = Field(
         default=None, description="how many times larger than computed deformations are drawn; default: to be seen"
     )
-    duration: Annotated[Time, Positive] | None = Field(default=None, description="of films; default: 5.6 s")
+    duration: Annotated[Time, Positive] | None = Field(default=None, description="of films; default: some 4 s")
     impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = Field(
         default=None,
         description="how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly",
