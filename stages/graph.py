@@ -169,7 +169,9 @@ class Graph:
         """One of what `s6_render.FORMATS` lists; `time`: of vibrations, as of `linear`."""
         params = s6_render.params(self.scene, what, kind)
         bundles = {f"bundle/{body}": task for body, task in self.bundle.items()}
-        source = {} if what == "modes" else {"linear": self.linear(time)} if what == "vibrations" else {"run": self.simulate}
+        source = (
+            {} if what == "modes" else {"linear": self.linear(time)} if what == "vibrations" else {"run": self.simulate}
+        )
         inputs: dict[str, Task] = {**source, **bundles}
         task = self._scene_task("render", "flexclear.stages.s6_render:run", params, inputs)
         folder = self._folder("paraview" if kind == "pvd" else "")

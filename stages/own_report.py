@@ -1,4 +1,4 @@
-"""The report of one scene: the answer first, then film, figures, comparison with its ideal twin, assumptions, doubts."""
+"""The report of one scene: the answer, then film, figures, comparison with its ideal twin, assumptions, doubts."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ if TYPE_CHECKING:
 #: general figures, in this order: caption, and what a reader who does not see them is told
 FIGURES = {
     "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
-    "reactions.png": ("Reactions and drives", "Magnitude of the force in each joint, and what drives supply, over time"),
+    "reactions.png": (
+        "Reactions and drives",
+        "Magnitude of the force in each joint, and what drives supply, over time",
+    ),
     "contacts.png": (
         "Joints with clearance",
         "Path of the ball or pin in its socket, the gap, and the normal force over time",
@@ -88,7 +91,11 @@ def _page(
         *(compare.parts(compared) if compared is not None else []),
         Part("doubts", "To be doubted", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("", "warning"))),
         Part("assumptions", "Assumptions, those on which most hangs first", listed(assumed, ("value", "assumption"))),
-        Part("effects", "Effects present and absent", listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else ""),
+        Part(
+            "effects",
+            "Effects present and absent",
+            listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
+        ),
         Part("cost", "What it cost", listed(_told(attributes, COST), ("", ""))),
         Part("stability", "How firmly it stands", listed(_stability(run), ("", ""))),
         Part("provenance", "Where it comes from", listed(_provenance(graph, place, records), ("", ""))),
@@ -105,8 +112,10 @@ def _told(attributes: Mapping[Any, Any], names: tuple[str, ...]) -> dict[str, st
     for name in names:
         value = attributes.get(name)
         if value not in (None, ""):
-            whole = isinstance(value, int) or getattr(value, "dtype", None) is not None and value.dtype.kind in "iu"
-            found[name.replace("_", " ")] = f"{int(value):,}" if whole else f"{value:.4g}" if isinstance(value, float) else str(value)
+            whole = isinstance(value, int) or (getattr(value, "dtype", None) is not None and value.dtype.kind in "iu")
+            found[name.replace("_", " ")] = (
+                f"{int(value):,}" if whole else f"{value:.4g}" if isinstance(value, float) else str(value)
+            )
     return found
 
 
@@ -119,7 +128,10 @@ def _stability(run: xr.Dataset | None) -> dict[str, str]:
     found["neighbouring starts"] = (
         "stay together to the end" if horizon >= end else f"part after {1e3 * horizon:.4g} ms of {1e3 * end:.4g} ms"
     )
-    for name, label, unit in (("energy_error", "largest energy that the ledger misses", "J"), ("constraint_error", "largest opening of a loop", "m")):
+    for name, label, unit in (
+        ("energy_error", "largest energy that the ledger misses", "J"),
+        ("constraint_error", "largest opening of a loop", "m"),
+    ):
         if name in run:
             found[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
     return found
@@ -167,9 +179,7 @@ def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> st
     return text
 
 
-def _media(
-    place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]
-) -> str:
+def _media(place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]) -> str:
     from flexclear.pipeline.post.overview.page import media
 
     record = records.get(id(task))

@@ -62,7 +62,9 @@ def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
     if kind is None:
         return [(what, next(k for k in ("mp4", "html", "png") if k in FORMATS[what]))]
     if kind not in FORMATS[what]:
-        raise InputError(f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}")
+        raise InputError(
+            f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}"
+        )
     return [(what, kind)]
 
 

@@ -95,8 +95,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 
-def make(place: Workplace) -> Path:
-    """Bring everything that the report shows up to date; returns the page.
+def make(place: Workplace, *, folder: bool = False) -> Path:
+    """Bring everything that the report shows up to date; returns the page; with `folder` one with files beside it.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
@@ -111,7 +111,12 @@ def make(place: Workplace) -> Path:
 
         place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(shown)
-    return place.store.root / "report" / "index.html"
+    target = place.store.root / "report" / "index.html"
+    if not folder:
+        return target
+    from flexclear.stages.own_report import publish_page
+
+    return publish_page(target.parent, "folder", target.read_bytes(), folder=True)
 
 
 def figure_tasks(place: Workplace, scenes: Scenes) -> list[Task]:

@@ -36,7 +36,7 @@ def gl_state() -> str:
 
 
 def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
-    """What is shown and how: what the scene says of its pictures, what is watched, and the GL libraries where they matter.
+    """What is shown and how: what the scene says of its pictures, what is watched, the GL libraries where they matter.
 
     Raises InputError for files of shapes that are not there.
     """

@@ -35,7 +35,9 @@ OPTIONS = (
 
 def missing() -> str:
     """What is not there; empty where pages can be tested."""
-    found = [name for name, names in (("chromium", NAMES), ("chromedriver", DRIVERS)) if not any(map(shutil.which, names))]
+    found = [
+        name for name, names in (("chromium", NAMES), ("chromedriver", DRIVERS)) if not any(map(shutil.which, names))
+    ]
     return f"pages are tested in a browser, and there is no {' and no '.join(found)}" if found else ""
 
 
@@ -73,7 +75,9 @@ class Browser:
 
     def size(self, width: int, height: int, *, dark: bool = False) -> None:
         """The size of the page's window, and the reader's choice of colours."""
-        self.devtools("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600)
+        self.devtools(
+            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
+        )
         scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         self.devtools("Emulation.setEmulatedMedia", features=scheme)
 
@@ -86,7 +90,7 @@ class Browser:
         return base64.b64decode(self.devtools("Page.printToPDF", printBackground=True)["data"])
 
     def logs(self) -> tuple[list[str], list[str]]:
-        """Messages of the console that are errors, and addresses that were asked for over the net, since the last call."""
+        """Errors on the console, and addresses that were asked for over the net, since the last call."""
         console = self.ask("POST", "/se/log", type="browser")
         events = [json.loads(entry["message"])["message"] for entry in self.ask("POST", "/se/log", type="performance")]
         asked = [e["params"]["request"]["url"] for e in events if e["method"] == "Network.requestWillBeSent"]

@@ -36,7 +36,8 @@ def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence
     if doubts:
         many = "One thing is" if len(doubts) == 1 else f"{len(doubts)} things are"
         said.append(f"<span class='bad'>{many} to be doubted</span>, see <a href='#doubts'>below</a>.")
-    return f"<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"
+    head = "" if compared is None else "<p>Beside the same mechanism with ideal joints and rigid bodies:</p>"
+    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
@@ -72,7 +73,10 @@ def _impacts(compared: xr.Dataset) -> list[str]:
         if not np.isfinite(count):
             continue
         many = "No impact" if not count else "One impact" if count == 1 else f"{count:.0f} impacts"
-        found.append(f"<b>{html.escape(name)}</b>: {many}; the contact force reaches <b class='n'>{number(peak, np.nan, 'N')}</b>.")
+        found.append(
+            f"<b>{html.escape(name)}</b>: {many}; the contact force reaches "
+            f"<b class='n'>{number(peak, np.nan, 'N')}</b>."
+        )
     return found
 
 
@@ -87,7 +91,11 @@ def _horizon(compared: xr.Dataset) -> list[str]:
 
 
 def _trust(run: xr.Dataset) -> list[str]:
-    energies = [np.abs(run[n].values - run[n].values[0]).max() for n in ("kinetic", "potential", "elastic", "drive_work", "load_work") if n in run]
+    energies = [
+        np.abs(run[n].values - run[n].values[0]).max()
+        for n in ("kinetic", "potential", "elastic", "drive_work", "load_work")
+        if n in run
+    ]
     largest, missed = max(map(float, energies), default=0.0), float(np.abs(run["energy_error"].values).max())
     share = missed / largest if largest > 0.0 else 0.0
     word = "<span class='good'>closes</span>" if share < LEDGER else "<span class='bad'>does not close</span>"
@@ -95,11 +103,15 @@ def _trust(run: xr.Dataset) -> list[str]:
 
 
 def number(value: float, error: float, unit: str) -> str:
-    """A value with its error, in a unit that reads well."""
+    """A value with its error, in a unit that reads well, to the second digit of the error."""
     factor, written = scaled(value, unit)
-    if not np.isfinite(error):
-        return f"{factor * value:.4g} {written}"
-    return f"{factor * value:.4g} ± {factor * error:.2g} {written}"
+    value, error = factor * value, factor * error
+    if not np.isfinite(error) or error <= 0.0:
+        return f"{value:.4g} {written}"
+    places = 1 - int(np.floor(np.log10(error)))
+    if places > 6 or error < 1e-4 * abs(value):
+        return f"{value:.4g} ± {error:.2g} {written}"
+    return f"{value:.{max(places, 0)}f} ± {error:.{max(places, 0)}f} {written}"
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:
@@ -115,7 +127,9 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "damping of flexible bodies": [n for n in flexible if body[n].get("damping") is not None],
         "geometric stiffening": [n for n in flexible if body[n].get("stiffening") is not None],
         "gravity": [n for n, part in load.items() if part["type"] == "gravity"],
-        "springs, dampers, bushings": [n for n, p in load.items() if p["type"] in ("spring-damper", "joint-spring", "bushing")],
+        "springs, dampers, bushings": [
+            n for n, p in load.items() if p["type"] in ("spring-damper", "joint-spring", "bushing")
+        ],
         "joint friction": [n for n, part in load.items() if part["type"] == "joint-friction"],
         "controllers": [n for n, part in load.items() if "pid" in part["type"]],
         "other forces": [n for n, p in load.items() if p["type"] in ("point-force", "point-torque", "joint-force")],

@@ -37,7 +37,8 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
     """
     shown = [part for part in parts if part.body]
     body = "".join(
-        f"<section aria-labelledby='{part.key}'><h2 id='{part.key}'>{html.escape(part.heading)}</h2>\n{part.body}</section>\n"
+        f"<section aria-labelledby='{part.key}'><h2 id='{part.key}'>{html.escape(part.heading)}</h2>\n"
+        f"{part.body}</section>\n"
         for part in shown
     )
     links = "".join(f"<li><a href='#{part.key}'>{html.escape(part.heading)}</a></li>" for part in shown)
@@ -53,6 +54,11 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
         f"{below}{said}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
     )
     return text.encode()
+
+
+def viewer_page(title: str, figures: Sequence[str]) -> bytes:
+    """A page with views that can be turned (`pipeline.post.pages.viewer`)."""
+    return page(title, "", [Part("view", "View", "".join(figures))])
 
 
 def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
@@ -90,7 +96,7 @@ def downloads(files: Mapping[str, bytes]) -> str:
         return ""
     kinds = {"csv": "text/csv", "toml": "text/plain", "bib": "text/plain", "md": "text/markdown"}
     items = "".join(
-        f"<li><a download='{html.escape(name)}' href='data:{kinds.get(name.rpartition('.')[2], 'application/octet-stream')};"
+        f"<li><a download='{html.escape(name)}' href='data:{kinds.get(name.rpartition('.')[2], 'text/plain')};"
         f"base64,{base64.b64encode(content).decode()}'>{html.escape(name)}</a> ({len(content) / 1e3:.3g} kB)</li>"
         for name, content in files.items()
     )

@@ -1,4 +1,4 @@
-"""What pages are made of: style, scripts, and the viewer; each page carries its own copy and asks nobody for anything."""
+"""What pages are made of: style, scripts, and the viewer; each page carries its own copy."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ def asset(name: str) -> str:
 
 
 def viewer(told: dict[str, Any], caption: str, *, play: bool = False) -> str:
-    """A view that can be turned, as a figure; what it shows is of `pipeline.post.render.player`. The page needs its script.
+    """A view that can be turned, as a figure; the page needs its script.
 
-    play: whether it moves at once, unless the reader's system asks for rest.
+    told: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
     """
     moving = "shapes" not in told
     tools = ["<button type='button' data-part='play' aria-pressed='false'>Play</button>"]
@@ -41,7 +41,8 @@ def viewer(told: dict[str, Any], caption: str, *, play: bool = False) -> str:
     # a closing tag inside of the data would end the script
     data = json.dumps(told, separators=(",", ":")).replace("</", "<\\/")
     return (
-        f"<figure><figcaption>{html.escape(caption)}</figcaption><div class='viewer' data-play='{'yes' if play else 'no'}'>"
+        f"<figure><figcaption>{html.escape(caption)}</figcaption>"
+        f"<div class='viewer' data-play='{'yes' if play else 'no'}'>"
         f"<canvas tabindex='0' role='img' aria-label='{html.escape(label, quote=True)}'></canvas>"
         f"<div class='viewer-tools'>{''.join(tools)}</div><p class='viewer-state' aria-live='off'></p>"
         f"<script type='application/json'>{data}</script></div></figure>\n"
@@ -50,11 +51,6 @@ def viewer(told: dict[str, Any], caption: str, *, play: bool = False) -> str:
 
 def figures_of(page: str) -> str:
     """The views of a page of this program, to be put into another one."""
-    return "".join(re.findall(r"<figure><figcaption>[^<]*</figcaption><div class='viewer'.*?</figure>\n", page, re.DOTALL))
-
-
-def viewer_page(title: str, lead: str, figures: list[str]) -> bytes:
-    """A page with views that can be turned, all inside."""
-    from flexclear.pipeline.post.overview.page import Part, page
-
-    return page(title, lead, [Part("view", "View", "".join(figures))])
+    return "".join(
+        re.findall(r"<figure><figcaption>[^<]*</figcaption><div class='viewer'.*?</figure>\n", page, re.DOTALL)
+    )

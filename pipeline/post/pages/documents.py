@@ -20,7 +20,9 @@ def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | 
     if not page.is_file():
         return ""
     parts = _parts(COMMENT.sub("", page.read_text(encoding="utf-8")))
-    text = "\n\n".join(f"### {head}\n\n{body}" if head else body for head, body in parts if not headings or head in headings)
+    text = "\n\n".join(
+        f"### {head}\n\n{body}" if head else body for head, body in parts if not headings or head in headings
+    )
     return _pictures(_html(text), page.parent, pictures)
 
 
@@ -36,7 +38,9 @@ def _html(text: str) -> str:
     made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
     # links between pages lead nowhere in one file
     made = re.sub(r'<a href="(?!https?:|#)[^"]*">(.*?)</a>', r"<i>\1</i>", made, flags=re.DOTALL)
-    made = made.replace("<table>", "<figure><div class='scroll'><table class='sorts'>").replace("</table>", "</table></div></figure>")
+    made = made.replace("<table>", "<figure><div class='scroll'><table class='sorts'>").replace(
+        "</table>", "</table></div></figure>"
+    )
     return made
 
 

@@ -64,7 +64,7 @@ def _sheet(body: str, bundle: xr.Dataset, seen: View, share: float) -> Figure:
     style.heading(
         figure,
         f"{body}: {count} modes{f', {kind}' if kind else ''}",
-        "mass-normalised shapes (in kg^-1/2) times the factor beside each; static shapes have no frequency of their own",
+        "mass-normalised shapes (in kg^-1/2) times the factor beside each; dashed: at rest",
     )
     return figure
 
@@ -81,7 +81,8 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, share: f
         triangles = index if index.shape[1] == 3 else np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
         skin(panel, seen, points, triangles, np.clip(moved / largest, 0.0, 1.0), zorder=2)
     else:
-        panel.scatter(*seen.project(points).T, c=moved / largest, cmap="viridis", vmin=0.0, vmax=1.0, s=9)
+        x, y = seen.project(points).T
+        panel.scatter(x, y, c=moved / largest, cmap="viridis", vmin=0.0, vmax=1.0, s=9)
     line = seen.project(rest if not is_rod(bundle) else bundle["node_position"].values)
     panel.plot(*line.T, color=SOFT, lw=0.8 if is_rod(bundle) else 0.0, ls="--", zorder=3)
     both = np.concatenate([seen.project(surface(bundle, q, sign * factor)[0]) for sign in (1.0, -1.0)] + [line])
@@ -98,6 +99,8 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, share: f
 def scale_to_size(bundle: xr.Dataset, q: np.ndarray, factor: float, rest: np.ndarray) -> float:
     """The largest drawn displacement [m] of a shape: of its centre line, or of its skin where that rests."""
     points, size = surface(bundle, q, factor)
-    return max(float(size.max()), 1e-300) if size.max() > 1e-9 * np.ptp(rest) else float(
-        np.linalg.norm(points - rest, axis=1).max()
+    return (
+        max(float(size.max()), 1e-300)
+        if size.max() > 1e-9 * np.ptp(rest)
+        else float(np.linalg.norm(points - rest, axis=1).max())
     )

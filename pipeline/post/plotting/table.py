@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import html
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -62,10 +63,12 @@ def from_markdown(text: str) -> Table:
 
 
 def as_html(table: Table, *, prose: bool = False) -> str:
-    """A ``<figure>`` with the table and its notes; `prose`: whether cells hold sentences. Pages let its columns sort."""
+    """A ``<figure>`` with the table and its notes; `prose`: whether cells hold sentences."""
     head = "".join(f"<th scope='col'>{html.escape(column)}</th>" for column in table.columns)
     rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>\n" for row in table.rows)
-    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in table.notes)
+    # links between pages of the documentation lead nowhere from here
+    told = [re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", note) for note in table.notes]
+    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in told)
     caption = html.escape(table.title)
     return (
         f"<figure class='table'><figcaption>{caption}</figcaption>\n<div "

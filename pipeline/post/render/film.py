@@ -27,7 +27,7 @@ from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata,
 from flexclear.pipeline.post.render.view import ANGLE, eye
 from flexclear.pipeline.post.render.writing import RATE, write
 
-VIEW, SIDE, HEIGHT = 688, 272, 540
+VIEW, SIDE, HEIGHT = 656, 304, 540
 
 
 @dataclass(frozen=True, slots=True)

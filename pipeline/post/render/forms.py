@@ -15,11 +15,9 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.core.workflow import opened
-from flexclear.pipeline.post.render import surfaces
-from flexclear.pipeline.post.render.solids import Solid, equivalent
+from flexclear.pipeline.post.render import shape_files, surfaces
+from flexclear.pipeline.post.render.solids import Solid
 from flexclear.pipeline.post.render.surfaces import Surface
 
 #: half width of a link as a share of the mechanism's size, and of the distance of its joints at most
@@ -52,8 +50,8 @@ class Seat:
 def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int = 0) -> Surface:
     """Surface of a body in its own axes [m]; empty where the joints' own balls are all there is.
 
-    com: centre of mass [m].  solid: what has its inertia, about that.  size: of the mechanism [m].  layer: counts bodies, so
-    that flat links in one plane are not equally thick and their faces do not lie in each other.
+    com: centre of mass [m].  solid: what has its inertia, about that.  size: of the mechanism [m].  layer: counts
+    bodies, so that flat links in one plane are not equally thick and their faces do not lie in each other.
     """
     joined = [seat for seat in seats if seat.joint != "fixed"] or list(seats)
     places = _apart([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
@@ -91,47 +89,10 @@ def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
         elif kind == "sphere":
             part = surfaces.sphere(shape["radius"])
         else:
-            part = read(folder / shape["file"], float(shape.get("unit", 1.0)))
+            part = shape_files.read(folder / shape["file"], float(shape.get("unit", 1.0)))
         pose = Pose.model_validate(shape.get("pose", {}))
         found.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
     return surfaces.merged(found)
-
-
-def read(path: Path, unit: float) -> Surface:
-    """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
-    import meshio
-
-    opened.note(path)  # some readers are not written in Python
-    try:
-        mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio ends the process for what it does not know
-        said = str(error) if not isinstance(error, SystemExit) else "meshio does not know its format"
-        raise InputError(f"{path}", f"is no surface that can be drawn: {said}", "give an STL, VTK, PLY or OBJ file") from None
-    faces = []
-    for block in mesh.cells:
-        if block.type in ("triangle", "quad"):
-            faces.append(surfaces.triangulated(block.data.astype(int)))
-        elif block.type in _SIDES:
-            faces.append(_boundary(block.data.astype(int), _SIDES[block.type]))
-    if not faces:
-        raise InputError(f"{path}", "has no triangles, quadrangles, tetrahedra or hexahedra", "export a surface")
-    points = np.zeros((len(mesh.points), 3))
-    points[:, : mesh.points.shape[1]] = unit * mesh.points
-    return surfaces.shaded(points, np.concatenate(faces), sharp=True)
-
-
-#: faces of cells, by their corners, seen from outside
-_SIDES = {
-    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
-    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
-}
-
-
-def _boundary(cells: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Triangles of the faces that belong to one cell only."""
-    faces = cells[:, list(sides)].reshape(-1, len(sides[0]))
-    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return surfaces.triangulated(faces[first[count == 1]])
 
 
 def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
@@ -157,7 +118,7 @@ def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Sol
     half = solid.half * min(1.0, LARGEST * size / float(solid.half.max()))
     if kinds and np.ptp(half) <= 1e-9 * half.max():  # alike about all axes and fixed to something: a ball
         return surfaces.moved(surfaces.sphere(float(half[0])), com)
-    part = surfaces.cylinder(half[0], 2.0 * half[2]) if solid.round else surfaces.box(2.0 * half)
+    part = surfaces.cylinder(half[0], 2.0 * half[2]) if solid.round else surfaces.box(tuple(2.0 * half))
     return surfaces.moved(part, com, solid.axes)
 
 
@@ -169,9 +130,7 @@ def _arm(place: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
         far = com + half * axis
         return surfaces.bar(place, far, _thickness(solid, axis, width))
     radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
-    return surfaces.merged(
-        [surfaces.bar(place, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)]
-    )
+    return surfaces.merged([surfaces.bar(place, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
 
 
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
@@ -234,6 +193,3 @@ def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
         if all(np.linalg.norm(place - other) > same for other in found):
             found.append(place)
     return np.array(found).reshape(-1, 3)
-
-
-__all__ = ["Seat", "equivalent", "link", "read", "shapes"]

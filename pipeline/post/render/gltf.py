@@ -46,7 +46,11 @@ class _File:
     def node(self, name: str, shape: Surface, color: str, opacity: float, fields: np.ndarray | None = None) -> int:
         """The number of a node with this surface, and morph targets where fields are given."""
         material: dict[str, Any] = {
-            "pbrMetallicRoughness": {"baseColorFactor": [*_linear(color), opacity], "metallicFactor": 0.1, "roughnessFactor": 0.6}
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [*_linear(color), opacity],
+                "metallicFactor": 0.1,
+                "roughnessFactor": 0.6,
+            }
         }
         self.told["materials"].append(material | ({"alphaMode": "BLEND"} if opacity < 1.0 else {}))
         primitive: dict[str, Any] = {
@@ -78,7 +82,9 @@ class _File:
     def bytes(self, title: str) -> bytes:
         """The file, as GLB."""
         # the world's z is up here, y in glTF
-        self.told["nodes"].append({"name": title, "children": list(range(len(self.told["nodes"]))), "rotation": [-(0.5**0.5), 0, 0, 0.5**0.5]})
+        self.told["nodes"].append(
+            {"name": title, "children": list(range(len(self.told["nodes"]))), "rotation": [-(0.5**0.5), 0, 0, 0.5**0.5]}
+        )
         told = {
             "asset": {"version": "2.0", "generator": "flexclear"},
             "scene": 0,

@@ -19,7 +19,9 @@ from flexclear.pipeline.post.series import derive
 SIZE, TRAIL = (9.6, 5.4), 0.02
 
 
-def frames(run: xr.Dataset, contact: int, seconds: float | None, slower: float | None, rate: int) -> Iterator[np.ndarray]:
+def frames(
+    run: xr.Dataset, contact: int, seconds: float | None, slower: float | None, rate: int
+) -> Iterator[np.ndarray]:
     """Pictures of shape (540, 960, 3)."""
     with style.style():
         canvas = FigureCanvasAgg(Figure(figsize=SIZE, dpi=100, layout=ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12)))

@@ -198,7 +198,11 @@ def _bodies(
             continue
         if name in bundles:
             if own is not None:  # beside the deformed mesh: what is fixed to it
-                yield Part(names.index(name), surfaces.moved(own, -_centre_at_rest(bundles[name])), look.get("color", COLORS[0]))
+                yield Part(
+                    names.index(name),
+                    surfaces.moved(own, -_centre_at_rest(bundles[name])),
+                    look.get("color", COLORS[0]),
+                )
             continue
         if "inertia" not in body:
             continue
@@ -252,8 +256,12 @@ def _joints(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.D
             grounded = first.partition(".")[0] not in _names(run, "body")
             yield at(first, rail, GROUND_COLOR if grounded else JOINT_COLOR)
         elif kind == "universal":
-            yield at(first, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _X), color)
-            yield at(second, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _Y), color)
+            yield at(
+                first, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _X), color
+            )
+            yield at(
+                second, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _Y), color
+            )
         elif kind == "planar":
             yield at(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
@@ -291,8 +299,12 @@ def _seated(
     if body not in bodies:
         return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
     if frame in frames:
-        return Part(bodies.index(body), surfaces.moved(part, np.zeros(3), axes), color, opacity, frames.index(frame), contact)
-    com = _centre_at_rest(bundles[body]) if body in bundles else np.array(told["body"][body].get("com", (0.0, 0.0, 0.0)))
+        return Part(
+            bodies.index(body), surfaces.moved(part, np.zeros(3), axes), color, opacity, frames.index(frame), contact
+        )
+    com = (
+        _centre_at_rest(bundles[body]) if body in bundles else np.array(told["body"][body].get("com", (0.0, 0.0, 0.0)))
+    )
     return Part(bodies.index(body), surfaces.moved(part, origin - com, axes), color, opacity, contact=contact)
 
 

@@ -102,13 +102,18 @@ def arrow(place: np.ndarray, way: np.ndarray, thick: float) -> Surface:
     points = np.vstack([base, [0.0, 0.0, length], [0.0, 0.0, length - head]])
     ring, n = np.arange(len(rim)), len(rim)
     after = np.roll(ring, -1)
-    cone = np.concatenate([np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])])
+    cone = np.concatenate(
+        [np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])]
+    )
     return surfaces.moved(surfaces.merged([shaft, surfaces.shaded(points, cone)]), place, surfaces.along(way))
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Forces on bodies with the places where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
-    told, frames = parameters(run), {str(name): k for k, name in enumerate(run["frame"].values)} if "frame" in run.coords else {}
+    told, frames = (
+        parameters(run),
+        {str(name): k for k, name in enumerate(run["frame"].values)} if "frame" in run.coords else {},
+    )
     for family, variable, dim in (("joint", "joint_force", "joint"), ("load", "load_force", "load")):
         if variable not in run:
             continue
@@ -128,12 +133,14 @@ def vtp(shape: Surface, data: dict[str, np.ndarray]) -> bytes:
     polygons = shape.triangles
     arrays = "".join(_array(name, values) for name, values in data.items())
     return (
-        '<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n'
         f'<PolyData><Piece NumberOfPoints="{len(shape.points)}" NumberOfPolys="{len(polygons)}" NumberOfVerts="0" '
         'NumberOfLines="0" NumberOfStrips="0">\n'
-        f'<PointData>{_array("Normals", shape.normals)}{arrays}</PointData>\n'
-        f'<Points>{_array("Points", shape.points)}</Points>\n'
-        f'<Polys>{_array("connectivity", polygons.ravel())}{_array("offsets", 3 * np.arange(1, len(polygons) + 1))}</Polys>\n'
+        f"<PointData>{_array('Normals', shape.normals)}{arrays}</PointData>\n"
+        f"<Points>{_array('Points', shape.points)}</Points>\n"
+        f"<Polys>{_array('connectivity', polygons.ravel())}"
+        f"{_array('offsets', 3 * np.arange(1, len(polygons) + 1))}</Polys>\n"
         "</Piece></PolyData>\n</VTKFile>\n"
     ).encode()
 
@@ -143,6 +150,5 @@ def _array(name: str, values: np.ndarray) -> str:
     data = np.ascontiguousarray(values, dtype="<i4" if whole else "<f4")
     components = f' NumberOfComponents="{data.shape[1]}"' if data.ndim == 2 else ""
     content = base64.b64encode(np.uint64(data.nbytes).tobytes() + data.tobytes()).decode()
-    return f'<DataArray type="{"Int32" if whole else "Float32"}" Name="{name}"{components} format="binary">{content}</DataArray>\n'
-
-
+    kind = "Int32" if whole else "Float32"
+    return f'<DataArray type="{kind}" Name="{name}"{components} format="binary">{content}</DataArray>\n'

@@ -1,4 +1,4 @@
-"""What can be made of a run, its reduced bodies and its vibrations: pictures, films, pages, files for other programs."""
+"""What is made of a run, its reduced bodies and its vibrations: pictures, films, pages, files for other programs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.post.pages import viewer, viewer_page
+from flexclear.pipeline.post.overview.page import viewer_page
+from flexclear.pipeline.post.pages import viewer
 from flexclear.pipeline.post.render import gl, gltf, pace, paraview, player
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.series import derive
@@ -97,7 +98,7 @@ def _film_module() -> Any:
 
 
 def _motion_page(shown: Shown) -> dict[str, bytes]:
-    return {"motion.html": viewer_page(shown.name("motion"), "", [viewer(player.motion(shown.mechanism()), "Motion")])}
+    return {"motion.html": viewer_page(shown.name("motion"), [viewer(player.motion(shown.mechanism()), "Motion")])}
 
 
 def _motion_gltf(shown: Shown) -> dict[str, bytes]:
@@ -151,14 +152,17 @@ def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
 def _mode_pages(shown: Shown) -> dict[str, bytes]:
     return {
         f"modes_{body}.html": viewer_page(
-            shown.name(f"modes of {body}"), "", [viewer(player.modes(bundle), f"{body}: {bundle.sizes['mode']} modes", play=True)]
+            shown.name(f"modes of {body}"),
+            [viewer(player.modes(bundle), f"{body}: {bundle.sizes['mode']} modes", play=True)],
         )
         for body, bundle in _bodies(shown).items()
     }
 
 
 def _mode_gltf(shown: Shown) -> dict[str, bytes]:
-    return {f"modes_{body}.glb": gltf.modes(body, bundle, player.scales(bundle)) for body, bundle in _bodies(shown).items()}
+    return {
+        f"modes_{body}.glb": gltf.modes(body, bundle, player.scales(bundle)) for body, bundle in _bodies(shown).items()
+    }
 
 
 def _mode_series(shown: Shown) -> dict[str, bytes]:
@@ -209,7 +213,7 @@ def _vibration_page(shown: Shown) -> dict[str, bytes]:
         raise InputError("--what vibrations", "the mechanism has no motion that vibrates in this pose")
     told = player.vibrations(drawn, shown.linear)
     count = shown.linear.sizes["vibration"]
-    page = viewer_page(shown.name("natural vibrations"), "", [viewer(told, f"{count} natural vibrations", play=True)])
+    page = viewer_page(shown.name("natural vibrations"), [viewer(told, f"{count} natural vibrations", play=True)])
     return {"vibrations.html": page}
 
 

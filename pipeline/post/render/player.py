@@ -61,12 +61,9 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
     names = [f"mode {k + 1}: {hertz(f)}" for k, f in enumerate(bundle["frequency"].values)]
     scale = scales(bundle)
     shapes = [
-        {"label": name, "fields": [k, None], "scale": float(scale[k]), "largest": float(scale[k] * largest[k]) or 1.0}
+        {"label": name, "fields": [k, None], "scale": float(scale[k]), "largest": float(largest[k]) or 1.0}
         for k, name in enumerate(names)
     ]
-    # the viewer weighs by factor and scale, and colours by the share of `largest`
-    for shape in shapes:
-        shape["largest"] = shape["largest"] / shape["scale"]
     mesh = _skin(bundle, rest) | {"fields": [_scaled(values) for values in fields], "track": -1}
     ghost = _skin(bundle, rest) | {"track": -1, "opacity": 0.18, "color": "#7c8894"}
     return {"meshes": [mesh, ghost], "shapes": shapes, "unit": 1.0, **_camera(side(bundle), rest)}
@@ -80,8 +77,8 @@ def scales(bundle: xr.Dataset) -> np.ndarray:
 def vibrations(drawn: Mechanism, linear: xr.Dataset) -> dict[str, Any]:
     """The natural vibrations of a mechanism about a pose, for the viewer.
 
-    drawn: of the equilibrium as a run of one output (`as_run`).  linear: schema LINEAR; of each complex shape real and imaginary
-    part are shown in turn, so that running waves run.
+    drawn: of the equilibrium as a run of one output (`as_run`).  linear: schema LINEAR; of each complex shape real and
+    imaginary part are shown in turn, so that running waves run.
     """
     count, motions = linear.sizes["vibration"], body_motions(drawn.run, linear, drawn.flexible)
     pieces = [(part, None) for part in drawn.parts] + [(None, body) for body in drawn.flexible]
@@ -107,10 +104,12 @@ def vibrations(drawn: Mechanism, linear: xr.Dataset) -> dict[str, Any]:
             told.pop("normals", None)
     shapes = [
         {
-            "label": f"vibration {k + 1}: {hertz(linear['frequency'].values[k])}, damping {linear['damping_ratio'].values[k]:.2g}",
+            "label": f"vibration {k + 1}: {hertz(frequency)}, damping {damping:.2g}",
             "fields": [2 * k, 2 * k + 1], "scale": float(scale[k]), "largest": float(largest[k]) or 1.0,
         }
-        for k in range(count)
+        for k, (frequency, damping) in enumerate(
+            zip(linear["frequency"].values, linear["damping_ratio"].values, strict=True)
+        )
     ]  # fmt: skip
     return {"meshes": meshes, "shapes": shapes, "unit": 1.0, **_camera(drawn.view, drawn.cloud, drawn.looks.zoom)}
 
@@ -141,7 +140,7 @@ def linear_fields(body: Flexible, rest: np.ndarray) -> np.ndarray:
 
 
 def field(bundle: xr.Dataset, mode: int, rest: np.ndarray) -> np.ndarray:
-    """How each point of a body's skin moves per unit of a modal coordinate, (point, 3); `rest` are the points at zero."""
+    """How each point of a body's skin moves per unit of a modal coordinate, (point, 3); `rest`: the points at zero."""
     q = np.zeros(bundle.sizes["mode"])
     q[mode] = SMALL
     moved: np.ndarray = (surface(bundle, q)[0] - rest) / SMALL
@@ -174,10 +173,12 @@ def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray)
 Motions = Mapping[int, tuple[np.ndarray, np.ndarray]]
 
 
-def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexible]) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """How each body moves in the vibrations, from one of its named frames; what a flexible body's bends there is taken off.
+def body_motions(
+    run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexible]
+) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """How each body moves in the vibrations, from one of its named frames; bodies without one rest.
 
-    Bodies without a named frame rest.
+    What a flexible body bends there is taken off.
     """
     bent = {body.index: body for body in flexible}
     frames = [str(name) for name in linear["frame"].values]
@@ -203,7 +204,9 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
 
 def as_run(linear: xr.Dataset) -> xr.Dataset:
     """An equilibrium as a run of one output, in which nothing moves."""
-    still = linear[[n for n in ("position", "quaternion", "frame_position", "modal_coordinate", "joint_position") if n in linear]]
+    still = linear[
+        [n for n in ("position", "quaternion", "frame_position", "modal_coordinate", "joint_position") if n in linear]
+    ]
     zero = xr.zeros_like(linear["position"])
     return still.assign(velocity=zero, angular_velocity=zero).expand_dims(time=[0.0]).assign_attrs(linear.attrs)
 

@@ -99,7 +99,9 @@ def box(size: Sequence[float]) -> Surface:
 def sphere(radius: float) -> Surface:
     """About the origin."""
     across = ROUND // 2
-    theta, phi = np.meshgrid(np.linspace(0.0, np.pi, across + 1), np.linspace(0.0, 2.0 * np.pi, ROUND + 1), indexing="ij")
+    theta, phi = np.meshgrid(
+        np.linspace(0.0, np.pi, across + 1), np.linspace(0.0, 2.0 * np.pi, ROUND + 1), indexing="ij"
+    )
     normals = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
     return Surface(radius * normals.reshape(-1, 3), normals.reshape(-1, 3), grid(across + 1, ROUND + 1))
 
@@ -129,7 +131,9 @@ def shaded(points: np.ndarray, triangles: np.ndarray, *, sharp: bool = False) ->
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     if sharp:
-        return Surface(corners.reshape(-1, 3), np.repeat(_unit(normal), 3, axis=0), np.arange(3 * len(corners)).reshape(-1, 3))
+        return Surface(
+            corners.reshape(-1, 3), np.repeat(_unit(normal), 3, axis=0), np.arange(3 * len(corners)).reshape(-1, 3)
+        )
     total = np.zeros_like(points)
     for k in range(3):
         np.add.at(total, triangles[:, k], normal)
