@@ -20,7 +20,7 @@ from flexclear.pipeline.post.plotting.style import SOFT
 #: modes beside each other, and drawn size of the largest displacement as a share of the body's length
 COLUMNS, SHARE = 3, 0.14
 #: pictures of one vibration in a film
-FRAMES = 24
+FRAMES = 16
 
 
 def files(name: str, body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> dict[str, bytes]:
@@ -33,15 +33,23 @@ def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -
     """One vibration of all modes, pictures of shape (height, width, 3)."""
     with style.style():
         seen = view(towards, up)
+        drawn: dict[float, np.ndarray] = {}  # on the way back bodies look as on the way out
         for phase in np.linspace(0.0, 2.0 * np.pi, FRAMES, endpoint=False):
-            figure = _sheet(body, bundle, seen, float(np.sin(phase)))
-            buffer = io.BytesIO()
-            figure.savefig(buffer, format="rgba", dpi=80)
-            plt.close(figure)
-            width, height = (int(v) for v in figure.get_size_inches() * 80)
-            pixels = np.frombuffer(buffer.getvalue(), dtype=np.uint8).reshape(height, width, 4)
-            # films want even numbers of pixels
-            yield pixels[: height - height % 2, : width - width % 2, :3].copy()
+            share = round(float(np.sin(phase)), 6)
+            if share not in drawn:
+                drawn[share] = _pixels(_sheet(body, bundle, seen, share))
+            yield drawn[share]
+
+
+def _pixels(figure: Figure) -> np.ndarray:
+    """A figure as a picture, and closed."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="rgba", dpi=80)
+    plt.close(figure)
+    width, height = (int(v) for v in figure.get_size_inches() * 80)
+    pixels = np.frombuffer(buffer.getvalue(), dtype=np.uint8).reshape(height, width, 4)
+    # films want even numbers of pixels
+    return pixels[: height - height % 2, : width - width % 2, :3].copy()
 
 
 def _sheet(body: str, bundle: xr.Dataset, seen: View, share: float) -> Figure:

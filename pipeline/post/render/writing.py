@@ -35,7 +35,7 @@ def write(frames: Iterator[np.ndarray], rate: int, kind: str = "mp4") -> tuple[s
                 "21",
             ]
             writer = imageio.get_writer(
-                path, fps=rate, codec="libx264", quality=None, macro_block_size=16, output_params=options
+                path, fps=rate, codec="libx264", quality=None, macro_block_size=2, output_params=options
             )
         except (ImportError, RuntimeError, ValueError):
             path = Path(folder) / "film.gif"
