@@ -127,7 +127,7 @@ def browser() -> Iterator[Browser]:
                 window.ask("DELETE", "")
         finally:
             process.terminate()
-            process.wait()
+            process.communicate()
 
 
 def _port(process: subprocess.Popen[str]) -> int:

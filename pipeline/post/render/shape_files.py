@@ -24,7 +24,8 @@ def read(path: Path, unit: float) -> Surface:
 
     opened.note(path)  # some readers are not written in Python
     try:
-        mesh = meshio.read(path)
+        with np.errstate(over="ignore"):  # meshio takes text for the length of a binary file, to see that it is none
+            mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio ends the process for what it does not know
         said = str(error) if not isinstance(error, SystemExit) else "meshio does not know its format"
         raise InputError(
