@@ -36,7 +36,10 @@ def collect(
     attributes: scene -> attributes of its run.  rendered: the scene whose film and views are shown.  source: folder
     with `docs` and `scenes`.  Whatever is not there is left out.
     """
-    tables = {path.stem: from_markdown(path.read_text()) for path in sorted((results / "tables").glob("table*.md"))}
+    tables = {
+        path.stem: from_markdown(path.read_text(encoding="utf-8"))
+        for path in sorted((results / "tables").glob("table*.md"))
+    }
     images = {name: results / "figures" / f"{name}.png" for name in figures.NAMES}
     drawn = {name: path.read_bytes() for name, path in images.items() if path.is_file()}
     folder = results / "runs" / rendered

@@ -146,7 +146,7 @@ def solid(corners: int) -> xr.Dataset:
     return xr.Dataset(
         {
             "node_position": (("node", "axis"), np.stack([x, y, 0.0 * x], axis=1)),
-            "cell": (("cell", "corner"), cell),
+            "cell_node": (("cell", "corner"), cell),
             "radius": (("cell",), np.zeros(len(cell))),
             "shape_translation": (("node", "axis", "mode"), shape),
             "shape_rotation": (("node", "axis", "mode"), 0.0 * shape),

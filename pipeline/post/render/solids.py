@@ -1,4 +1,4 @@
-"""The uniform cylinder or box that has a body's mass and inertia: for rods, plates and discs that is the body itself."""
+"""The uniform cylinder or box with a body's mass and inertia: of rods, plates and discs that is the body itself."""
 
 from __future__ import annotations
 
