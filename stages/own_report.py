@@ -28,6 +28,8 @@ FIGURES = {
         "Joints with clearance",
         "Path of the ball or pin in its socket, the gap, and the normal force over time",
     ),
+    "wear.png": ("Wear of contacts", "Load times sliding way over time, and how deep the surfaces wear over the angle"),
+    "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
     "energy.png": ("Energy", "Energies over time, and what their ledger misses"),
 }
 #: of a run's attributes, those that tell how it was made

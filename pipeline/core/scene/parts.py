@@ -22,6 +22,7 @@ from flexclear.pipeline.core.scene.fields import (
     Time,
     Velocity,
 )
+from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
@@ -179,11 +180,18 @@ class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z.
 
     A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
-    `pipeline.dynamics.joints.planar`.
+    `pipeline.dynamics.joints.planar`.  friction: follows the force that the joint carries; absent means none.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
     between: tuple[FrameName, FrameName]
+    friction: JointFriction | None = None
+
+    @model_validator(mode="after")
+    def _rubs(self) -> IdealJoint:
+        if self.friction is not None:
+            require_fitting(self.type, self.friction)
+        return self
 
 
 #: types of ideal joints

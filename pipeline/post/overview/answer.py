@@ -123,6 +123,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
     there = {
         "clearance": loose,
         "contact friction": [f"{n} ({joint[n]['friction']['law']})" for n in loose if joint[n].get("friction")],
+        "wear": [n for n in loose if joint[n].get("wear")],
         "flexible bodies": [f"{n} ({body[n]['modes']['reference']})" for n in flexible],
         "damping of flexible bodies": [n for n in flexible if body[n].get("damping") is not None],
         "geometric stiffening": [n for n in flexible if body[n].get("stiffening") is not None],
@@ -130,7 +131,8 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "springs, dampers, bushings": [
             n for n, p in load.items() if p["type"] in ("spring-damper", "joint-spring", "bushing")
         ],
-        "joint friction": [n for n, part in load.items() if part["type"] == "joint-friction"],
+        "joint friction": [n for n, part in load.items() if part["type"] == "joint-friction"]
+        + [n for n, part in joint.items() if n not in loose and part.get("friction")],
         "controllers": [n for n, part in load.items() if "pid" in part["type"]],
         "other forces": [n for n, p in load.items() if p["type"] in ("point-force", "point-torque", "joint-force")],
         "stops": list(scene.get("stop", {})),
