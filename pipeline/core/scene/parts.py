@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
+from flexclear.pipeline.core.scene.appearance import Seen
 from flexclear.pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
@@ -27,14 +28,14 @@ from flexclear.pipeline.core.units import quantity
 Positive = Field(gt=0.0)
 
 
-class Ground(Part):
+class Ground(Seen):
     """The fixed world; listed only to give it frames."""
 
     type: Literal["ground"]
     frames: dict[PartName, Pose] = Field(default_factory=dict)
 
 
-class RigidBody(Part):
+class RigidBody(Seen):
     """Mass, centre of mass and inertia about it, all in the body frame."""
 
     type: Literal["rigid"]
@@ -112,7 +113,7 @@ class Stiffening(Part):
     """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
 
 
-class FlexibleBody(Part):
+class FlexibleBody(Seen):
     """A body reduced from a mesh; its frames are those of the recipe.
 
     pose: start pose of the undeformed mesh frame.
@@ -130,7 +131,7 @@ class FlexibleBody(Part):
     angular_velocity: AngularVelocity | None = None
 
 
-class MeshedRigidBody(Part):
+class MeshedRigidBody(Seen):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
     ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.

@@ -35,6 +35,7 @@ from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from flexclear.pipeline.core.units import quantity
 
+Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it tells the whole relative motion
 SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
@@ -123,13 +124,30 @@ class View(Part):
     mechanism its normal, else from above and in front.
     """
 
-    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    direction: Direction | None = None
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+        default=None, description="quantities that comparisons, tables and films show, as 'platform.position'"
+    )
+    direction: Direction | None = Field(default=None, description="vector from the mechanism to the eye, world axes")
+    up: Direction | None = Field(
+        default=None, description="what is up in pictures, world axes; default: against gravity, else z"
+    )
+    zoom: Annotated[Number, Positive] | None = Field(
+        default=None, description="how many times larger than usual the mechanism is drawn"
+    )
+    exaggeration: Annotated[Number, Positive] | None = Field(
+        default=None, description="how many times larger than computed deformations are drawn; default: to be seen"
+    )
+    duration: Annotated[Time, Positive] | None = Field(default=None, description="of films; default: some 4 s")
+    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = Field(
+        default=None,
+        description="how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly",
+    )
 
     @model_validator(mode="after")
     def _points(self) -> View:
-        if self.direction is not None and not any(self.direction):
-            raise ValueError("a direction of length zero points nowhere")
+        for asked in (self.direction, self.up):
+            if asked is not None and not any(asked):
+                raise ValueError("a direction of length zero points nowhere")
         return self
 
 
