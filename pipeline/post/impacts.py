@@ -13,11 +13,11 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
 
     Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
     that of the next opening of the same contact.  Of one that the run's end cuts short, separation
-    speed and duration are NaN.
+    speed, duration, impulse and losses are NaN.
     """
     if "event_time" not in run or "contact" not in run.sizes:
         return {}
-    contact = run.event_contact.values.astype(int)
+    contact, names = run.event_contact.values, [str(name) for name in run.contact.values]
     speed = run.event_approach_speed.values
     closings, openings = of_kind(run, "closing"), of_kind(run, "opening")
     strong = np.flatnonzero(closings & (speed > IMPACT))
@@ -30,18 +30,40 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
         "impact_separation_speed": (("impact",), np.where(ended, speed[opens], np.nan)),
         "impact_peak_force": (("impact",), run.event_peak_force.values[strong]),
         "impact_duration": (("impact",), np.where(ended, run.event_time.values[opens] - begun, np.nan)),
-        "impact_count": (("contact",), np.bincount(contact[strong], minlength=run.sizes["contact"])),
+        "impact_count": (
+            ("contact",),
+            np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
+        ),
+        **_books(run, contact[strong], begun, np.where(ended, run.event_time.values[opens], np.nan)),
     }
+
+
+#: what the run's ledger books of contacts, by the name that an impact's share of it has
+BOOKS = {
+    "impact_impulse": "contact_impulse",
+    "impact_damping_loss": "contact_damping_loss",
+    "impact_friction_loss": "contact_friction_loss",
+}
+
+
+def _books(
+    run: xr.Dataset, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
+) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
+    time, found = run.time.values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
+    for name, book in BOOKS.items():
+        if book in run:
+            values, shares = run[book].values, np.full(len(contact), np.nan)
+            names = list(run.contact.values)
+            for i, c in enumerate(names.index(name) for name in contact):
+                shares[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
+            found[name] = (("impact",), shares)
+    return found
 
 
 def of_kind(run: xr.Dataset, name: str) -> np.ndarray:
     """True for the events of a kind, e.g. those that close a gap, shape (event,)."""
-    kind = run.event_kind.values
-    if kind.dtype.kind in "US" or kind.dtype == object:
-        return np.array([str(k) == name for k in kind], dtype=bool)
-    meanings = str(run.event_kind.attrs.get("flag_meanings", "opening closing")).split()
-    values = np.atleast_1d(run.event_kind.attrs.get("flag_values", np.arange(len(meanings))))
-    return np.asarray(kind == values[meanings.index(name)])
+    return np.asarray(run.event_kind.values == name, dtype=bool)
 
 
 def _next_opening(i: int, contact: np.ndarray, openings: np.ndarray) -> int:
