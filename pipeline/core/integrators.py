@@ -60,5 +60,6 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
             "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),
         "radau": Traits("radau", 5, implicit=True, tolerances=TO_1E_9),
+        "exponential": Traits("exponential", 6, implicit=True, retracts=True, tolerances=TO_1E_9),
     }
 )
