@@ -34,7 +34,7 @@ class Traits:
 
     module: of `pipeline.dynamics.integrate`, which holds its METHOD.
     order: the error of a run falls with this power of the step.
-    implicit: its steps solve equations, by Newton's method.
+    implicit: its steps solve equations, by iteration.
     multistep: its steps use slopes of earlier ones, so that it is begun by a one-step method.
     estimates: it estimates its error, by which steps can be chosen; otherwise a scene must give their length.
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
