@@ -59,7 +59,7 @@ class Error:
 
 @dataclass(frozen=True)
 class Rung:
-    """One of our runs: integrator and tolerance, its time once [s], how wrong it is, and how to time it once more [s]."""
+    """One of our runs: by what, its time once [s], how wrong it is, and how to time it once more [s]."""
 
     integrator: str
     rtol: float

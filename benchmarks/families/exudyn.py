@@ -149,9 +149,7 @@ def _reaches(level: float, error: Error) -> bool:
     return error.relative <= level
 
 
-def _side_by_side(
-    again: Callable[[], Outcome], first: Outcome, rungs: list[Rung]
-) -> tuple[float, dict[str, float]]:
+def _side_by_side(again: Callable[[], Outcome], first: Outcome, rungs: list[Rung]) -> tuple[float, dict[str, float]]:
     """Median times [s] of theirs, and of ours by name, measured in turns."""
     theirs, ours = [first.seconds], {_name(rung): [rung.time()] for rung in rungs}
     for _ in range(REPEATS - 1):

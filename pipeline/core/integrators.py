@@ -21,8 +21,6 @@ TO_1E_9, TO_1E_13 = (tuple(10.0**-k for k in range(3, last + 1)) for last in (9,
 STEPS = (1e-4, 3e-5, 1e-5, 3e-6)
 
 
-
-
 def by_need(flexible: bool) -> tuple[str, ...]:
     """Integrators among which one is chosen where a scene asks for accuracy alone."""
     return (DEFAULT, *((VIBRATING,) if flexible else ()), STIFF)
@@ -71,8 +69,6 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
             "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),
         "radau": Traits("radau", 5, implicit=True, tolerances=TO_1E_9),
-        "exponential": Traits(
-            "exponential", 6, implicit=True, long_steps=True, retracts=True, tolerances=TO_1E_9
-        ),
+        "exponential": Traits("exponential", 6, implicit=True, long_steps=True, retracts=True, tolerances=TO_1E_9),
     }
 )

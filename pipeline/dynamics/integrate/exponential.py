@@ -28,7 +28,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import modal_basis, phi_functions
 from flexclear.pipeline.dynamics.integrate.method import Method, slope
 from flexclear.pipeline.dynamics.integrate.modal_basis import count, damping, lift, read, square, turn, work_rate
-from flexclear.pipeline.dynamics.integrate.newton import SMALL, limit
+from flexclear.pipeline.dynamics.integrate.newton import limit
 from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -154,7 +154,7 @@ def difference(h, w, step, coefficient, weights, out):
 # Departures -----------------------------------------------------------------------------------------------------------
 @kernel
 def depart(h, w, step, e):
-    """Departure of g at node e from its start, from the node's state in Y_STAGE, its slope, and the pair TOTAL of it."""
+    """Departure of g at node e from its start, by the node's state in Y_STAGE, its slope, and its pair TOTAL."""
     d, o, work = vector(h, DEPARTURE + e), basis(h), pair(h, SPARE)
     read(h, w, o, h[m.Y_STAGE], work)
     for i in range(2 * h[m.NV]):

@@ -87,7 +87,7 @@ def lifting(h, o, i):
 
 @kernel
 def response(h, o, j):
-    """Where w holds what mode j's root of the stiffness accelerates, the power that the drives bring in, and its rate."""
+    """Where w holds what mode j's root of the stiffness accelerates, the drives' power then, and its rate."""
     return lifting(h, o, h[m.NV] + j)
 
 

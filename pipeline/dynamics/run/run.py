@@ -102,7 +102,10 @@ def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
 
 
 def integrate(
-    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, judges: Mapping[str, tuple[Judge, str]] | None = None
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    judges: Mapping[str, tuple[Judge, str]] | None = None,
 ) -> Run:
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 

@@ -86,9 +86,9 @@ class Suit:
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""
         vibrating = VIBRATING in self.names and self.rates.all > APART * self.rates.held
-        if vibrating and self.by_stability > CHEAP and VIBRATING not in self.missed:
-            if self.cost(VIBRATING, rtol) < self.cost(DEFAULT, rtol):
-                return VIBRATING
+        vibrating = vibrating and self.by_stability > CHEAP and VIBRATING not in self.missed
+        if vibrating and self.cost(VIBRATING, rtol) < self.cost(DEFAULT, rtol):
+            return VIBRATING
         return STIFF if DEFAULT in self.missed else DEFAULT
 
     def why(self, rtol: float) -> str:
@@ -132,7 +132,9 @@ ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0}
 def suit(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Suit:
     """What is known of a scene before any run."""
     names = by_need(bool(scene.flexible()))
-    engine = engine_of(edited(scene, {"solver.integrator": VIBRATING if VIBRATING in names else DEFAULT}), bundles, silent)
+    engine = engine_of(
+        edited(scene, {"solver.integrator": VIBRATING if VIBRATING in names else DEFAULT}), bundles, silent
+    )
     start = consistent_start(engine)
     engine.select_pieces_after(engine.start)
     return Suit(rates(engine, start), engine.end - engine.start, names)
@@ -173,6 +175,6 @@ def _too_dear(engine: Engine, most: float) -> str:
     if whole < CLEARLY * most:
         return ""
     return (
-        f"at this pace the run takes {whole / DEARER:.2g} evaluations, while {DEFAULT} is stable with {most:.2g}: it is "
-        "not the vibrations of the modes that make it dear"
+        f"at this pace the run takes {whole / DEARER:.2g} evaluations, while {DEFAULT} is stable with {most:.2g}: "
+        "it is not the vibrations of the modes that make it dear"
     )
