@@ -5,12 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 
 from benchmarks.page import DOCS
-from benchmarks.site import datasets
+from benchmarks.site import datasets, keys
 
 #: page below docs/ -> what makes its text
-PAGES: dict[str, Callable[[], str]] = {"datasets.md": datasets.text}
+PAGES: dict[str, Callable[[], str]] = {
+    "datasets.md": datasets.text,
+    **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
+}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -30,8 +30,7 @@ class NormalLaw(Part):
 
     restitution: the law's own parameter c_r; a free impact rebounds with it only as well as the law
     achieves.  delivered_restitution: the rebound that a free impact is to have; the parameter
-    follows from it.  exponent: default 1.5, for linear laws 1.  damping [N s/m] and effective_mass
-    (default: the reduced mass of the two links): for linear laws only.
+    follows from it.  exponent: default 1.5, for linear laws 1.
     law: name of the law, as docs/contact.md lists them.  stiffness: K in force = K depth^exponent; without it, from
     materials and radii.  damping: of linear laws [N s/m].  effective_mass: of linear laws: mass that rebounds; default:
     the reduced mass of the two links.
@@ -102,9 +101,7 @@ class Ambrosio(Part):
 class LuGre(Part):
     """LuGre friction per unit of normal force.
 
-    bristle_stiffness [1/m], bristle_damping [s/m] and viscous [s/m]: sigma_0, sigma_1, sigma_2 over
-    the normal force; v_stribeck: speed over which friction falls from static to dynamic.
-
+    v_stribeck: speed over which friction falls from static to dynamic.
     static, dynamic: coefficients of friction.  bristle_stiffness, bristle_damping, viscous: sigma_0 [1/m], sigma_1
     [s/m] and sigma_2 [s/m], each over the normal force.
     """

@@ -98,6 +98,7 @@ class Accuracy(Part):
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
+    quantities: a file writes them without this key.
     allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
     """
 
