@@ -8,10 +8,12 @@ from collections.abc import Callable
 from functools import partial
 
 from benchmarks.page import DOCS
-from benchmarks.site import datasets, keys
+from benchmarks.site import datasets, index, keys, python
 
 #: page below docs/ -> what makes its text
 PAGES: dict[str, Callable[[], str]] = {
+    "index.md": index.text,
+    "reference/python.md": python.text,
     "datasets.md": datasets.text,
     **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
 }

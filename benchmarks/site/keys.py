@@ -29,8 +29,8 @@ _MODULE = re.compile(r"^flexclear__.*__(\w+?)__(?:recipe|beam_recipe)__(\w+)$|^f
 HEADS = {
     "scene": (
         "Keys of a scene",
-        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). Every part may say where its values '
-        "come from in `source`, either one text or one per key.",
+        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). Every part may say where its '
+        "values come from in `source`, either one text or one per key.",
     ),
     "recipe": (
         "Keys of a mesh recipe",
