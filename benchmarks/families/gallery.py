@@ -89,9 +89,9 @@ def _legs(forces: xr.DataArray) -> list[str]:
 
 def _robot_arm(run: xr.Dataset, scene: Scene) -> str:
     tip, seat = (run["frame_position"].sel(frame=f"arm.{end}") for end in ("tip", "seat"))
-    after = run["time"] > 0.4
-    angle = np.arctan2((tip - seat).sel(axis="y"), (tip - seat).sel(axis="x")).where(after, drop=True)
-    return f"The tip swings on by ±{1e3 * 0.6 * _amplitude(angle):.2g} mm about its new place."
+    way = (tip - seat).isel(time=(run["time"] > 0.4).values)
+    angle = np.arctan2(way.sel(axis="y").values, way.sel(axis="x").values)
+    return f"The tip swings on by ±{1e3 * 0.6 * 0.5 * float(np.ptp(angle)):.2g} mm about its new place."
 
 
 def _universal(run: xr.Dataset, scene: Scene) -> str:

@@ -20,6 +20,22 @@ from flexclear.pipeline.structure.fe.recipe import Recipe
 _QUANTITY = re.compile(r"(?:^|; )([a-z ]+): SI number, or text with a unit$")
 _VECTORS = ("length", "velocity", "angular velocity", "number", "acceleration", "angle")
 _OWN_UNIT = "SI number, or text with a unit that fits where the law stands"
+#: unit of a bare number
+SI = {
+    "length": "m",
+    "time": "s",
+    "mass": "kg",
+    "angle": "rad",
+    "velocity": "m/s",
+    "angular velocity": "rad/s",
+    "acceleration": "m/s^2",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "pressure": "Pa",
+    "density": "kg/m^3",
+    "area": "m^2",
+    "second moment of area": "m^4",
+}
 #: wherever all of these may stand, any law of time may
 _LAW_KINDS = {"Constant", "Step", "Harmonic"}
 #: names that are not made of words
@@ -56,12 +72,7 @@ EDITS = """## Edits of another file
 
 def page(kind: str) -> str:
     """The page of scenes, recipes or sweeps."""
-    schema = {
-        "scene": Scene.model_json_schema,
-        "sweep": Sweep.model_json_schema,
-        "recipe": TypeAdapter(Recipe).json_schema,
-    }
-    found: dict[str, Any] = schema[kind]()
+    found = _schema(kind)
     definitions = found.pop("$defs", {})
     title, text = HEADS[kind]
     parts = [f"# {title}\n\n{text} {WHERE}"]
@@ -72,6 +83,13 @@ def page(kind: str) -> str:
     for name in _order(found, definitions):
         parts.append(_section(name, definitions, examples))
     return "".join(parts).rstrip() + "\n"
+
+
+def _schema(kind: str) -> dict[str, Any]:
+    if kind == "recipe":
+        adapter: TypeAdapter[Any] = TypeAdapter(Recipe)
+        return adapter.json_schema()
+    return (Scene if kind == "scene" else Sweep).model_json_schema()
 
 
 def _order(schema: Any, definitions: dict[str, Any]) -> list[str]:
@@ -135,7 +153,8 @@ def _table(part: dict[str, Any], definitions: dict[str, Any]) -> str:
         if key == "source":
             continue
         default = "needed" if key in required else _default(told)
-        rows.append((f"`{key}`", _value(told, definitions), default, _meaning(told)))
+        meaning = "this kind" if "const" in told else _meaning(told)
+        rows.append((f"`{key}`", _value(told, definitions), default, meaning))
     return table(("key", "value", "default", "meaning"), rows) if rows else "It has no keys."
 
 
@@ -168,8 +187,13 @@ def _value(told: dict[str, Any], definitions: dict[str, Any]) -> str:
             return " or ".join(dict.fromkeys(kinds))
     quantity = _QUANTITY.search(str(told.get("description", "")))
     if quantity is not None:
-        return quantity[1]
+        return _with_unit(quantity[1])
     return _plain(told, definitions)
+
+
+def _with_unit(quantity: str) -> str:
+    """A quantity with the SI unit that a bare number of it has."""
+    return f"{quantity} [{SI[quantity]}]" if SI.get(quantity) else quantity
 
 
 def _plain(told: dict[str, Any], definitions: dict[str, Any]) -> str:
@@ -177,7 +201,7 @@ def _plain(told: dict[str, Any], definitions: dict[str, Any]) -> str:
     if kind == "array":
         vector = next((v for v in _VECTORS if str(told.get("description", "")).endswith(v)), "")
         if vector:
-            return f"three components, {vector}"
+            return f"three components, {_with_unit(vector)}"
         inner = told.get("items") or (told.get("prefixItems") or [{}])[0]
         return f"list of {_value(inner, definitions)}" if inner else "list"
     if kind == "object":

@@ -28,7 +28,7 @@ def _told(text: str, keys: Collection[str]) -> dict[str, str]:
     one = "(?:" + "|".join(re.escape(key) for key in sorted(keys, key=len, reverse=True)) + ")"
     marks = list(re.finditer(rf"(?:^|(?<=[.;:] ))({one}(?:, {one}| and {one})*)( \[[^\]]*\])?: ", text))
     ends = [mark.start() for mark in marks[1:]] + [len(text)]
-    found = {}
+    found: dict[str, str] = {}
     for mark, end in zip(marks, ends, strict=False):
         words = text[mark.end() : end].strip().removesuffix(".").removesuffix(";") + (mark[2] or "")
         found |= dict.fromkeys(re.split(", | and ", mark[1]), words)
