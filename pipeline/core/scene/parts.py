@@ -198,7 +198,8 @@ class IdealJoint(Part):
 
     A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
     `pipeline.dynamics.joints.planar`.
-    between: first frame, whose axes are those of motion, and second frame, each as body.FRAME.
+    type: which motion it leaves free.  between: first frame, whose axes are those of motion, and second frame, each as
+    body.FRAME.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
