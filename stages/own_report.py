@@ -22,6 +22,8 @@ FIGURES = {
     "motion.png": "Motion",
     "reactions.png": "Reactions and drives",
     "contacts.png": "Joints with clearance",
+    "wear.png": "Wear of contacts",
+    "joint_friction.png": "Friction of ideal joints",
     "energy.png": "Energy",
 }
 #: of a run's attributes, those that tell how it was made

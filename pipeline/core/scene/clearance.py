@@ -141,6 +141,18 @@ def _not_above(dynamic: float, static: float) -> None:
         )
 
 
+class Wear(Part):
+    """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area).
+
+    coefficient: k [-], for the pair of surfaces.  hardness: of the softer one.  sectors: into which both surfaces are
+    divided around their axis for the map of depths; a ball and its socket also into bands of equal area.
+    """
+
+    coefficient: Annotated[Number, Positive]
+    hardness: Annotated[Pressure, Positive]
+    sectors: Annotated[int, Field(ge=4, le=720)] = 36
+
+
 class _Contact(Part):
     """What all contacts between surfaces have.
 
@@ -164,7 +176,7 @@ class _Contact(Part):
 
 
 class _Clearance(_Contact):
-    """What all clearance joints have; clearance: radial."""
+    """What all clearance joints have; clearance: half the difference of the diameters."""
 
     clearance: Annotated[Length, Positive]
 
@@ -173,12 +185,14 @@ class ClearanceSpherical(_Clearance):
     """Ball in socket with radial clearance; between = [socket frame, ball frame].
 
     ball_radius: radius of the ball.  socket_material, ball_material: elastic constants, for the stiffness.
+    wear: of both surfaces; absent means none.
     """
 
     type: Literal["clearance-spherical"]
     ball_radius: Annotated[Length, Positive]
     socket_material: Material | None = None
     ball_material: Material | None = None
+    wear: Wear | None = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceSpherical:
@@ -201,6 +215,7 @@ class ClearanceRevolute(_Clearance):
 
     length: of the bearing, along the axis.
     pin_radius: radius of the pin.  journal_material, pin_material: elastic constants, for the stiffness.
+    wear: of both surfaces; absent means none.
     """
 
     type: Literal["clearance-revolute"]
@@ -208,6 +223,7 @@ class ClearanceRevolute(_Clearance):
     length: Annotated[Length, Positive]
     journal_material: Material | None = None
     pin_material: Material | None = None
+    wear: Wear | None = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceRevolute:

@@ -21,6 +21,7 @@ from flexclear.pipeline.core.scene.fields import (
     Time,
     Velocity,
 )
+from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
@@ -199,11 +200,18 @@ class IdealJoint(Part):
     A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
     `pipeline.dynamics.joints.planar`.
     type: which motion it leaves free.  between: first frame, whose axes are those of motion, and second frame, each as
-    body.FRAME.
+    body.FRAME.  friction: follows the force that the joint carries; absent means none.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
     between: tuple[FrameName, FrameName]
+    friction: JointFriction | None = None
+
+    @model_validator(mode="after")
+    def _rubs(self) -> IdealJoint:
+        if self.friction is not None:
+            require_fitting(self.type, self.friction)
+        return self
 
 
 #: types of ideal joints

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from flexclear.pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
+from flexclear.pipeline.core.scene.clearance import (
+    CONTACTS,
+    BallOnPlane,
+    Clearance,
+    ClearanceRevolute,
+    ClearanceSpherical,
+)
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from flexclear.pipeline.core.scene.gears import Gear
@@ -18,6 +24,7 @@ from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
     Ground,
+    IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
@@ -352,9 +359,18 @@ class Scene(Part):
         """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
 
+    def worn(self) -> dict[str, ClearanceRevolute | ClearanceSpherical]:
+        """Joints with clearance whose wear is asked for, by name."""
+        wearing = (ClearanceRevolute, ClearanceSpherical)
+        return {n: j for n, j in self.joint.items() if isinstance(j, wearing) and j.wear is not None}
+
     def stop_ends(self) -> list[str]:
         """Names of all ends of stops, as records have them."""
         return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
+
+    def rubbing(self) -> dict[str, IdealJoint]:
+        """Ideal joints with friction, by name."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, IdealJoint) and j.friction is not None}
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""
