@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.drives import PathDrive
@@ -111,7 +111,8 @@ def integrate(
 
     bundles: reduced flexible bodies by name.  judges: by integrator, who looks whether another one shall go on, and
     which; without them the explicit ones hand over where they would crawl.  Raises InputError for a scene that cannot
-    be built, SolverError when the run cannot go on.
+    be built, SolverError when the run cannot go on, StoppedError with the run so far as `partial` when it is asked to
+    stop.
     """
     made = _maker(scene, bundles, progress)
     engine = made("")
@@ -119,11 +120,22 @@ def integrate(
     mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
     for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
-    engine, trajectory, switched = follow(engine, start, progress, made, judges)
+    try:
+        engine, trajectory, switched = follow(engine, start, progress, made, judges)
+    except StoppedError as stopped:
+        if stopped.partial is not None:
+            last, there = stopped.partial
+            stopped.partial = Run(scene, last, there, observed(last, there), mended=mended)
+        raise
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, twin_of(engine, start, trajectory), switched, mended)
+    done = Run(scene, engine, trajectory, seen, None, switched, mended)
+    try:
+        return replace(done, twin=twin_of(engine, start, trajectory))
+    except StoppedError as stopped:
+        stopped.partial = done
+        raise
 
 
 def follow(
@@ -190,6 +202,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
+        if seen.status[bad[0]] == m.JAMMED:
+            raise SolverError(at + "friction of ideal joints jams the mechanism in the recorded state")
         if seen.status[bad[0]] == m.SINGULAR:
             lost = (
                 "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "
