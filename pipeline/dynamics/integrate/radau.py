@@ -170,7 +170,7 @@ def keep(h, f, w, n, step):
 
 @kernel
 def begin(h, f, w, n):
-    """No polynomial is known; the Jacobian holds until the iteration says otherwise, also in another mode of contact."""
+    """No polynomial is known; the Jacobian holds until the iteration says otherwise, whatever the contacts' modes."""
     w[h[m.MEMORY] + LAST_STEP] = 0.0
 
 
@@ -256,7 +256,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
     @kernel
     def jacobian(h, f, w, n):
-        """Change of all rates with all variables, at the start of the step; none of them depends on works and losses."""
+        """Change of all rates with all variables, at the start of the step; works and losses change none."""
         size, near = h[m.NY], slope(h, 1)
         works = h[m.NQ] + h[m.NV]
         states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * h[m.N_CONTACTS]
