@@ -32,6 +32,7 @@ __all__ = [
     "compare",
     "cost",
     "edited",
+    "effects",
     "equilibrium",
     "frequencies",
     "load_scene",
@@ -175,6 +176,16 @@ def compare(
     without = "both" if ideal is True else ideal or None
     found = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
     return found.dataset()
+
+
+def effects(scene: Scene | str | Path) -> xr.Dataset:
+    """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
+
+    Variables and meanings: `pipeline.post.influences`.  The quantities are those of `[view] watch`, else of
+    `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    """
+    found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
+    return found
 
 
 def render(scene: Scene | str | Path) -> Path:
