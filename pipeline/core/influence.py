@@ -1,10 +1,10 @@
-"""What an effect does to a quantity: how far two variants of a scene are apart, and how well that is known.
+r"""What an effect does to a quantity: how far two variants of a scene are apart, and how well that is known.
 
 Variants with contacts are run from several starts that differ by a hair. Where these members agree their mean is the
 motion; where they part, beyond the horizon of the motion, it is a statistic, and the difference of two means is known
 to its standard error only:
 
-.. math:: d(t) = \\sqrt{\\max(0, |\\bar a - \\bar b|^2 - (k\\,s)^2)}, \\quad s^2 = (s_a^2 + s_b^2)/n
+.. math:: d(t) = \sqrt{\max(0, |\bar a - \bar b|^2 - (k\,s)^2)}, \quad s^2 = (s_a^2 + s_b^2)/n
 
 with k standard errors taken as chance. Without spread d is the distance of the two motions.
 """
