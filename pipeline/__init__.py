@@ -37,6 +37,7 @@ __all__ = [
     "frequencies",
     "load_scene",
     "open",
+    "plan",
     "render",
     "report",
     "run",
@@ -186,6 +187,16 @@ def effects(scene: Scene | str | Path) -> xr.Dataset:
     """
     found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
     return found
+
+
+def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
+    """Which of a scene's effects the accuracy that it wants calls for: the planned scene, and the evidence.
+
+    The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
+    `[accuracy]`, what was decided, and why.  Raises FlexclearError.
+    """
+    found = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
+    return found.planned, found.dataset()
 
 
 def render(scene: Scene | str | Path) -> Path:

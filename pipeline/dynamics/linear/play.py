@@ -5,8 +5,8 @@ Joints and drives hold the links: a small opening e of what they demand moves th
 .. math:: G\,x = -e, \qquad x = -G^{+} e
 
 where G holds the rates of all joints' residuals. Clearance lets two places part by up to its radius (and the depth to
-which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there to
-the body that is asked for. A body that bends under the forces of its joints opens the joints at its ends by what its
+which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there
+to the body that is asked for. A body that bends under the forces of its joints opens the joints at its ends by what its
 ends move, which is known. Both hold where joints and drives leave the body asked for no freedom; elsewhere masses
 decide, and there is no bound (infinite).
 
@@ -67,7 +67,9 @@ def bounds(full: Scene, run: Run, bundles: Mapping[str, xr.Dataset], chosen: Seq
     motions = Motions(model, seen)
     loose = [name for name in full.contacts() if name in model.scene.joint]
     asked = [q for q in chosen if q.kind in OF_POSE and q.owner in model.mechanism.link_of]
-    loads = joint_wrenches(motions, [name for name, joint in model.scene.joint.items() if _touches(joint, full)] + loose)
+    loads = joint_wrenches(
+        motions, [name for name, joint in model.scene.joint.items() if _touches(joint, full)] + loose
+    )
     load = {name: float(np.linalg.norm(loads[name][1], axis=1).max()) for name in loose}
     rows = np.unique(np.linspace(0, len(seen.state) - 1, LOOKS).astype(int))
     clearance = {name: {q.name: 0.0 for q in asked} for name in loose}
@@ -240,7 +242,7 @@ def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
 
 
 def _carried(scene: Scene, name: str) -> dict[str, str]:
-    """Bodies fixed to a body, by the frame of it that carries them; the body itself by each frame with another joint."""
+    """Bodies fixed to a body, by its frame that carries them; the body itself by each frame with another joint."""
     fixed = [part.between for part in scene.joint.values() if part.type == "fixed"]
     found: dict[str, str] = {}
     open_ends = []
