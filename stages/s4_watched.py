@@ -68,10 +68,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
     """The run of a scene, in this process; `members` as told by the caller, none where there is no contact."""
-    from flexclear.pipeline.core.influence import kept
+    from flexclear.pipeline.core.influence import kept, members_apart
     from flexclear.pipeline.dynamics.record.point import Runner
 
-    return Runner(bundles, kept(scene.owners(), chosen), _members(scene, members)).run(scene)
+    return Runner(bundles, kept(scene.owners(), chosen), _members(scene, members)).run(members_apart(scene))
 
 
 def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:

@@ -6,7 +6,7 @@ to its standard error only:
 
 .. math:: d(t) = \sqrt{\max(0, |\bar a - \bar b|^2 - (k\,s)^2)}, \quad s^2 = (s_a^2 + s_b^2)/n
 
-with k standard errors taken as chance. Without spread d is the distance of the two motions.
+with as many standard errors k taken as chance as Student's t says for so few members. Without spread d is the distance of the two motions.
 """
 
 from __future__ import annotations
@@ -15,15 +15,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import stdtrit
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.kept import Kept, parse_kept
+from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
-#: a difference of means below so many standard errors is chance: the largest of some tens of independent times of
-#: normal variables reaches 3
-CHANCE = 3.0
+#: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
+RARE = 1e-3
+#: by how much members start apart: a share of the clearance, and the least [m]
+SHARE, LEAST = 1e-4, 1e-8
 #: what is kept of a quantity to compare it by: the series, and of what impacts make large its extreme, which is read
 #: where it is and not at an output
 OF_KIND = {
@@ -50,6 +53,24 @@ class Influence:
     def most(self) -> float:
         """The largest difference that is not excluded."""
         return self.difference + self.uncertainty
+
+
+def chance(members: int) -> float:
+    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t)."""
+    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
+
+
+def members_apart(scene: Scene) -> Scene:
+    """The scene with members that start a hair apart: a ten-thousandth of its least clearance, at least 1e-8 m.
+
+    No start is known better; and members that are nearer to each other than the errors of a loose tolerance would make
+    these look like influences.
+    """
+    clearances = [joint.clearance for joint in scene.contacts().values()]
+    apart = max(LEAST, SHARE * min(clearances, default=0.0))
+    changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=apart)})
+    changed._name, changed._path = scene.name, scene.path
+    return changed
 
 
 def kept(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Kept]:
@@ -87,8 +108,9 @@ def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Inf
         distance, error = rotation_between(one, two), 2.0 * error  # a quaternion changes by half the angle
     else:
         distance = np.linalg.norm(one - two, axis=1)
-    told = np.sqrt(np.maximum(0.0, distance**2 - (CHANCE * error) ** 2))
-    return Influence(float(told.max(initial=0.0)), float(CHANCE * error.max(initial=0.0)))
+    error = chance(members) * error
+    told = np.sqrt(np.maximum(0.0, distance**2 - error**2))
+    return Influence(float(told.max(initial=0.0)), float(error.max(initial=0.0)))
 
 
 def _impact_times(a: Point, b: Point, name: str) -> Influence:

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.influence import Influence, influence, kept
+from flexclear.pipeline.core.influence import Influence, influence, kept, members_apart
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
@@ -68,7 +68,7 @@ class Pilots:
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             members = MEMBERS if scene.contacts() or scene.stop else 0
-            found = Runner(mine, kept(scene.owners(), self.chosen), members).run(scene)
+            found = Runner(mine, kept(scene.owners(), self.chosen), members).run(members_apart(scene))
             self.points[key] = found
             self.evaluations += found.evaluations
         return self.points[key]

@@ -12,7 +12,7 @@ from flexclear.pipeline.dynamics.plan.pilots import RTOL, SMOOTH, SMOOTH_RTOL, P
 #: share of what is wanted that the integration may err by
 SHARE = 0.15
 #: tolerances that are tried, loosest first, of motions without contacts, and with
-TRIED, WITH_CONTACTS = (1e-4, 1e-5, 1e-6), (1e-5, 1e-6)
+TRIED, WITH_CONTACTS = (1e-4, 1e-5, 1e-6), (1e-4, 1e-5, 1e-6)
 STIFF_TRIED = (1e-3, 1e-4)
 #: by how much the tolerance of the whole scene is tighter than that of its rigid twin: vibrations are added to impacts
 SAFER = 0.1
