@@ -125,14 +125,6 @@ def _leg(axis: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(axis, x), axis], axis=2)
 
 
-def repeated(run: xr.Dataset, name: str, strokes: int) -> xr.Dataset:
-    """The run again and again, the ball nearer to the socket's middle from stroke to stroke."""
-    nearer = [run.assign(contact_offset=run.contact_offset * 0.5**k) for k in range(strokes)]
-    parts = [part.isel(time=slice(int(k > 0), None)) for k, part in enumerate(nearer)]
-    later = [part.assign_coords(time=part.time + k * END) for k, part in enumerate(parts)]
-    return xr.concat(later, dim="time", data_vars="minimal", coords="minimal").assign_attrs(scene=name)
-
-
 def _contact(time: np.ndarray) -> dict:
     phase = (time[:, None] - (BURSTS + 3.3e-5)[None, :]) / BURST_LENGTH
     pulse = np.where((phase > 0) & (phase < 1), np.sin(np.pi * np.clip(phase, 0, 1)), 0.0)
