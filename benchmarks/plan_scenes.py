@@ -2,7 +2,7 @@
 
 One seed makes one family. Every scene may hold all effects at once: flexible rods, clearances with friction, gravity,
 damping. What differs: clearances of 1 um to 1 mm, rods from steel to nylon, speeds of a tenth to ten times the usual
-ones, and accuracies over four decades, shares of what the quantity does in the ideal mechanism.
+ones, and accuracies over four decades: 1 um to 10 mm, 10 urad to 0.1 rad, 0.1 mm/s to 1 m/s, shares of forces.
 """
 
 from __future__ import annotations
@@ -29,8 +29,14 @@ MATERIALS = {
     "nylon": (1140.0, 2.7e9, 0.39),
 }
 CLEARANCES, SPEEDS = (1e-6, 1e-3), (0.1, 10.0)
-#: shares of the quantity's own size, over four decades
-SHARES = {"pose": (1e-5, 1e-1), "rate": (5e-5, 5e-1), "force": (5e-5, 5e-1)}
+#: accuracies over four decades, by quantity, SI; of forces and of what contacts do, shares of their size
+ACCURACIES = {
+    "position": (1e-6, 1e-2),
+    "orientation": (1e-5, 1e-1),
+    "velocity": (1e-4, 1.0),
+    "angular_velocity": (1e-3, 10.0),
+}
+FORCES = (5e-5, 5e-1)
 #: how often what is asked for is of which kind
 ASKED = {"pose": 0.5, "pose and rate": 0.2, "rate": 0.1, "force": 0.2}
 
@@ -104,7 +110,7 @@ MECHANISMS = {
     ),
 }
 #: longest time of a scene, in times of the mechanism's usual motion
-LONGEST = 0.5
+LONGEST = 1.0
 #: half of the scenes are the parallel mechanism of the paper
 ORDER = ("sps4", "slider-crank", "sps4", "four-bar", "sps4", "leg")
 
@@ -149,7 +155,7 @@ def drawn(seed: int, number: int, folder: Path) -> Drawn:
     table["load"] = loads | ({"gravity": {"type": "gravity", "acceleration": down}} if random.random() < 0.5 else {})
     scene = edited(base, table)
     asked = _asked(random, mechanism)
-    scene = edited(scene, {"accuracy": {"quantities": {q: {"relative": share} for q, share in asked.items()}}})
+    scene = edited(scene, {"accuracy": {"quantities": asked}})
     scene._name, scene._path = f"{name}-{number}", None
     told = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": asked}
     return Drawn(scene, told)
@@ -159,12 +165,16 @@ def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
 
-def _asked(random: np.random.Generator, mechanism: Mechanism) -> dict[str, float]:
+def _asked(random: np.random.Generator, mechanism: Mechanism) -> dict[str, dict[str, float]]:
+    """Quantities with their accuracy, absolute or relative as a scene says it."""
     kinds = str(random.choice(list(ASKED), p=list(ASKED.values()))).split(" and ")
     found = {}
     for kind in kinds:
         quantity = str(random.choice(mechanism.quantities[kind]))
-        found[quantity] = _log_uniform(random, *SHARES[kind])
+        limits = ACCURACIES.get(quantity.rpartition(".")[2])
+        found[quantity] = (
+            {"absolute": _log_uniform(random, *limits)} if limits else {"relative": _log_uniform(random, *FORCES)}
+        )
     return found
 
 

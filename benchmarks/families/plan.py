@@ -26,7 +26,7 @@ from flexclear.pipeline.core.scene.wanted import parse
 
 SEED, SCENES = 1, 60
 #: starts of runs with contacts
-MEMBERS = 4
+MEMBERS = 3
 #: a miss by more than this is wrong, and so much may planning cost: of the full run, or a second
 WORST, SHARE, SECOND = 3.0, 0.2, 1.0
 #: what a run is warmed up over, as a share of its time
@@ -50,7 +50,6 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
 
     made = drawn(seed, number, folder / "recipes")
     scene, told = made.scene, dict(made.told)
-    told["wanted"] = {name: float(f"{share:.3g}") for name, share in made.told["wanted"].items()}
     place = run.workplace()
     try:
         task = s8_plan.task(scene)
@@ -76,7 +75,8 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     shares, chances = {}, {}
     for q in chosen:
         apart = influence.influence(two, one, q, MEMBERS)
-        wanted = made.told["wanted"][q.name] * influence.size(one, q)
+        asked = made.told["wanted"][q.name]
+        wanted = asked["absolute"] if "absolute" in asked else asked["relative"] * influence.size(one, q)
         shares[q.name], chances[q.name] = apart.difference / wanted, apart.uncertainty / wanted
     worst = max(shares.values())
     return {
@@ -156,7 +156,7 @@ def show(records: list[Record]) -> dict[str, str]:
         "clearance [um]": lambda r: short(1e6 * r["clearance"]),
         "speed": lambda r: short(r["speed"]),
         "rod": lambda r: r["rod"],
-        "wanted": lambda r: ", ".join(f"{n} {100 * s:.2g} %" for n, s in r["wanted"].items()),
+        "wanted": lambda r: ", ".join(f"{n} {_asked(of)}" for n, of in r["wanted"].items()),
         "kept": lambda r: ", ".join(r["kept"]) or "nothing",
         "error / wanted": lambda r: f"{short(r['share'])} ± {short(r['chance'])}",
     }
@@ -167,6 +167,11 @@ def show(records: list[Record]) -> dict[str, str]:
         "summary": f"{text}\n\n{table(rows, by_mechanism)}",
         "misses": "\n\n".join([told, *(["Not run: " + "; ".join(other)] if other else [])]),
     }
+
+
+def _asked(of: dict[str, float]) -> str:
+    """An accuracy as a scene has it, absolute ones in SI."""
+    return f"{of['absolute']:.2g}" if "absolute" in of else f"{100 * of['relative']:.2g} %"
 
 
 def _names(done: list[Record]) -> list[str]:

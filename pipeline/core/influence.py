@@ -26,7 +26,7 @@ from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
 #: by how much members start apart: a share of the clearance, and the least [m]
-SHARE, LEAST = 1e-4, 1e-8
+SHARE, LEAST = 1e-3, 1e-8
 #: what is kept of a quantity to compare it by: the series, and of what impacts make large its extreme, which is read
 #: where it is and not at an output
 OF_KIND = {
@@ -61,7 +61,7 @@ def chance(members: int) -> float:
 
 
 def members_apart(scene: Scene) -> Scene:
-    """The scene with members that start a hair apart: a ten-thousandth of its least clearance, at least 1e-8 m.
+    """The scene with members that start a hair apart: a thousandth of its least clearance, at least 1e-8 m.
 
     No start is known better; and members that are nearer to each other than the errors of a loose tolerance would make
     these look like influences.

@@ -127,7 +127,7 @@ def table(found: xr.Dataset) -> Table:
         "Dropped: largest change of the quantity over the run when the effect is taken from the full scene. Added: "
         "when it is put into the bare one (friction: into the one with its clearance). Interaction: what it does "
         "together with the effect named, beyond the sum of both.",
-        "Behind ±: what may be chance: as many standard errors of the means over the members of runs with contacts as Student's t says.",
+        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     notes += [f"Refused: {line}" for line in filter(None, found.attrs["refused"].split("\n"))]
     columns = ("quantity", "effect", "dropped", "added", "interaction", "with")

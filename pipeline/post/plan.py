@@ -143,7 +143,7 @@ def verified(found: xr.Dataset) -> Table:
     notes = [
         f"Evaluations of the equations of motion: {int(found.attrs['full_evaluations']):,} in full, "
         f"{int(found.attrs['planned_evaluations']):,} as planned, of all members together.",
-        "Behind ±: what may be chance: as many standard errors of the means over the members of runs with contacts as Student's t says.",
+        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(
         "The plan beside the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)

@@ -355,20 +355,15 @@ def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -
 
 
 def _modes(search: Search) -> dict[str, int]:
-    """Bodies that stay flexible and need fewer modes, and how many, all of them together.
-
-    Where the motion parts from its neighbours within less than what is wanted, no run tells more than the members do:
-    there, a difference that cannot be told from chance counts as none.
-    """
+    """Bodies that stay flexible and need fewer modes, and how many, all of them together."""
     pilots, gone = search.pilots, search.gone
     kept = [n for n in pilots.fewer if not any(e.owner == n and e.kind == FLEXIBILITY for e in gone)]
     if not kept:
         return {}
-    loose = any(d.kept and d.effect.kind == CLEARANCE for d in search.decisions.values()) or bool(pilots.scene.stop)
-    how = {"rtol": LOOSE, "share": PART} if loose else {}
-    there, less = pilots.point(gone, **how), pilots.point(gone, fewer=True, **how)
-    apart = pilots.between(less, there)
-    most = {name: i.difference * (1.0 + OF_PILOT + (WHOLE if loose else 0.0)) for name, i in apart.items()}
+    if pilots.variant(gone).contacts() or pilots.scene.stop:
+        return {}  # impacts shake modes of any frequency, and these change the impacts
+    apart = _with_doubt(search, pilots.between(pilots.point(gone, fewer=True), pilots.point(gone)), False)
+    most = {name: i.most for name, i in apart.items()}
     if not search.fits(most):
         return {}
     search.spend(most)

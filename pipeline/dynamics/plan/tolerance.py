@@ -15,7 +15,7 @@ SHARE = 0.15
 TRIED, WITH_CONTACTS = (1e-4, 1e-5, 1e-6), (1e-4, 1e-5, 1e-6)
 STIFF_TRIED = (1e-3, 1e-4)
 #: by how much the tolerance of the whole scene is tighter than that of its rigid twin: vibrations are added to impacts
-SAFER = 0.1
+SAFER = 1e-3
 DEFAULT, TIGHT = "dop853", 1e-8
 
 
