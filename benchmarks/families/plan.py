@@ -42,7 +42,8 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     """One scene after the other, since their times are the subject."""
     with tempfile.TemporaryDirectory() as folder:
         for case in cases:
-            yield case, [_measured(*case.of, Path(folder))]
+            seed, number = case.of
+            yield case, [_measured(seed, number, Path(folder))]
 
 
 def _measured(seed: int, number: int, folder: Path) -> Record:

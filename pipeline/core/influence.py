@@ -6,7 +6,8 @@ to its standard error only:
 
 .. math:: d(t) = \sqrt{\max(0, |\bar a - \bar b|^2 - (k\,s)^2)}, \quad s^2 = (s_a^2 + s_b^2)/n
 
-with as many standard errors k taken as chance as Student's t says for so few members. Without spread d is the distance of the two motions.
+with as many standard errors k taken as chance as Student's t says for so few members. Without spread d is the distance
+of the two motions.
 """
 
 from __future__ import annotations

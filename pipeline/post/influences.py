@@ -107,9 +107,13 @@ def _interaction(both: Point, alone: Sequence[Point], bare: Point, quantity: Qua
     if not names or any(name not in p.values for p in points for name in names):
         return Influence(np.inf)
     signs = (1.0, -1.0, -1.0, 1.0)
-    values = {name: sum(s * p.values[name] for s, p in zip(signs, points, strict=True)) for name in names}
+    values = {
+        name: np.asarray(np.sum([s * p.values[name] for s, p in zip(signs, points, strict=True)], axis=0))
+        for name in names
+    }
     deviation = {
-        name: np.sqrt(sum(np.square(p.deviation.get(name, 0.0 * p.values[name])) for p in points)) for name in names
+        name: np.sqrt(np.sum([np.square(p.deviation.get(name, 0.0 * p.values[name])) for p in points], axis=0))
+        for name in names
     }
     nothing = Point({name: np.zeros_like(value) for name, value in values.items()}, {}, {}, 0)
     return influence(Point(values, {}, deviation, 0), nothing, quantity, members)
