@@ -110,7 +110,7 @@ MECHANISMS = {
     ),
 }
 #: longest time of a scene, in times of the mechanism's usual motion
-LONGEST = 1.0
+LONGEST = 0.6
 #: half of the scenes are the parallel mechanism of the paper
 ORDER = ("sps4", "slider-crank", "sps4", "four-bar", "sps4", "leg")
 
