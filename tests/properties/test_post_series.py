@@ -164,14 +164,6 @@ def test_impacts_are_closings_paired_with_their_openings():
     assert float(post.clearance[0]) == pytest.approx(0.5e-3, rel=1e-12)
 
 
-def test_events_may_be_flags_instead_of_words():
-    run = synthetic.run("sps4/csj", clearance=True)
-    flags = (run.event_kind.values == "closing").astype(np.int8)
-    told = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "opening closing"}
-    other = run.assign(event_kind=("event", flags, told))
-    assert derive(other).identical(derive(run))
-
-
 def test_slow_closings_are_no_impacts():
     run = synthetic.run("sps4/csj", clearance=True)
     speed = run.event_approach_speed.values.copy()
