@@ -13,4 +13,5 @@ NAMES = {
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
     "plan": "plan:FAMILY",
+    "effects": "effects:FAMILY",
 }
