@@ -161,13 +161,14 @@ def _answers(found: dict[str, Record]) -> str:
     place, force, peak = (found[name] for name in ("platform.position", "A2.force", "A1.peak_force"))
     ratio = place["play_added"] / place["rod_added"]
     together = force["rod_interaction"] > max(force["rod_added"], 0.1 * force["play_added"])
+    alone, beside = _cell(place, "rod_added"), _cell(place, "rod_dropped")
+    dominates = force["play_added"] > DOMINATES * force["rod_added"]
     lines = [
-        f'- "The flexible rod alone does not matter for the pose": it moves the platform by '
-        f"{_cell(place, 'rod_added')}, the clearance by {ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance the rod does matter: "
-        f"taken from both, the mean position changes by {_cell(place, 'rod_dropped')}.",
-        f'- "Clearance dominates": alone it moves the platform by {_cell(place, "play_added")} and changes the force at '
-        f"A2 by {_cell(force, 'play_added')}, the rod alone by {_cell(force, 'rod_added')}. "
-        f"{_so(force['play_added'] > DOMINATES * force['rod_added'])}",
+        f'- "The flexible rod alone does not matter for the pose": it moves the platform by {alone}, the clearance by '
+        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance the rod does matter: taken from both, the "
+        f"mean position changes by {beside}.",
+        f'- "Clearance dominates": alone it moves the platform by {_cell(place, "play_added")} and changes the force '
+        f"at A2 by {_cell(force, 'play_added')}, the rod alone by {_cell(force, 'rod_added')}. {_so(dominates)}",
         f'- "Both together are needed for forces": without the rod\'s flexibility the largest force at A1 changes by '
         f"{_cell(peak, 'rod_dropped')}; at A2 both do {_cell(force, 'rod_interaction')} beyond the sum of each. "
         f"{_so(together)}",
