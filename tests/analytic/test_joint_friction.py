@@ -133,8 +133,8 @@ def speed(name: str) -> np.ndarray:
 
 def test_a_block_slides_down_a_slope_and_creeps_where_it_would_stick() -> None:
     t, a = made().time.values, G * (np.sin(STEEP) - 0.2 * np.cos(STEEP))
-    # the start, on which friction sets in over v_static/a = 0.35 ms, leaves less than v_static
-    assert speed("slide") == pytest.approx(a * t, abs=COULOMB["v_static"])
+    # at the start, until it slides at v_static, friction is less: that leaves less than twice this speed
+    assert speed("slide") == pytest.approx(a * t, abs=2.0 * COULOMB["v_static"])
     assert np.diff(speed("slide"))[2:] == pytest.approx(a * np.diff(t)[2:], rel=1e-8)  # rtol 1e-10, many mechanisms
     load = made().joint_bearing_load.sel(rubbing="slide").values
     assert load == pytest.approx(MASS * G * np.cos(STEEP), rel=1e-12)  # rounding
@@ -291,3 +291,19 @@ def test_a_slider_crank_with_friction_in_every_joint_moves_as_derived_in_other_c
     assert dataset.dissipated.values[-1] == pytest.approx(known.lost, rel=1e-6)
     assert known.lost > 0.1
     assert "friction of O, A, B, P follows reactions" in dataset.attrs["warnings"]
+
+
+@pytest.mark.slow
+def test_bearings_on_a_flexible_rod_carry_what_the_record_says() -> None:
+    """Modes take part in what the links beyond a joint need, and a joint of the tree lies on the rod."""
+    law = tuple({**COULOMB, "radius": 0.005}.items())
+    names = ("main", "crank_pin", "slider_pin")
+    edits = (*((f"joint.{name}.friction", law) for name in names), ("time.end", 2e-3))
+    dataset = run("checks/flexible_slider_crank", edits)
+    assert dataset.sizes["mode"] > 0
+    force = dataset["joint_force"].sel(joint=list(names)).values
+    known = np.linalg.norm(force[..., :2], axis=-1) + np.abs(force[..., 2])  # z is the axis of all pins
+    load = dataset["joint_bearing_load"].sel(rubbing=list(names)).values
+    assert load == pytest.approx(known, rel=1e-9)  # rounding of sums over stiff modes
+    # rtol 1e-10 at some hundred steps
+    assert np.abs(dataset.energy_error.values).max() < 1e-7 * dataset.dissipated.values[-1]
