@@ -251,8 +251,8 @@ def rendered(scene: Scene, place: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
     place, wanted = place or workplace(), Graph(scene)
     require_names(scene)
-    check(place.bring([wanted.render], jobs=1))
-    return place.store.root / wanted.render.folder
+    check(place.bring(list(wanted.render.values()), jobs=1))
+    return place.store.root / wanted.simulate.folder
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:
