@@ -165,8 +165,8 @@ def _answers(found: dict[str, Record]) -> str:
     dominates = force["play_added"] > DOMINATES * force["rod_added"]
     lines = [
         f'- "The flexible rod alone does not matter for the pose": it moves the platform by {alone}, the clearance by '
-        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance the rod does matter: taken from both, the "
-        f"mean position changes by {beside}.",
+        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance the rod does matter: taken from both, "
+        f"the mean position changes by {beside}.",
         f'- "Clearance dominates": alone it moves the platform by {_cell(place, "play_added")} and changes the force '
         f"at A2 by {_cell(force, 'play_added')}, the rod alone by {_cell(force, 'rod_added')}. {_so(dominates)}",
         f'- "Both together are needed for forces": without the rod\'s flexibility the largest force at A1 changes by '
