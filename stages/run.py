@@ -19,6 +19,7 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
 from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
+from flexclear.pipeline.core.log import set_level
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
@@ -195,7 +196,9 @@ def workplace(options: argparse.Namespace | None = None) -> Workplace:
 
     options: of a command, with `jobs`, its `limit` and how much is said.
     """
-    monitor = Monitor(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    if options is not None:
+        set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    monitor = Monitor()
     jobs = getattr(options, "jobs", None)
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
