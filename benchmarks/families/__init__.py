@@ -12,4 +12,7 @@ NAMES = {
     "stability": "stability:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
+    "gallery": "gallery:FAMILY",
+    "plan": "plan:FAMILY",
+    "effects": "effects:FAMILY",
 }
