@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTL
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pieces import Piece, Tape, piece
+from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
@@ -34,8 +34,6 @@ TRIAL, HOPELESS = 400_000, 10_000_000
 #: control floats of a method that another one goes on with
 LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
 
-#: closure rows solved for, each from a time on [s]
-Selections = tuple[tuple[float, np.ndarray], ...]
 Stop = Callable[[np.ndarray], bool]
 
 
@@ -98,30 +96,6 @@ class Trajectory:
     def selection(self, row: int) -> np.ndarray:
         """Closure rows that were solved for to reach a row."""
         return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
-
-
-@dataclass(frozen=True)
-class Handover:
-    """What the next method must know, copied, at the end of the last accepted step.
-
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
-    lasting: control floats LASTING.  rows, events: what was recorded.  selections: as of a trajectory.
-    """
-
-    y: np.ndarray
-    modes: np.ndarray
-    latched: np.ndarray
-    watched: np.ndarray
-    counters: np.ndarray
-    lasting: np.ndarray
-    rows: np.ndarray
-    events: np.ndarray
-    selections: Selections
-
-    @property
-    def time(self) -> float:
-        """Where the next method begins [s]."""
-        return float(self.lasting[0])
 
 
 class StiffError(SolverError):
