@@ -26,13 +26,17 @@ CASES: list[tuple[str, dict[str, Any], bool]] = [
     ("checks/oscillator", {"load.spring.stiffness": 150.0, "load.spring.damping": 1.0}, True),
     ("checks/pendulum", {"load.gravity.acceleration.1": -1.62}, True),
     ("checks/clearance_slider_crank", {"joint.pin.friction.static": 0.2}, True),
+    ("checks/oscillator", {"body.mass.mass": 2.0}, True),
+    ("checks/oscillator", {"body.mass.frames.centre.position.2": "1 mm"}, False),
+    ("sps4/ideal", {"body.platform.mass": 0.4, "body.platform.com.2": "1 mm"}, True),
+    ("sps4/csj", {"body.rod1.inertia.0.0": 0.000998, "body.socket_A2.mass": 0.2, "joint.A1.clearance": "0.3 mm"}, True),
     # what is another structure, start or kernel
     ("sps4/csj", {"joint.A1.clearance": "2 m"}, False),
     ("sps4/csj", {"drive.P3.law.value": "1 mm"}, False),
     ("sps4/csj", {"drive.P3.law": STROKE}, False),
     ("sps4/csj", {"joint.A1.friction": {"law": "ambrosio", "dynamic": 0.1, "v0": 1e-4, "v1": 1e-3}}, False),
     ("checks/pendulum", {"body.bob.mass": 2.0}, False),
-    ("checks/pendulum", {"body.bob.com.0": -0.5}, False),
+    ("checks/oscillator", {"body.mass.inertia.0.0": 0.0}, False),
 ]
 
 

@@ -153,16 +153,14 @@ def _flexible(scene: Scene, body: str) -> bool:
     return isinstance(scene.body[body], FlexibleBody)
 
 
-def rigid_inertia(scene: Scene, group: Group, link: Placement) -> RigidInertia:
-    """Of a group of rigid bodies, in the frame `link` (given in the host's)."""
-    inward = link.inverse()
+def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia:
+    """Of rigid bodies that move as one, at these places in the frame in which it is wanted."""
     mass, first = 0.0, np.zeros(3)
     parts = []
-    for name, place in group.places.items():
+    for name, here in places.items():
         body = scene.body[name]
         if not isinstance(body, RigidBody):
             continue
-        here = inward.of(place)
         c = here.p + here.R @ np.array(body.com)
         parts.append((body.mass, c, here.R @ np.array(body.inertia) @ here.R.T))
         mass += body.mass

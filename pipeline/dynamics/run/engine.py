@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -48,7 +49,7 @@ class Engine:
     end: float
     rtol: float
 
-    @property
+    @cached_property
     def breaks(self) -> np.ndarray:
         """Start, breaks of drives and loads and samples in between, end [s]; what only rounding sets apart is one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
