@@ -293,12 +293,14 @@ def _joined(
 
 def size_of(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
     """Size of the mechanism [m], or of the clearance it moves in: what a length tolerance is relative to."""
-    points = []
+    points, of_body = list[np.ndarray](), dict[str, list[np.ndarray]]()
+    for frame in frames.values():
+        of_body.setdefault(frame.body, []).append(frame.place.p)
     for link in links:
         for name, place in link.places.items():
-            points += [link.start.of(place.of(f.place)).p for f in frames.values() if f.body == name]
+            points += [link.start.point(place.point(p)) for p in of_body.get(name, [])]
             if link.inertia is not None:
-                points.append(link.start.of(Placement(link.inertia.com)).p)
+                points.append(link.start.point(link.inertia.com))
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)

@@ -29,6 +29,10 @@ class Placement:
         """`inner`, given in this frame, in this frame's parent."""
         return Placement(self.p + self.R @ inner.p, self.R @ inner.R)
 
+    def point(self, p: np.ndarray) -> np.ndarray:
+        """A point, given in this frame, in this frame's parent."""
+        return np.asarray(self.p + self.R @ p)
+
     def inverse(self) -> Placement:
         """The parent, seen from this frame."""
         return Placement(-self.R.T @ self.p, self.R.T)

@@ -37,12 +37,11 @@ def refilled(model: Model, scene: Scene) -> Model | None:
         return None
     clearances = scene.contacts()
     contacts = [c._replace(joint=clearances[c.name]) if c.name in clearances else c for c in model.contacts]
-    mechanism = replace(model.mechanism, scene=scene, contacts=contacts)
-    if scene.body != model.scene.body:
-        weighed = _weighed(mechanism, scene)
-        if weighed is None:
-            return None
-        mechanism = weighed
+    mechanism = replace(model.mechanism, contacts=contacts)
+    weighed = _weighed(mechanism, scene) if scene.body != model.scene.body else mechanism
+    if weighed is None:
+        return None
+    mechanism = replace(weighed, scene=scene)
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
     made = filled(mechanism, numbering, like=model)
@@ -79,7 +78,7 @@ def _same_structure(model: Model, scene: Scene) -> bool:
 def _same_bodies(model: Model, scene: Scene) -> bool:
     """Whether no body differs in more than its mass, centre and inertia; those decide nothing but the links' numbers."""
     old = model.scene.body
-    if list(scene.body) != list(old):
+    if [*scene.body] != [*old]:
         return False
     changed = [(new, was) for new, was in zip(scene.body.values(), old.values(), strict=True) if new is not was]
     return all(new == was or _shape(new) == _shape(was) for new, was in changed)
@@ -98,16 +97,18 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
     They do so where a link has its frame at its centre of mass, where closing moves it, and where it has hardly any
     inertia: then a motion may be without mass.
     """
-    links = []
-    for link in mechanism.links:
-        if link.inertia is not None:
+    old = mechanism.scene.body
+    changed = {name for name, body in scene.body.items() if body is not old[name]}
+    links = list(mechanism.links)
+    for i, link in enumerate(links):
+        if link.inertia is not None and changed & link.places.keys():
             now = rigid_inertia(scene, link.places)
-            floats = link.branch.edge is None and not np.array_equal(now.com, link.inertia.com)
-            least, *_, most = np.linalg.eigvalsh(now.moments)
-            if floats or not least > SLENDER * most:
+            if link.branch.edge is None and not np.array_equal(now.com, link.inertia.com):
                 return None
-            link = replace(link, inertia=now)
-        links.append(link)
+            links[i] = replace(link, inertia=now)
+    principal = np.linalg.eigvalsh(np.array([link.inertia.moments for link in links if link.inertia is not None]))
+    if not np.all(principal[:, 0] > SLENDER * principal[:, -1]):
+        return None
     placed = [replace(link, start=start) for link, start in zip(links, mechanism.placed, strict=True)]
     length = size_of(scene, placed, mechanism.frames)
     if not mechanism.start_residual < 0.5 * EXACT * min(1.0, length) or mechanism.choice or mechanism.has_paths:

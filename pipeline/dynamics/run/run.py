@@ -182,7 +182,7 @@ def _near_singular(
 ) -> Iterator[tuple[int, Collocation]]:
     """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
-        engine.select_pieces(0.5 * (motion.start + motion.end))
+        engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
             if blurred(engine, rows[k]):

@@ -172,7 +172,7 @@ def integrate(
             continue
         if a > (engine.start if left is None else left.time):
             engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-        engine.select_pieces(0.5 * (a + b))
+        engine.select_pieces_after(0.5 * (a + b))
         control[m.END], engine.n[m.FRESH] = b, 1
         if _segment(engine, tape, progress, stop):
             break
