@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
@@ -11,6 +10,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.schema import RUN, conform
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.effects import RECORDS
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
@@ -71,7 +71,7 @@ def attributes(scene: Scene) -> dict[str, str]:
         "parameters": json.dumps(parameters, sort_keys=True),
         "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
         "sources": json.dumps(scene.sources(), sort_keys=True),
-        "versions": " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
+        "versions": " ".join(f"{name} {library_version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
     }
 
 
