@@ -76,7 +76,7 @@ def _same_structure(model: Model, scene: Scene) -> bool:
 
 
 def _same_bodies(model: Model, scene: Scene) -> bool:
-    """Whether no body differs in more than its mass, centre and inertia; those decide nothing but the links' numbers."""
+    """Whether no body differs in more than its mass, centre and inertia, which decide but the links' numbers."""
     old = model.scene.body
     if [*scene.body] != [*old]:
         return False

@@ -170,6 +170,11 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     return engine
 
 
+def another(engine: Engine) -> Engine:
+    """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
+    return assemble(engine.model, engine.entry, engine.method, engine.mobility)
+
+
 def may_start_singular(model: Model) -> bool:
     """Whether a run may start in a singular pose: something moves or says which way, and no contact may interfere."""
     bodies = model.scene.body.values()
