@@ -9,6 +9,8 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,8 @@ import xarray as xr
 from scipy.special import ellipk
 
 from flexclear import pipeline
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
@@ -321,24 +324,91 @@ def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, caps
     assert "not installed" in said or "no scheduler answers" in said
 
 
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")  # of a library that is not ours, in whatever version there is
-def test_a_cluster_gives_the_same_bytes(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    distributed = pytest.importorskip("distributed")
-    found = []
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        for name, address in (("here", None), ("cluster", cluster.scheduler_address)):
-            monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / name))
-            found.append(
-                pipeline.sweep(
-                    root / "scenes/checks/pendulum.toml",
-                    {"body.bob.com.0": np.linspace(-2.0, -1.0, 12)},
-                    ["bob.velocity.largest"],
-                    workers=1,
-                    scheduler=address,
-                )
-            )
-    assert found[0].identical(found[1])
+class Mortal:
+    """Stands for a pool of two processes that dies at its third and fourth task, or at all from the third one on."""
+
+    def __init__(self, recovers: bool) -> None:
+        self.recovers, self.given, self.renewed = recovers, 0, 0
+
+    def submit(self, family: str, packed: bytes, points: list[dict[str, Any]], alone: bool) -> Future[Any]:
+        self.given += 1
+        future: Future[Any] = Future()
+        if self.given in (3, 4) or (self.given > 4 and not self.recovers):
+            future.set_exception(BrokenProcessPool())
+        else:
+            future.set_result(([Point({}, {}, {}, point["n"]) for point in points], 0.1 * len(points)))
+        return future
+
+    def renew(self) -> None:
+        self.renewed += 1
+
+    def run(self, told: list[int]) -> None:
+        jobs = [sweep_engine.Job(str(n), "family", {"n": n}) for n in range(40)]
+        engine = sweep_engine.Engine(self.submit, lambda: 2, self.renew)
+        engine.run(jobs, {"family": b""}, lambda found, _: told.extend(point.evaluations for _, point in found))
+
+
+def test_points_that_are_lost_with_a_process_are_run_again():
+    told, pool = list[int](), Mortal(recovers=True)
+    pool.run(told)
+    assert sorted(told) == list(range(40))
+    assert pool.renewed == 1
+
+
+def test_processes_that_keep_dying_end_the_sweep_in_words():
+    told, pool = list[int](), Mortal(recovers=False)
+    with pytest.raises(ResourceError, match="memory full"):
+        pool.run(told)
+    assert told
+    assert pool.renewed == sweep_engine.LOSSES
+
+
+def _dask(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
+    """A scheduler or a worker of Dask on this machine."""
+    environment = os.environ | {"PYTHONPATH": str(cwd), "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "5"}
+    command = [sys.executable, "-m", "dask", *arguments]
+    return subprocess.Popen(command, cwd=cwd, env=environment, text=True, stderr=subprocess.DEVNULL)
+
+
+def test_a_cluster_of_which_a_worker_is_killed_gives_the_same_bytes(root: Path, tmp_path: Path):
+    pytest.importorskip("distributed")
+    place, path = tmp_path / "scheduler.json", pendulum(tmp_path, 1500)
+    target, local = tmp_path / "cluster.nc", tmp_path / "local.nc"
+    worker = ("worker", f"--scheduler-file={place}", "--nthreads=1", "--no-nanny", "--no-dashboard")
+    scheduler = ("scheduler", "--port=0", "--host=127.0.0.1", f"--scheduler-file={place}", "--no-dashboard")
+    others = [_dask(*scheduler, cwd=root)]
+    try:
+        others += [_dask(*worker, cwd=root), _dask(*worker, cwd=root)]
+        address = _address(place)
+        arguments = ("sweep", str(path), f"--scheduler={address}", f"--out={target}")
+        process = flexclear(*arguments, cwd=root, results=tmp_path / "results")
+        _begun(process, tmp_path / "results")
+        assert process.poll() is None
+        others[1].send_signal(signal.SIGKILL)
+        others.append(_dask(*worker, cwd=root))
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, err
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+    alone = flexclear("sweep", str(path), "--workers=2", f"--out={local}", cwd=root, results=tmp_path / "local")
+    _, err = alone.communicate(timeout=PATIENCE)
+    assert alone.returncode == 0, err
+    assert target.read_bytes() == local.read_bytes()
+
+
+def _address(place: Path) -> str:
+    """Of a scheduler that has two workers."""
+    from distributed import Client
+
+    end = time.monotonic() + PATIENCE
+    while not place.exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    with Client(scheduler_file=str(place), timeout=PATIENCE, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=PATIENCE)
+        return str(client.scheduler.address)
 
 
 def test_a_latin_hypercube_has_one_point_in_every_row_and_column():
