@@ -153,6 +153,20 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
         assert here["evaluations"] == one.attrs["evaluations"]
 
 
+def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
+    """What `flexclear sections` finds without a neighbour is what a point keeps, to the last bit."""
+    path, count = root / "scenes/checks/driven_pendulum.toml", {"sections.transient": 2, "sections.periods": 20}
+    keep = ["bob.position.sections", "bob.angular_velocity.sections"]
+    vary = {"load.torque.force.amplitude": [0.9, 1.5]}
+    found = pipeline.sweep(path, vary, keep, set=count, workers=1)
+    whole, _ = pipeline.sections(pipeline.load_scene(path, count | {"sections.exponent_periods": 20}))
+    here = found.isel({"load.torque.force.amplitude": 1})
+    assert here["bob.position.sections"].dims == ("section", "axis")
+    assert np.array_equal(here["bob.position.sections"].values, whole["position"].sel(body="bob").values)
+    assert np.array_equal(here["bob.angular_velocity.sections"], whole["angular_velocity"].sel(body="bob"))
+    assert (found["evaluations"] > 0).all()
+
+
 def test_the_error_that_is_told_is_the_error(root: Path):
     """The oscillator's closed form says how far off a value is; the difference from the tighter run says the same."""
     keep = ["mass.position.final"]
@@ -298,6 +312,9 @@ def test_members_give_mean_and_deviation(root: Path):
         ({"keep": ["bob.velocity"]}, "keep", "bob.velocity.largest"),
         ({"keep": ["bop.velocity.largest"]}, "keep", "bob"),
         ({"keep": ["bob.orientation.mean"]}, "keep", "final"),
+        ({"keep": ["bob.velocity.sections", "bob.velocity.final"]}, "keep", "two sweeps"),
+        ({"keep": ["bob.velocity.sections"], "error": True}, "keep", "estimated error"),
+        ({"keep": ["hinge.force.sections"]}, "keep", "has no 'sections'"),
         ({"set": {"time.end": "1 kg"}}, "set", "mass"),
         ({"members": 3}, "members", "no clearance joint"),
         ({"sample": {"method": "sobol", "points": 4}}, "sweep", "without count"),
