@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene, with_numbers
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import tabulate
@@ -64,3 +66,9 @@ def test_a_quick_edit_refuses_what_a_whole_one_does(root: Path, change: dict[str
             edit(scene, change)
         said.append(str(refused.value))
     assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("edit", [edited, with_numbers, lambda scene, change: load_scene(scene.path, change)])
+def test_a_recipe_in_an_edit_is_looked_for_where_the_scene_is(root: Path, edit: Callable[..., Scene]):
+    scene = edit(load_scene(root / "scenes/sps4/far_cb.toml"), {"body.rod1.mesh": "meshes/rods/steel.toml"})
+    assert Path(scene.recipes()["rod1"]).resolve() == (root / "meshes/rods/steel.toml").resolve()
