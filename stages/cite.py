@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import argparse
 import ast
-import re
 from collections.abc import Iterator
 
+from flexclear.pipeline.core.citations import cited
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-
-#: a paragraph that starts like this names where a method is from
-SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -52,5 +49,4 @@ def named(source: str) -> Iterator[str]:
     """Texts after ``Source:`` in all docstrings of a module, each on one line."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
-            for match in SOURCE.finditer(ast.get_docstring(node) or ""):
-                yield " ".join(match[1].split())
+            yield from cited(ast.get_docstring(node))

@@ -200,7 +200,8 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     files = sorted(path for path in folder.rglob("*.nc") if len(path.relative_to(folder).parts) <= 2)
     if not files:
         raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
-    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.open_dataset(path) for path in files}
+    # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
+    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.load_dataset(path) for path in files}
     return xr.DataTree.from_dict(tree, name=folder.name)
 
 

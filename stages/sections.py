@@ -60,13 +60,14 @@ def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
 def write_page(
     verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
 ) -> None:
-    """The verdicts as a page, with the figures (PNG) in a folder of its name beside it."""
-    from flexclear.pipeline.post.verdict_page import markdown
+    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name beside it."""
+    from flexclear.pipeline.post.verdict_page import csv_text, markdown
 
     folder = page.parent / page.stem
     folder.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
+    (folder / "verdicts.csv").write_text(csv_text(verdicts))
     page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem))
 
 

@@ -20,7 +20,7 @@ from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 from flexclear.pipeline.core.workflow.cores import side_by_side
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.dataset import attributes
+from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions, quaternions
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -62,7 +62,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
-    return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
+    told |= attributes(scene) | {"title": f"{wanted.members} motions of {subject(scene)}"}
+    return conform(made, ENSEMBLE, **told, seed=wanted.seed, perturbation=wanted.perturbation)
 
 
 def ball_offsets(model: Model, wanted: Ensemble, members: int) -> Iterator[np.ndarray]:
@@ -104,8 +105,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
-    contacts = [contact.name for contact in model.contacts]
-    return xr.Dataset(variables, coords={"time": regular, "body": names, "contact": contacts})
+    return xr.Dataset(variables, coords={"time": regular, "body": names, **contact_names(model)})
 
 
 def motion_series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:

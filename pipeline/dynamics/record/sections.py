@@ -17,7 +17,7 @@ from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.scene.schema import Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.dataset import attributes
+from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies, motion_series
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.engine import Engine
@@ -65,9 +65,10 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     coordinates = {"section": np.arange(wanted.periods), "body": names, "followed": np.arange(len(followed))}
     coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
     if engine.model.contacts:
-        coordinates["contact"] = [contact.name for contact in engine.model.contacts]
+        coordinates |= contact_names(engine.model)
     made = xr.Dataset(variables, coords=coordinates)
-    return conform(made, SECTIONS, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
+    title = f"Sections of the periodic motion of {subject(scene)}"
+    return conform(made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
 
 
 def section_period(scene: Scene) -> float:
@@ -156,7 +157,8 @@ class _Tape:
         if not model.contacts:
             return kept
         kept["impact_section"] = (("impact",), self._column("section", -1).astype(np.int32))
-        kept["impact_contact"] = (("impact",), self._column("contact", -1).astype(np.int32))
+        names = np.array([contact.name for contact in model.contacts], dtype=str)
+        kept["impact_contact"] = (("impact",), names[self._column("contact", -1).astype(np.int64)])
         for name in ("phase", "approach_speed", "peak_force", "duration"):
             kept[f"impact_{name}"] = (("impact",), self._column(name, np.nan))
         for name in ("position", "quaternion", "velocity"):
