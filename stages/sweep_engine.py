@@ -18,6 +18,8 @@ from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 SHARE, MOST, QUEUED = 0.5, 1000, 2
+#: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
+PER_WORKER = 5e-3
 #: seconds in which a scheduler must have answered
 PATIENCE = 10.0
 #: seconds after which a cluster is asked again how many workers it has
@@ -59,8 +61,9 @@ class Engine:
         waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
         while waiting or running:
             # nothing is compiled twice: until the first point is there nothing else begins
-            while waiting and len(running) < (QUEUED * self.width() if pace else 1):
-                mine = _take(waiting, min(MOST, max(1, int(SHARE / pace))) if pace else 1)
+            width = self.width()
+            while waiting and len(running) < (QUEUED * width if pace else 1):
+                mine = _take(waiting, min(MOST, max(1, int(max(SHARE, PER_WORKER * width) / pace))) if pace else 1)
                 family = mine[0].family
                 running[self._given(family, families[family], [job.point for job in mine], alone=not pace)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)

@@ -12,4 +12,5 @@ NAMES = {
     "stability": "stability:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
+    "sweep": "sweep:FAMILY",
 }

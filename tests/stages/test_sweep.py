@@ -266,6 +266,18 @@ def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
     assert example["best"]() == pytest.approx(2.0 * ((np.pi / 0.5) ** 2 + 1.0), abs=1e-4)
 
 
+def test_the_example_of_a_sensitivity_has_shares_of_a_whole(root: Path, tmp_path: Path):
+    pytest.importorskip("SALib")
+    example = runpy.run_path(str(root / "docs/examples/sensitivity.py"))
+    error, found = example["study"](4, workers=1)
+    assert error.shape == (40,)
+    assert (error < 5e-3).all()
+    # nothing goes along with less than nothing; what is estimated from four points is anything but a share
+    assert (found["ST"] >= 0.0).all()
+    example["figure"](found, tmp_path / "shares.png")
+    assert (tmp_path / "shares.png").stat().st_size > 10_000
+
+
 #: runs one point in a fresh process and prints the own modules that it loaded
 LOADED = """
 import sys
