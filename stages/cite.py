@@ -41,7 +41,7 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
     for name in sorted(sources.closure(roots)):
         base = sources.root.joinpath(*name.split("."))
         path = next(p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file())
-        for found in dict.fromkeys(named(path.read_text())):
+        for found in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
             yield name, found
 
 

@@ -26,7 +26,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
+    run.limit_argument(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
+    run.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -34,7 +36,7 @@ def command(options: argparse.Namespace) -> None:
     asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
         run.check_target(options.page, "--page")
-    place = run.workplace()
+    place = run.workplace(options)
     scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     outcome = place.bring([graph.verdict for graph in tasks.values()])
@@ -42,7 +44,7 @@ def command(options: argparse.Namespace) -> None:
     kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
     judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
     verdicts = {name: place.store.load(record) for name, record in judged.items()}
-    print("\n\n".join(text(name, verdict) for name, verdict in verdicts.items()))
+    print(run.as_json(verdicts) if options.json else "\n\n".join(text(*judged) for judged in verdicts.items()))
     if options.page is not None:
         pictures = {
             name: place.store.path(record.stage, record.key, "sections.png").read_bytes()
@@ -67,8 +69,8 @@ def write_page(
     folder.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
-    (folder / "verdicts.csv").write_text(csv_text(verdicts))
-    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem))
+    (folder / "verdicts.csv").write_text(csv_text(verdicts), encoding="utf-8")
+    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem), encoding="utf-8")
 
 
 def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:

@@ -8,11 +8,12 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.workflow import workers
+from flexclear.pipeline.core.workflow import stopping, workers
 from flexclear.pipeline.core.workflow.schedule import TICK
 from flexclear.stages.sweep_points import source_digest, work
 
@@ -20,6 +21,8 @@ from flexclear.stages.sweep_points import source_digest, work
 SHARE, MOST, QUEUED = 0.5, 1000, 2
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
+#: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
+LONG = 5.0
 #: seconds in which a scheduler must have answered
 PATIENCE = 10.0
 #: seconds after which a cluster is asked again how many workers it has
@@ -30,42 +33,47 @@ LOSSES = 3
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: place of the scene -> value."""
+    """A point to be run. family: its key; point: place of the scene -> value; journal: where it keeps its work."""
 
     key: str
     family: str
     point: dict[str, Any]
+    journal: Path
 
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
-#: gives work to whoever does it: key of the family, what `work` is given of it, points, whether nobody else is busy
-Submit = Callable[[str, bytes, list[dict[str, Any]], bool], Future[Any]]
+Points = list[dict[str, Any]]
+#: gives `stages.sweep_points.work` to whoever does it, with its first five arguments
+Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None]], Future[Any]]
 
 
 @dataclass(frozen=True)
 class Engine:
-    """Who does the work, and on how many tasks at a time.
+    """Who does the work, and on how many tasks at a time; whether on this machine.
 
     renew: called where a worker has died and taken the others with it, before work is given out again.
     """
 
     submit: Submit
     width: Callable[[], int]
+    here: bool = True
     renew: Callable[[], None] = lambda: None
 
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
         """Run points; `done` is told finished ones and their processor time [s], in any order of the batches.
 
-        families: what `stages.sweep_points.work` is given of each.  Raises ResourceError when workers keep dying.
+        families: what `stages.sweep_points.work` is given of each.  Raises ResourceError when workers keep dying,
+        StoppedError when all is to stop.
         """
         waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
         while waiting or running:
+            stopping.check()
             # nothing is compiled twice: until the first point is there nothing else begins
             width = self.width()
             while waiting and len(running) < (QUEUED * width if pace else 1):
                 mine = _take(waiting, min(MOST, max(1, int(max(SHARE, PER_WORKER * width) / pace))) if pace else 1)
-                family = mine[0].family
-                running[self._given(family, families[family], [job.point for job in mine], alone=not pace)] = mine
+                keep = self.here and not 0.0 < pace < LONG
+                running[self._given(mine, families, alone=not pace, keep=keep)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -86,9 +94,11 @@ class Engine:
                 first, lost = not pace, 0  # what the first one took held compiling and fetching
                 pace = max(1e-6, seconds / len(mine)) if not first else SHARE / 2.0
 
-    def _given(self, family: str, packed: bytes, points: list[dict[str, Any]], *, alone: bool) -> Future[Any]:
+    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool) -> Future[Any]:
+        family, points = mine[0].family, [job.point for job in mine]
+        journals = [job.journal if keep else None for job in mine]
         try:
-            return self.submit(family, packed, points, alone)
+            return self.submit(family, families[family], points, alone, journals)
         except BrokenProcessPool as error:
             failed: Future[Any] = Future()
             failed.set_exception(error)
@@ -123,26 +133,26 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
         return
     pools: list[ProcessPoolExecutor] = [workers.pool(width)]
 
-    def submit(family: str, packed: bytes, points: list[dict[str, Any]], alone: bool) -> Future[Any]:
+    def submit(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
         with workers.without_main():
-            return pools[-1].submit(work, family, packed, points, alone)
+            return pools[-1].submit(work, family, packed, points, alone, journals)
 
     def renew() -> None:
         workers.kill(pools[-1])
         pools.append(workers.pool(width))
 
     try:
-        yield Engine(submit, lambda: width, renew)
+        yield Engine(submit, lambda: width, renew=renew)
     except BaseException:
         workers.kill(pools[-1])
         raise
     pools[-1].shutdown()
 
 
-def _here(family: str, packed: bytes, points: list[dict[str, Any]], alone: bool) -> Future[Any]:
+def _here(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
     """The work, done in this process at once."""
     future: Future[Any] = Future()
-    future.set_result(work(family, packed, points, alone))
+    future.set_result(work(family, packed, points, alone, journals))
     return future
 
 
@@ -177,11 +187,11 @@ def _on_cluster(client: Any, place: str) -> Engine:
     executor, seen = client.get_executor(), [now(), _threads(client, place)]
     held: dict[str, Any] = {}
 
-    def submit(family: str, packed: bytes, points: list[dict[str, Any]], alone: bool) -> Future[Any]:
+    def submit(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
         # sent once; workers fetch it from each other, and the scheduler has it made again when it is lost with one
         if family not in held:
             held[family] = client.submit(bytes, packed, key=f"family-{family}", pure=False)
-        future: Future[Any] = executor.submit(work, family, held[family], points, alone, source_digest())
+        future: Future[Any] = executor.submit(work, family, held[family], points, alone, journals, source_digest())
         return future
 
     def width() -> int:
@@ -190,7 +200,7 @@ def _on_cluster(client: Any, place: str) -> Engine:
             seen[:] = now(), sum(client.nthreads().values())
         return max(1, int(seen[1]))
 
-    return Engine(submit, width)
+    return Engine(submit, width, here=False)
 
 
 def _threads(client: Any, place: str) -> int:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.points import Point
@@ -49,30 +50,41 @@ def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
 
 
 def work(
-    key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool, sources: str = ""
+    key: str,
+    packed: bytes,
+    points: Sequence[Mapping[str, Any]],
+    alone: bool,
+    journals: Sequence[Path | None] = (),
+    sources: str = "",
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
+    journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
     of a worker that has joined since.
     """
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
-    from flexclear.pipeline.core.workflow import cores
+    from flexclear.pipeline.core.workflow import cores, journal
 
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
     cores.tell(alone)
     scene, runner = _opened(key, packed)
     begun, found = time.process_time(), list[Point]()
-    for point in points:
+    for point, place in zip(points, journals or [None] * len(points), strict=True):
         try:
             edited = with_numbers(scene, point)
         except InputError as error:
             found.append(Point({}, {}, {}, 0, str(error)))
             continue
-        found.append(runner.run(edited))
+        if place is None:
+            found.append(runner.run(edited))
+            continue
+        with journal.kept(place.parent, place.name) as kept:
+            found.append(runner.run(edited))
+            kept.remove()
     return found, time.process_time() - begun
 
 

@@ -1,4 +1,4 @@
-"""Which of eight unknowns of the mechanism with clearance decides where the platform stands at the top of the stroke.
+"""Which of eight unknowns of the mechanism with clearance decides how high the platform is at the top of the stroke.
 
 Sobol's indices with SALib (``pip install 'flexclear[sensitivity]'``): the first-order index of an unknown is the share
 of the variance that it explains alone, the total one the share that goes with it, together with others.
@@ -38,7 +38,7 @@ PROBLEM = {
 
 
 def study(count: int = 32, workers: int | None = None) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Distance of each point from where the platform stands on average [m], and the indices ``S1`` and ``ST`` of it.
+    """How far each point is above the platform's mean height [m], and the indices ``S1``, ``ST`` of it.
 
     count: a power of two; there are 10 points for each of them.
     """
@@ -46,8 +46,8 @@ def study(count: int = 32, workers: int | None = None) -> tuple[np.ndarray, dict
     vary = {name: points[:, k] for k, name in enumerate(UNKNOWNS)}
     keep = ["platform.position.final"]
     found = pipeline.sweep(SCENE, vary, keep, combine="list", set=SET, workers=workers)
-    place = found["platform.position.final"].values
-    error = np.linalg.norm(place - place.mean(axis=0), axis=1)
+    height = found["platform.position.final"].sel(axis="z").values
+    error = height - height.mean()
     return error, indices.analyze(PROBLEM, error, calc_second_order=False, seed=1)
 
 
@@ -61,7 +61,7 @@ def figure(found: dict[str, np.ndarray], target: Path) -> None:
         ax.barh(rows + shift, found[key], 0.36, xerr=found[f"{key}_conf"], label=words, error_kw={"lw": 0.8})
     ax.set_yticks(rows, list(UNKNOWNS))
     ax.invert_yaxis()
-    ax.set_xlabel("share of the variance of the platform's distance from its mean place")
+    ax.set_xlabel("share of the variance of the platform's height")
     ax.legend(frameon=False)
     made.savefig(target, dpi=150, metadata={"Software": None})
 

@@ -8,12 +8,13 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import rotation_between
-from flexclear.pipeline.core.artifacts.schema import conform
+from flexclear.pipeline.core.artifacts.schema import conform, require_complete
 from flexclear.pipeline.core.quantities import IMPACT, PARTED
 from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
 from flexclear.pipeline.post.impacts import impacts, of_kind
 from flexclear.pipeline.post.rotations import angle_about_y
 from flexclear.pipeline.post.schema import POST
+from flexclear.pipeline.post.wear import wear
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
@@ -22,8 +23,10 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one there are no ensemble
     variables.  The horizon is the run's own (its end where it has none), the ensemble's is called so.
     Nothing is interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
+    Raises InputError for what is left of a run that was stopped.
     """
-    data: Variables = {**motion(run), **contacts(run), **impacts(run)}
+    require_complete(run)
+    data: Variables = {**motion(run), **contacts(run), **impacts(run), **wear(run, parameters(run).get("joint", {}))}
     data["reaction"] = (("time", "joint"), reactions(run))
     data |= extremes(run, data["reaction"][1])
     end = float(run["horizon"] if "horizon" in run else run.time.values[-1])

@@ -89,7 +89,7 @@ class Mortal:
     def __init__(self, recovers: bool) -> None:
         self.recovers, self.given, self.renewed = recovers, 0, 0
 
-    def submit(self, family: str, packed: bytes, points: list[dict[str, Any]], alone: bool) -> Future[Any]:
+    def submit(self, family: str, packed: bytes, points: list[dict[str, Any]], *_: Any) -> Future[Any]:
         self.given += 1
         future: Future[Any] = Future()
         if self.given in (3, 4) or (self.given > 4 and not self.recovers):
@@ -102,8 +102,8 @@ class Mortal:
         self.renewed += 1
 
     def run(self, told: list[int]) -> None:
-        jobs = [sweep_engine.Job(str(n), "family", {"n": n}) for n in range(40)]
-        engine = sweep_engine.Engine(self.submit, lambda: 2, self.renew)
+        jobs = [sweep_engine.Job(str(n), "family", {"n": n}, Path(str(n))) for n in range(40)]
+        engine = sweep_engine.Engine(self.submit, lambda: 2, renew=self.renew)
         engine.run(jobs, {"family": b""}, lambda found, _: told.extend(point.evaluations for _, point in found))
 
 

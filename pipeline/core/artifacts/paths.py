@@ -7,16 +7,23 @@ from pathlib import Path
 
 from flexclear.pipeline.core.version import version
 
-CHECKOUT = Path(__file__).absolute().parents[4]
+#: folder that holds the packages `pipeline` and `stages`: `flexclear`, or, where links are not followed, a checkout
+PACKAGES = Path(__file__).absolute().parents[3]
+#: folder that holds the package `flexclear`; sources are read below it
+TREE = PACKAGES if (PACKAGES / "flexclear" / "__init__.py").is_file() else PACKAGES.parent
+#: folder with the scenes and meshes of the project, which are installed with it
+DATA = PACKAGES
 
 
 def results_root() -> Path:
-    """Folder of all results: FLEXCLEAR_RESULTS; else ``results`` of the source checkout, wherever the
-    command is called from; else, where the package was installed without one, of the current folder."""
+    """Folder of all results: FLEXCLEAR_RESULTS; else ``results`` of the source checkout, where the command is called
+    from inside of one's own, else of the current folder."""
     named = os.environ.get("FLEXCLEAR_RESULTS")
     if named:
         return Path(named).resolve()
-    return (CHECKOUT if (CHECKOUT / "pyproject.toml").is_file() else Path.cwd()) / "results"
+    here = Path.cwd()
+    inside = (TREE / "pyproject.toml").is_file() and here.resolve().is_relative_to(TREE.resolve())
+    return (TREE if inside else here) / "results"
 
 
 def kernel_root() -> Path:

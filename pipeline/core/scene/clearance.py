@@ -128,6 +128,18 @@ def _not_above(dynamic: float, static: float) -> None:
         )
 
 
+class Wear(Part):
+    """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area).
+
+    coefficient: k [-], for the pair of surfaces.  hardness: of the softer one.  sectors: into which both surfaces are
+    divided around their axis for the map of depths; a ball and its socket also into bands of equal area.
+    """
+
+    coefficient: Annotated[Number, Positive]
+    hardness: Annotated[Pressure, Positive]
+    sectors: Annotated[int, Field(ge=4, le=720)] = 36
+
+
 class _Contact(Part):
     """What all contacts between surfaces have.
 
@@ -161,6 +173,7 @@ class ClearanceSpherical(_Clearance):
     ball_radius: Annotated[Length, Positive]
     socket_material: Material | None = None
     ball_material: Material | None = None
+    wear: Wear | None = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceSpherical:
@@ -189,6 +202,7 @@ class ClearanceRevolute(_Clearance):
     length: Annotated[Length, Positive]
     journal_material: Material | None = None
     pin_material: Material | None = None
+    wear: Wear | None = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceRevolute:

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     Length: TypeAlias = float
     Time: TypeAlias = float
     Mass: TypeAlias = float
+    Force: TypeAlias = float
     Angle: TypeAlias = float
     Speed: TypeAlias = float
     Rate: TypeAlias = float
@@ -64,6 +65,7 @@ else:
     Length = _scalar("length")
     Time = _scalar("time")
     Mass = _scalar("mass")
+    Force = _scalar("force")
     Angle = _scalar("angle")
     Speed = _scalar("velocity")
     Rate = _scalar("angular velocity")

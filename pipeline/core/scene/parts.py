@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
+from flexclear.pipeline.core.scene.appearance import Seen
 from flexclear.pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
@@ -21,19 +22,20 @@ from flexclear.pipeline.core.scene.fields import (
     Time,
     Velocity,
 )
+from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
 
 
-class Ground(Part):
+class Ground(Seen):
     """The fixed world; listed only to give it frames."""
 
     type: Literal["ground"]
     frames: dict[PartName, Pose] = Field(default_factory=dict)
 
 
-class RigidBody(Part):
+class RigidBody(Seen):
     """Mass, centre of mass and inertia about it, all in the body frame."""
 
     type: Literal["rigid"]
@@ -111,7 +113,7 @@ class Stiffening(Part):
     """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
 
 
-class FlexibleBody(Part):
+class FlexibleBody(Seen):
     """A body reduced from a mesh; its frames are those of the recipe.
 
     pose: start pose of the undeformed mesh frame.
@@ -129,7 +131,7 @@ class FlexibleBody(Part):
     angular_velocity: AngularVelocity | None = None
 
 
-class MeshedRigidBody(Part):
+class MeshedRigidBody(Seen):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
     ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
@@ -178,11 +180,18 @@ class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z.
 
     A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
-    `pipeline.dynamics.joints.planar`.
+    `pipeline.dynamics.joints.planar`.  friction: follows the force that the joint carries; absent means none.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
     between: tuple[FrameName, FrameName]
+    friction: JointFriction | None = None
+
+    @model_validator(mode="after")
+    def _rubs(self) -> IdealJoint:
+        if self.friction is not None:
+            require_fitting(self.type, self.friction)
+        return self
 
 
 #: types of ideal joints

@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from flexclear.pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
+from flexclear.pipeline.core.scene.clearance import (
+    CONTACTS,
+    BallOnPlane,
+    Clearance,
+    ClearanceRevolute,
+    ClearanceSpherical,
+)
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from flexclear.pipeline.core.scene.gears import Gear
@@ -18,6 +24,7 @@ from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
     Ground,
+    IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
@@ -28,6 +35,7 @@ from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from flexclear.pipeline.core.units import quantity
 
+Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it tells the whole relative motion
 SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
@@ -116,13 +124,30 @@ class View(Part):
     mechanism its normal, else from above and in front.
     """
 
-    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    direction: Direction | None = None
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+        default=None, description="quantities that comparisons, tables and films show, as 'platform.position'"
+    )
+    direction: Direction | None = Field(default=None, description="vector from the mechanism to the eye, world axes")
+    up: Direction | None = Field(
+        default=None, description="what is up in pictures, world axes; default: against gravity, else z"
+    )
+    zoom: Annotated[Number, Positive] | None = Field(
+        default=None, description="how many times larger than usual the mechanism is drawn"
+    )
+    exaggeration: Annotated[Number, Positive] | None = Field(
+        default=None, description="how many times larger than computed deformations are drawn; default: to be seen"
+    )
+    duration: Annotated[Time, Positive] | None = Field(default=None, description="of films; default: some 4 s")
+    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = Field(
+        default=None,
+        description="how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly",
+    )
 
     @model_validator(mode="after")
     def _points(self) -> View:
-        if self.direction is not None and not any(self.direction):
-            raise ValueError("a direction of length zero points nowhere")
+        for asked in (self.direction, self.up):
+            if asked is not None and not any(asked):
+                raise ValueError("a direction of length zero points nowhere")
         return self
 
 
@@ -334,9 +359,18 @@ class Scene(Part):
         """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
 
+    def worn(self) -> dict[str, ClearanceRevolute | ClearanceSpherical]:
+        """Joints with clearance whose wear is asked for, by name."""
+        wearing = (ClearanceRevolute, ClearanceSpherical)
+        return {n: j for n, j in self.joint.items() if isinstance(j, wearing) and j.wear is not None}
+
     def stop_ends(self) -> list[str]:
         """Names of all ends of stops, as records have them."""
         return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
+
+    def rubbing(self) -> dict[str, IdealJoint]:
+        """Ideal joints with friction, by name."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, IdealJoint) and j.friction is not None}
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from typing import TypeVar
 
+from flexclear.pipeline.core.errors import StoppedError
 from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.system import cores
+
+__all__ = ["cores", "free", "side_by_side", "tell"]
 
 Result = TypeVar("Result")
 #: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
 BESIDE = 4
 
 _told: bool | None = None
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def tell(others_idle: bool) -> None:
@@ -56,8 +54,9 @@ def side_by_side(work: Callable[[int, Progress], Result], count: int, done: Call
             for future in waiting:
                 results.append(future.result())
                 done(len(results))
-        except BaseException:
-            given_up.set()
+        except BaseException as error:
+            if not isinstance(error, StoppedError):  # of that all hear, and leave their work in good order
+                given_up.set()
             pool.shutdown(cancel_futures=True)
             raise
     return results

@@ -122,11 +122,13 @@ def make_right_hand_side(
     stops: Callable | None = None,
     closures: Any = None,
     harmonics: Callable | None = None,
+    friction: tuple[Callable, Callable] | None = None,
 ) -> Callable:
     """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
 
     joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels
-    that apply them.  closures: the module of that name.  harmonics: adds those of the laws of time.
+    that apply them.  closures: the module of that name.  harmonics: adds those of the laws of time.  friction: of ideal
+    joints, on accelerations and on drives (`equations.joint_friction`).
     """
     known_motion = make_known_motion(harmonics)
     kinematics = make_kinematics(joints, flexible)
@@ -136,6 +138,7 @@ def make_right_hand_side(
     modal = no_modal_forces if flexible is None else flexible.modal_forces
     close = no_closures if closures is None else closures.close
     known_forces = no_known_forces if closures is None else closures.known_forces
+    rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
 
     @kernel
     def spread_state(h, w, y):
@@ -197,8 +200,10 @@ def make_right_hand_side(
         backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
         for k in range(h[m.NV]):
             w[h[m.DU] + k] = w[h[m.FORCE] + k]
+        rub(h, f, w, n)
         drive_forces(h, w)
         known_forces(h, w)
+        rub_drives(h, w)
         rates(h, w, dy)
 
     return evaluate

@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import Parts
+from flexclear.pipeline.dynamics.effects import Parts, joint_frictions
 from flexclear.pipeline.dynamics.model import contacts as contacting
 from flexclear.pipeline.dynamics.model import flexible_bodies, laws, wiring
 from flexclear.pipeline.dynamics.model import loads as loading
@@ -100,9 +100,9 @@ def filled(
     coupled, gauges = couplings(mechanism), Gauges()
     if like is None:
         looped, order = wiring.closures(numbering, site_pairs, coupled)
-        closures = tuple([*mechanism.closures, *coupled][k] for k in order)
+        ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
     else:
-        looped, closures = {}, like.closures
+        looped, ordered = {}, like.closures
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
@@ -112,16 +112,20 @@ def filled(
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
+    wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
+    rubbing = _rubbing(numbering, parts, ordered, contact_ledger + ledger)
     groups, floors = _error_groups(numbering, ledger, gauges.internal)
     arrays = pack(
         {
             m.NQ: numbering.nq,
-            m.N_LEDGER: contact_ledger + ledger + gauges.internal,
+            m.N_LEDGER: len(groups) - numbering.nq - numbering.nv,
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
             m.N_COUPLINGS: len(coupled),
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
+            m.RUBBING_SLOT: contact_ledger + ledger,
+            m.WEAR_SLOT: len(groups) - numbering.nq - numbering.nv - gauges.internal - wear_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
@@ -131,6 +135,8 @@ def filled(
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
             **coupling_tables,
+            **rubbing,
+            m.WORN: contacting.worn(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
             m.GROUPS: groups,
@@ -145,7 +151,7 @@ def filled(
         arrays,
         mechanism.scene,
         mechanism.links,
-        closures,
+        ordered,
         mechanism.contacts,
         normals,
         loaded.loads,
@@ -193,7 +199,24 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         flexible=not mechanism.all_rigid,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,
+        joint_frictions=joint_frictions(mechanism.scene),
+        wear=bool(mechanism.scene.worn()),
     )
+
+
+#: tables of joints with friction, where there are none
+NO_FRICTION: dict[Any, Any] = dict.fromkeys(
+    (m.RUBBING, m.BEARINGS, m.RUBBING_ENTRIES, m.REACTION_TERMS, m.REACTION_LOOPS, m.BEARING_NUMBERS), ()
+)
+
+
+def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupling, ...], slot: int) -> dict[Any, Any]:
+    """Tables of the ideal joints with friction; slot: of their first loss in the ledger."""
+    if not parts.joint_frictions:
+        return NO_FRICTION
+    from flexclear.pipeline.dynamics.model import joint_friction
+
+    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
 
 
 def _pose_row(place: Placement) -> np.ndarray:
@@ -249,7 +272,13 @@ def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.n
                 target[mine] = len(floors) - 1
     groups = [*q_group, *v_group]
     energy = sum(link.mass for link in mechanism.links) * L**2
-    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * internal]
+    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads]
+    if mechanism.scene.rubbing():
+        from flexclear.pipeline.dynamics.model import joint_friction
+
+        tail += joint_friction.ledger_groups(mechanism, energy)
+    tail += [(L, 1), (energy, 1)] * len(mechanism.scene.worn())  # sliding distance, load path
+    tail += [(1.0, 1)] * internal
     for floor, count in tail:
         floors.append(floor)
         groups += [len(floors) - 1] * count

@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.periods import periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -136,7 +136,7 @@ def _sections(engine: Engine, kept: Sequence[Kept]) -> tuple[Values, int]:
     require_periodic(parts, start)
     looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + wanted.phase)
     values, evaluations = dict[str, list[np.ndarray]](), 0
-    for done in periods(parts, start, range(0)):
+    for done in periods(parts, start, range(0), Cursor()):
         evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
         if done.number >= wanted.transient:
             here = done.parts[looked_at]

@@ -15,17 +15,22 @@ from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.scene.schema import Scene, Sections
+from flexclear.pipeline.core.workflow import journal
+from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies, motion_series
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.periods import APART, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.periods import APART, Cursor, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
 from flexclear.pipeline.dynamics.run.run import engines, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
+#: of impacts, known when they end
+LATER = ("peak_force", "duration")
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
@@ -51,14 +56,21 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     require_periodic(parts, start)
     count = wanted.transient + wanted.periods
     followed = range(wanted.transient, min(count, wanted.transient + wanted.exponent_periods))
-    tape = _Tape(names, engine.start + wanted.phase)
-    for done in periods(parts, start, followed):
+    tape, begin = _Tape(names, engine.start + wanted.phase), Cursor()
+    kept = _Kept.found(engine, start)
+    if kept is not None and kept.state is not None:
+        remember(engine, kept.state.arrays)
+        tape.unpack(kept.state.arrays)
+        begin = Cursor.unpacked(kept.state.arrays)
+    for done in periods(parts, start, followed, begin):
         progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
         if done.number >= wanted.transient:
             tape.add(parts, done, number=done.number - wanted.transient)
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
+        if kept is not None:
+            kept.keep({**memory(engine), **done.after.packed()}, tape)
     growth = np.array(tape.growth[: len(followed)])
     told = {"period": period, "phase": wanted.phase, "transient": wanted.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
@@ -88,6 +100,30 @@ def section_period(scene: Scene) -> float:
             "give a time from 0 to below the period",
         )
     return period
+
+
+@dataclass
+class _Kept:
+    """What the task's journal knows of these sections: what an earlier attempt left, if anything."""
+
+    journal: Journal
+    name: str
+    begun: float
+    state: State | None
+
+    @staticmethod
+    def found(engine: Engine, start: np.ndarray) -> _Kept | None:
+        """None where nothing is kept."""
+        current, begun = journal.current(), journal.seconds()
+        if current is None:
+            return None
+        name = current.name(digest(engine, start))
+        return _Kept(current, name, begun, current.find(name))
+
+    def keep(self, arrays: Mapping[str, np.ndarray], tape: _Tape) -> None:
+        """From here on the work can go on without the pieces that led here; the tape is as it is until the next."""
+        seconds = journal.seconds() - self.begun
+        self.journal.cover(self.name, lambda: State({**arrays, **tape.packed()}, {}, np.zeros(0), seconds))
 
 
 @dataclass
@@ -148,6 +184,30 @@ class _Tape:
             if begun is not None and "duration" not in begun:
                 begun |= {"peak_force": event["peak_force"], "duration": event["duration"]}
 
+    def packed(self) -> dict[str, np.ndarray]:
+        """All of it so far as arrays."""
+        arrays = {"growth": np.array(self.growth), "lost": np.array(self.lost)}
+        for name in self.motions[0] if self.motions else ():
+            arrays[f"motion.{name}"] = _joined(self.motions, name)
+        for name in self.impacts[0] if self.impacts else ():
+            if name not in LATER:
+                arrays[f"impact.{name}"] = np.array([impact[name] for impact in self.impacts])
+        arrays["ended"] = np.array(["duration" in impact for impact in self.impacts])
+        arrays |= {f"later.{name}": self._column(name, np.nan) for name in LATER}
+        last = {id(impact): k for k, impact in enumerate(self.impacts)}
+        arrays["open"] = np.array([[c, last[id(impact)]] for c, impact in self.open.items()], int).reshape(-1, 2)
+        return arrays
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Take up what `packed` gave."""
+        self.growth, self.lost = arrays["growth"].tolist(), int(arrays["lost"])
+        motion = _named(arrays, "motion.")
+        self.motions = [{name: (_dimensions(name), values) for name, values in motion.items()}] if motion else []
+        for k, ended in enumerate(arrays["ended"]):
+            impact = {name: values[k] for name, values in _named(arrays, "impact.").items()}
+            self.impacts.append(impact | ({name: arrays[f"later.{name}"][k] for name in LATER} if ended else {}))
+        self.open = {int(c): self.impacts[k] for c, k in arrays["open"]}
+
     def variables(self, model: Model) -> Variables:
         """All of it, by the names of the schema SECTIONS."""
         kept = {
@@ -170,6 +230,17 @@ class _Tape:
 
     def _column(self, name: str, absent: float) -> np.ndarray:
         return np.array([float(impact.get(name, absent)) for impact in self.impacts])
+
+
+def _dimensions(name: str) -> tuple[str, ...]:
+    """Of a series of the motion, see `motion_series`."""
+    if name == "contact_offset":
+        return ("time", "contact", "axis")
+    return ("time", "body", "quat" if name == "quaternion" else "axis")
+
+
+def _named(arrays: Mapping[str, np.ndarray], begin: str) -> dict[str, np.ndarray]:
+    return {name.removeprefix(begin): values for name, values in arrays.items() if name.startswith(begin)}
 
 
 def _joined(motions: Iterable[Variables], name: str) -> np.ndarray:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.paths import CHECKOUT
+from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
 from flexclear.pipeline.post.models import (
     CSJ,
@@ -46,7 +46,7 @@ NEEDS = (
 )
 
 #: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
-SECTIONS = CHECKOUT / "docs/chaos/verdicts.csv"
+SECTIONS = TREE / "docs/chaos/verdicts.csv"
 #: two answers agree, or an effect is slight, below this share; one that has no influence is below SMALL
 SLIGHT, SMALL = 0.1, 0.05
 HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
