@@ -13,4 +13,7 @@ NAMES = {
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
     "sweep": "sweep:FAMILY",
+    "gallery": "gallery:FAMILY",
+    "plan": "plan:FAMILY",
+    "effects": "effects:FAMILY",
 }

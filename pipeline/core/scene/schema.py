@@ -45,7 +45,10 @@ MOST_SAMPLES = 1e6
 
 
 class TimeSpan(Part):
-    """Start and end of the run."""
+    """Start and end of the run.
+
+    start, end: times at which the run begins and ends.
+    """
 
     start: Time = 0.0
     end: Time
@@ -61,6 +64,7 @@ class Ensemble(Part):
     """Members that start with the ball of every clearance joint offset in a random direction.
 
     bodies: whose motion is kept; default: the bodies that carry the clearance joints.
+    members: how many runs.  perturbation: by which length the balls are offset.  seed: of the random directions.
     """
 
     members: Annotated[int, Field(ge=2, le=100_000)] = 16
@@ -76,6 +80,7 @@ class Sections(Part):
     phase: when in the period the motion is looked at [s].  transient: periods that are not kept, before the `periods`
     that are.  exponent_periods: how many of these are followed by a neighbour too, which tells the rate at which
     motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
+    periods: that are kept.
     """
 
     period: Annotated[Time, Field(gt=0.0)] | None = None
@@ -87,7 +92,10 @@ class Sections(Part):
 
 
 class Wanted(Part):
-    """A wanted accuracy: absolute in SI, or relative to the quantity's own size."""
+    """A wanted accuracy: absolute in SI, or relative to the quantity's own size.
+
+    absolute: in the SI unit of the quantity.  relative: share of the largest change of the quantity.
+    """
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
     relative: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
@@ -98,16 +106,19 @@ class Accuracy(Part):
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
+    quantities: a file writes them without this key.
     allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
+    by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 
     quantities: dict[str, Wanted] = Field(default_factory=dict)
     allow_missed: bool = False
+    by_need: bool | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _flat(cls, table: Any) -> Any:
-        plain = {"allow_missed", "source"}
+        plain = {"allow_missed", "by_need", "source"}
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
         wanted = {name: value for name, value in table.items() if name not in plain}
@@ -181,7 +192,16 @@ def _wanted(name: str, value: Any) -> Any:
 
 
 class Scene(Part):
-    """Everything a scene file says, after composition. Names of parts are keys."""
+    """Everything a scene file says, after composition. Names of parts are keys.
+
+    title: what it is, in a line.  description: more words.  body: bodies by name.  joint: joints by name, ideal ones
+    and ones with clearance.  drive: prescribed motions by name.  load: forces, springs, controllers and gravity by
+    name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  time: begin and end of
+    the run.  start: how the run begins, beyond poses and velocities of bodies.  solver: integrator and tolerance.
+    output: what is recorded.  ensemble: runs from nearby starts.  sections: repeated motion, looked at once in each
+    period.  accuracy: wanted accuracy by quantity.  limits: what the work may take of the machine.  view: what pictures
+    and comparisons look at.
+    """
 
     title: str
     description: str = ""
@@ -235,6 +255,15 @@ class Scene(Part):
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _method_by_need(cls, table: Any) -> Any:
+        """Note whether the integrator is left open, before it gets its default."""
+        accuracy, solver = (table.get(key) for key in ("accuracy", "solver")) if isinstance(table, dict) else (0, 0)
+        if not isinstance(accuracy, dict) or "by_need" in accuracy or not isinstance(solver, dict | None):
+            return table
+        return {**table, "accuracy": {**accuracy, "by_need": not {"integrator", "step"} & set(solver or ())}}
+
     @model_validator(mode="after")
     def _fits_together(self) -> Scene:
         self.check()
@@ -246,6 +275,10 @@ class Scene(Part):
         self._samples_can_be_made()
         self._quantities_are_there()
         self._stressed_bodies_are_flexible()
+
+    def by_need(self) -> bool:
+        """Whether the integrator is chosen for the accuracy that is asked for."""
+        return bool(self.accuracy is not None and self.accuracy.quantities and self.accuracy.by_need)
 
     def owners(self) -> dict[str, tuple[str, ...]]:
         """Names of the parts that may own a quantity, by what they are."""

@@ -47,9 +47,9 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
     making = Lock()
 
-    def heir() -> Engine:
+    def heir(name: str) -> Engine:
         with making:
-            return another(other())
+            return another(other(name))
 
     def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
         """On an engine of its own, so that it does not depend on who ran before."""
