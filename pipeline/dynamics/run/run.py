@@ -28,8 +28,9 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from flexclear.pipeline.dynamics.run.pace import Judge
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
-from flexclear.pipeline.dynamics.run.trajectory import Judge, StiffError, Trajectory
+from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
