@@ -13,4 +13,6 @@ NAMES = {
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
     "gallery": "gallery:FAMILY",
+    "plan": "plan:FAMILY",
+    "effects": "effects:FAMILY",
 }

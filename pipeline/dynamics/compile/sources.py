@@ -80,6 +80,9 @@ def _project(parts: Parts) -> str:
     given, imports = _joints(parts)
     given = {"evaluate": "calls.evaluate", **given}
     given["closures"] = _closures(imports, parts)
+    if parts.flexible:
+        stiffen = _import(imports, f"{DYNAMICS}.equations.projection", "make_stiffen")
+        given["stiffen"] = f"{stiffen}({given['closures']})"
     maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
     return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
 
