@@ -141,7 +141,7 @@ def _add_rigid(model: Model, place: Placement, mass: float, J: np.ndarray) -> An
 
 
 def _rigid_body(model: Model, scene: Scene, i: int) -> None:
-    mass, com, J = rigid_inertia(scene, model.groups[i], Placement())
+    mass, com, J = rigid_inertia(scene, model.groups[i].places)
     model.bodies.append(_add_rigid(model, model.starts[i].of(Placement(com)), mass, J))
     model.centres.append(com)
 

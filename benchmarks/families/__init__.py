@@ -12,6 +12,7 @@ NAMES = {
     "stability": "stability:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
+    "sweep": "sweep:FAMILY",
     "gallery": "gallery:FAMILY",
     "plan": "plan:FAMILY",
     "effects": "effects:FAMILY",

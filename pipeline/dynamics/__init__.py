@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
-    from flexclear.pipeline.dynamics.run.trajectory import Judge
+    from flexclear.pipeline.dynamics.run.pace import Judge
 
 __all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 

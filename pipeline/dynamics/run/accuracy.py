@@ -27,8 +27,8 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import Quantity, parse
 
 if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.pace import Judge
     from flexclear.pipeline.dynamics.run.suited import Suit
-    from flexclear.pipeline.dynamics.run.trajectory import Judge
 
 #: by integrator, who looks whether another one shall go on, and which
 Judges = Mapping[str, "tuple[Judge, str]"]

@@ -9,7 +9,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.run.engine import Engine, pieces_at
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation
@@ -38,11 +38,7 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 
 def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np.ndarray:
     """The same as the kernel writes it, shape (rows, columns); see `equations.observation.by_name`."""
-    segments = engine.breaks
-    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
-    middles = 0.5 * (segments[sides - 1] + segments[sides])
-    per_segment = {x: pieces_at(engine.model, x) for x in set(middles.tolist())}
-    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64)
+    pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
     share = min(MOST_SHARE, max(RECORD_SHARE, LOOSER * engine.rtol))
     return observe_with(engine, rows, pieces, max(share * engine.rtol, ROUNDING))
 
@@ -80,7 +76,7 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -
     between them.
     clear: pivot ratio of the closures that the sides must have.
     """
-    pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))
+    pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
     for k in range(TRIES):
         rows = np.tile(row, (len(SIDES), 1))
         near = m.record(rows, len(engine.model.contacts))

@@ -28,8 +28,9 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from flexclear.pipeline.dynamics.run.pace import Judge
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
-from flexclear.pipeline.dynamics.run.trajectory import Judge, StiffError, Trajectory
+from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
@@ -218,7 +219,7 @@ def _near_singular(
 ) -> Iterator[tuple[int, Collocation]]:
     """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
-        engine.select_pieces(0.5 * (motion.start + motion.end))
+        engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
             if blurred(engine, rows[k]):

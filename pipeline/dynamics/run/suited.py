@@ -23,9 +23,9 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.pace import Judge, foreseen, limited
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import Judge, foreseen, limited
 
 #: evaluations of a step of the default method, and how far its region of stability reaches where steps swing about it,
 #: along both axes; the product of rate and step that its error control settles at

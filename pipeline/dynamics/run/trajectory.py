@@ -16,6 +16,7 @@ from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTL
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.pace import Judge, crawls
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
@@ -29,23 +30,10 @@ EVENT_ROWS = 4096
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
 #: why it stops that a polynomial over a singular pose may mend
 STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
-#: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
-TRIAL, HOPELESS = 400_000, 10_000_000
 #: control floats of a method that another one goes on with
 LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
 
 Stop = Callable[[np.ndarray], bool]
-
-
-@dataclass(frozen=True)
-class Judge:
-    """Who looks at a run now and then, whether another method should go on with it.
-
-    every: evaluations between two looks.  verdict: why another one should, or nothing.
-    """
-
-    every: int
-    verdict: Callable[[Engine], str]
 
 
 def never(rows: np.ndarray) -> bool:
@@ -133,7 +121,7 @@ def integrate(
     Where the task keeps a journal, what an earlier attempt left there is gone on with.  Raises StoppedError, with the
     engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
     """
-    judge = judge or Judge(SLICE, _crawls)
+    judge = judge or Judge(SLICE, crawls)
     if outputs is None:
         outputs = output_times(engine.breaks, engine.model.scene.output.interval)
     mine = piece(engine, y, outputs, left)
@@ -184,7 +172,7 @@ def _advance(
         if not resumed:
             if a > (engine.start if left is None else left.time):
                 engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-            engine.select_pieces(0.5 * (a + b))
+            engine.select_pieces_after(0.5 * (a + b))
             control[m.END], engine.n[m.FRESH] = b, 1
         resumed = False
         if _segment(engine, tape, progress, stop, mine, judge):
@@ -365,24 +353,6 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
         return False
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
     return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
-
-
-def foreseen(engine: Engine) -> float:
-    """Evaluations of the whole run, at the pace so far."""
-    return float(engine.n[m.EVALUATIONS] / max((engine.control[m.TIME] - engine.start) / engine.control[m.SPAN], 1e-12))
-
-
-def limited(engine: Engine) -> bool:
-    """Whether stability, not accuracy, limits the steps that the method chooses."""
-    return bool(engine.n[m.STIFF_STEPS] > refusal.STIFF_SHARE * engine.n[m.STEPS])
-
-
-def _crawls(engine: Engine) -> str:
-    """Why the run would take far too long, where stability limits the steps; else nothing."""
-    n, control = engine.n, engine.control
-    if not engine.method.traits.hands_over_to or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
-        return ""
-    return refusal.stiffness(n, control) if limited(engine) and foreseen(engine) > min(HOPELESS, n[m.CAP]) else ""
 
 
 def _hand_over(engine: Engine, tape: Tape) -> Handover:
