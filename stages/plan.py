@@ -83,7 +83,7 @@ class Planned:
 
     def text(self) -> str:
         """The table of decisions."""
-        return self.kept("plan.md").read_text()
+        return self.kept("plan.md").read_text(encoding="utf-8")
 
     def file(self, target: Path) -> bytes:
         """The planned scene's file as it stands at a place; it extends the full scene's."""

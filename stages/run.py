@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import re
 import time
@@ -13,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
@@ -128,34 +127,6 @@ def _deadline(options: argparse.Namespace | None) -> tuple[float, str]:
     except ValueError as error:
         raise InputError(f"--limit {text}", f"is no time: {error}", "write --limit 2h, or '90 min'") from None
     return seconds, f"the time that --limit {text} gives is over"
-
-
-def json_argument(parser: argparse.ArgumentParser) -> None:
-    """For scripts: what else is printed, as JSON."""
-    parser.add_argument("--json", action="store_true", help="print the results as JSON")
-
-
-def as_json(found: object) -> str:
-    """A result as JSON; datasets as their variables with dimensions, units and values, and their attributes."""
-    return json.dumps(found, indent=2, default=_plain, allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    if hasattr(value, "data_vars"):
-        variables = {
-            str(name): {"dims": list(data.dims), "units": data.attrs.get("units", ""), "values": _finite(data.values)}
-            for name, data in value.variables.items()
-        }
-        return {"attributes": dict(value.attrs), "variables": variables}
-    return _finite(value) if hasattr(value, "tolist") else str(value)
-
-
-def _finite(values: Any) -> Any:
-    """Numbers of an array as lists; those that JSON does not have are null."""
-    plain = values.tolist() if hasattr(values, "tolist") else values
-    if isinstance(plain, list):
-        return [_finite(value) for value in plain]
-    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
 
 
 def told(folder: Path, files: Mapping[str, str]) -> None:
