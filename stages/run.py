@@ -225,14 +225,6 @@ def graph(scene: Scene) -> Graph:
     return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
 
-def rendered(scene: Scene, place: Workplace | None = None) -> Path:
-    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, wanted = place or workplace(), Graph(scene)
-    require_names(scene)
-    check(place.bring(list(wanted.render.values()), jobs=1))
-    return place.store.root / wanted.simulate.folder
-
-
 def results(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
     import xarray as xr
