@@ -23,13 +23,12 @@ from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
-from flexclear.pipeline.core.units import quantity
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import WARNING, Monitor
 from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import owner
+from flexclear.stages import limit, owner
 from flexclear.stages.graph import STAGES, Graph
 
 if TYPE_CHECKING:
@@ -94,31 +93,10 @@ def common_arguments(parser: argparse.ArgumentParser) -> None:
         help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
     )
     parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
-    limit_argument(parser)
+    limit.argument(parser)
     said = parser.add_mutually_exclusive_group()
     said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
     said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
-
-
-def limit_argument(parser: argparse.ArgumentParser) -> None:
-    """How long the command may take."""
-    parser.add_argument(
-        "--limit", metavar="TIME", help="stop in good order after, e.g., 2h (exit code 4); run again to go on"
-    )
-
-
-def _deadline(options: argparse.Namespace | None) -> tuple[float, str]:
-    """Seconds from now, and what is told then; InputError for what is no time."""
-    text = getattr(options, "limit", None)
-    if text is None:
-        return math.inf, ""
-    try:
-        seconds = quantity(re.sub(r"(?<=[0-9.])(?=[a-z])", " ", text.strip()), "time")
-        if not seconds > 0.0:
-            raise ValueError("it must be above zero")
-    except ValueError as error:
-        raise InputError(f"--limit {text}", f"is no time: {error}", "write --limit 2h, or '90 min'") from None
-    return seconds, f"the time that --limit {text} gives is over"
 
 
 def told(folder: Path, files: Mapping[str, str]) -> None:
@@ -180,7 +158,7 @@ def workplace(options: argparse.Namespace | None = None) -> Workplace:
     jobs = getattr(options, "jobs", None)
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
-    root, (seconds, why) = results_root(), _deadline(options)
+    root, (seconds, why) = results_root(), limit.deadline(options)
     sources = Sources(TREE, root / "cache" / "imports.json")
     return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (time.monotonic() + seconds, why))
 

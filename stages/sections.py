@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.stages import as_json, run
+from flexclear.stages import as_json, limit, run
 from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
-    run.limit_argument(parser)
+    limit.argument(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
     as_json.json_argument(parser)
 

@@ -15,7 +15,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
-from flexclear.stages import run, sweep_plan
+from flexclear.stages import limit, run, sweep_plan
 from flexclear.stages.run import Workplace
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
 
@@ -35,7 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, metavar="N", help="processes of this machine (default: its cores)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep)")
-    run.limit_argument(parser)
+    limit.argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:

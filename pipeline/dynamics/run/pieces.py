@@ -27,6 +27,10 @@ from flexclear.pipeline.dynamics.run.singular_pass import Pass
 MEMORY = ("w", "n", "h", "kept")
 
 
+#: closure rows solved for, each from a time on [s]
+Selections = tuple[tuple[float, np.ndarray], ...]
+
+
 @dataclass
 class Tape:
     """The arrays of one integration; rows and events may be replaced by larger ones.
@@ -41,6 +45,30 @@ class Tape:
     collocations: list[Collocation] = field(default_factory=list)
     passes: list[Pass] = field(default_factory=list)
     doubted: set[str] = field(default_factory=set)
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What the next method must know, copied, at the end of the last accepted step.
+
+    y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
+    lasting: control floats LASTING.  rows, events: what was recorded.  selections: as of a trajectory.
+    """
+
+    y: np.ndarray
+    modes: np.ndarray
+    latched: np.ndarray
+    watched: np.ndarray
+    counters: np.ndarray
+    lasting: np.ndarray
+    rows: np.ndarray
+    events: np.ndarray
+    selections: Selections
+
+    @property
+    def time(self) -> float:
+        """Where the next method begins [s]."""
+        return float(self.lasting[0])
 
 
 @dataclass
@@ -121,10 +149,10 @@ def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
     engine.h[list(m.ADDRESSES)] = addresses
 
 
-def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Any) -> Piece | None:
+def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | None) -> Piece | None:
     """The piece of an integration from state y, as an earlier attempt left it; None where nothing is kept.
 
-    left: what another method left (`trajectory.Handover`), or None.
+    left: what another method left or None.
     """
     kept = journal.current()
     if kept is None:

@@ -17,7 +17,7 @@ from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.pace import Judge, crawls
-from flexclear.pipeline.dynamics.run.pieces import Piece, Tape, piece
+from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
@@ -33,8 +33,6 @@ STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
 #: control floats of a method that another one goes on with
 LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
 
-#: closure rows solved for, each from a time on [s]
-Selections = tuple[tuple[float, np.ndarray], ...]
 Stop = Callable[[np.ndarray], bool]
 
 
@@ -86,30 +84,6 @@ class Trajectory:
     def selection(self, row: int) -> np.ndarray:
         """Closure rows that were solved for to reach a row."""
         return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
-
-
-@dataclass(frozen=True)
-class Handover:
-    """What the next method must know, copied, at the end of the last accepted step.
-
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
-    lasting: control floats LASTING.  rows, events: what was recorded.  selections: as of a trajectory.
-    """
-
-    y: np.ndarray
-    modes: np.ndarray
-    latched: np.ndarray
-    watched: np.ndarray
-    counters: np.ndarray
-    lasting: np.ndarray
-    rows: np.ndarray
-    events: np.ndarray
-    selections: Selections
-
-    @property
-    def time(self) -> float:
-        """Where the next method begins [s]."""
-        return float(self.lasting[0])
 
 
 class StiffError(SolverError):
