@@ -89,7 +89,7 @@ def spread(h, w, c):
                 l_ik, other = w[row + k], S + count * b
                 for r in range(count):
                     w[mine + r] -= l_ik * w[other + r]
-        inverse = 1.0 / w[row + i]
+        inverse = w[row + i]
         for r in range(count):
             w[mine + r] *= inverse
 
@@ -132,7 +132,7 @@ def independence(h, w):
     """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
     least = 1.0
     for r in range(h[m.N_KEPT_ROWS]):
-        pivot = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r] ** 2
+        pivot = 1.0 / w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r] ** 2
         o = h[m.ROW_SCALE] + r
         least = min(least, pivot / max(w[o], w[o + h[m.N_CLOSURE_ROWS]]))
     return least

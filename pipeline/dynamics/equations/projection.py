@@ -90,6 +90,8 @@ def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) 
             worst = max(widest(h, w, h[m.RESIDUAL], True), widest(h, w, h[m.RESIDUAL_RATE], True))
             if worst <= tolerance:
                 return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
+            if n[m.ABRIDGED]:
+                evaluate(h, f, w, n, t, y, dy)  # for its factors
             correction(h, w, h[m.RESIDUAL_RATE], step)
             for k in range(h[m.NV]):
                 w[y + h[m.NQ] + k] += w[step + k]

@@ -40,6 +40,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     engine, other = engines(scene, bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
+    engine.straight.wanted = True
     jacobian = offset_jacobian(engine, start)
     members, reasons = [], []
     for k, offsets in enumerate(ball_offsets(engine.model, wanted, wanted.members)):

@@ -66,6 +66,7 @@ class Runner:
         engine, other = engines_alike(self.engine, scene, self.bundles)
         self.engine = self.engine or engine
         found, count = list[Values](), 0
+        engine.straight.wanted = True
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, silent, other)
             found.append(_kept(last, trajectory, self.kept))

@@ -19,6 +19,7 @@ OFTEN = 0.05
 
 def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
+    engine.complete()
     control, n, contacts = engine.control, engine.n, engine.model.contacts
     if n[m.STATUS] in LOOPS:
         told = beyond_reach(engine) or end_in_pose(engine, rows)

@@ -17,6 +17,7 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
+from flexclear.pipeline.dynamics.run.specialised import MANY, specialise
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
 
 #: evaluations between two looks at the clock and the keyboard
@@ -166,6 +167,8 @@ def integrate(
     tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
     if left is None and engine.mobility.singular_start:
         _leave_singular_start(engine, tape)
+    if engine.straight.wanted:
+        specialise(engine, progress)
     control = engine.control
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
@@ -297,6 +300,9 @@ def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> boo
         elif _crawls(engine):
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
         else:
+            engine.straight.wanted |= bool(n[m.EVALUATIONS] >= MANY)
+            if engine.straight.wanted:
+                specialise(engine, progress)
             _warn(engine, tape, progress)
             if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):
                 return True

@@ -1,0 +1,38 @@
+"""When the steps evaluate with code for the mechanism's wiring alone, instead of the code for all mechanisms.
+
+It takes some seconds to make, once for all scenes of this wiring, and half the time to run. It is made for ensembles,
+sections and sweeps at once, and for a run that has taken `MANY` evaluations: what the scene says and what its run has
+met decide, no clock and no cache, so that equal scenes give equal bytes. Values differ from those of the other code by
+rounding.
+"""
+
+from __future__ import annotations
+
+from numba import config
+
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.specialise.tape import TooLong
+from flexclear.pipeline.dynamics.specialise.wiring import wiring
+
+#: evaluations of one run after which it goes on so: those that it has taken cost what the code takes to make
+MANY = 1_000_000
+#: selections of closure rows for which it is made, of one run
+SELECTIONS = 4
+
+
+def specialise(engine: Engine, progress: Progress = silent) -> None:
+    """Let the engine's steps evaluate with code for its wiring and the closure rows that are solved for now.
+
+    Nothing changes where there is so much to compute that straight code would be no faster.
+    """
+    known, kept = engine.straight.addresses, engine.kept.tobytes()
+    if config.DISABLE_JIT or kept in known or len(known) >= SELECTIONS:
+        return
+    wired = wiring(engine.model.arrays, engine.h)
+    try:
+        known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
+    except TooLong:
+        known[kept] = 0
+    engine.connect()
