@@ -105,7 +105,7 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
 
 
 def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None]) -> int:
-    """Address of the right-hand side for one wiring; TooLong when there can be none."""
+    """Address of the right-hand side for one wiring; UnsuitedError when there is none."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     with disk_limits(folder):
         found = _modules(folder, {SPECIALISED: sources.specialised(parts, wiring)}, tell, began)

@@ -13,7 +13,7 @@ from numba import config
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.specialise.tape import TooLong
+from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
 
 #: evaluations of one run after which it goes on so: those that it has taken cost what the code takes to make
@@ -33,6 +33,6 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
     wired = wiring(engine.model.arrays, engine.h)
     try:
         known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
-    except TooLong:
+    except UnsuitedError:
         known[kept] = 0
     engine.connect()

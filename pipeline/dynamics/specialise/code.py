@@ -15,7 +15,7 @@ FLAGS = ("contract", "reassoc", "nsz")
 TYPES = {FLOAT: ir.DoubleType(), INTEGER: ir.IntType(64), BIT: ir.IntType(1)}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "iadd": "add", "imul": "mul", "and": "and_"}
 #: functions of the processor, and of the mathematics library
-INTRINSICS = {"sqrt": "llvm.sqrt", "fabs": "llvm.fabs", "round": "llvm.rint", "pow": "llvm.pow"}
+INTRINSICS = {"sqrt": "llvm.sqrt", "fabs": "llvm.fabs", "round": "llvm.rint", "pow": "llvm.pow", "copysign": "llvm.copysign"}
 LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2"}
 
 

@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
 #: operations beyond which straight code is no faster than loops: it no longer fits the caches near to the processor
@@ -27,11 +27,14 @@ _INTEGER = ir.IntType(64)
 
 
 def program(rates: Callable, wiring: wired.Wiring) -> Program:
-    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; TooLong when it is too much."""
+    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too much, or divides by zero."""
     h, trace = wired.header(wiring), Trace(LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
     w.values.update(wired.ground(h))
-    trace.plain(rates)(h, f, w, n, wired.start(wired.STATE), wired.start(wired.RATES))
+    try:
+        trace.plain(rates)(h, f, w, n, wired.start(wired.STATE), wired.start(wired.RATES))
+    except ZeroDivisionError:
+        raise UnsuitedError("rows are solved for of which the wiring says that they depend on each other") from None
     kept = _kept(h)
     stores = [("w", place, value) for place, value in w.values.items() if kept(*wired.split(place))]
     return Program(trace.tape.block, [*stores, ("n", m.EVALUATION, n.values[m.EVALUATION]), ("n", m.ABRIDGED, 1)])

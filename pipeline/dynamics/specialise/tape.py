@@ -16,8 +16,8 @@ FLOAT, INTEGER, BIT = "float", "integer", "bit"
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
 
-class TooLong(Exception):
-    """The computation has more operations than it was allowed."""
+class UnsuitedError(Exception):
+    """There is no straight code for a wiring, or none that would be faster."""
 
 
 class Undecided(Exception):  # noqa: N818  (not an error: how a branch leaves the function that met it)
@@ -128,7 +128,7 @@ class Tape:
             self.block.append(found)
             self.left -= 1
             if self.left < 0:
-                raise TooLong
+                raise UnsuitedError("the computation is too long")
         return found
 
     def add(self, a: Any, b: Any) -> Any:

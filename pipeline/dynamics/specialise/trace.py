@@ -18,7 +18,7 @@ from numba.core.dispatcher import Dispatcher
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 #: of NumPy, that kernels apply
-FUNCTIONS = ("sqrt", "sin", "cos", "exp", "tanh", "arctan2", "round")
+FUNCTIONS = ("sqrt", "sin", "cos", "exp", "tanh", "arctan2", "round", "copysign")
 
 
 class Memory:
