@@ -152,8 +152,9 @@ EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1
 LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
 SITES = wiring("link port")  # port: or -1
-#: data0: first of its numbers; inboard: whether modes move the inboard frame
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard")
+#: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
+#: the mass matrix
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled")
 MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
 PORTS = wiring("flex column shapes")  # column, shapes: first of them
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope

@@ -83,12 +83,13 @@ def spread(h, w, c):
         first, row, mine = m.ENVELOPE.first(h, i), base(h, h[m.ENVELOPE.place], h[m.MASS], i), S + count * a
         for r in range(count):
             w[mine + r] = w[J + count * a + r]
-        for b in range(a):
+        for b in range(a - 1, -1, -1):
             k = m.SUPPORT.coordinate(h, support + b)
-            if k >= first:
-                l_ik, other = w[row + k], S + count * b
-                for r in range(count):
-                    w[mine + r] -= l_ik * w[other + r]
+            if k < first:
+                break  # in increasing order
+            l_ik, other = w[row + k], S + count * b
+            for r in range(count):
+                w[mine + r] -= l_ik * w[other + r]
         inverse = w[row + i]
         for r in range(count):
             w[mine + r] *= inverse
