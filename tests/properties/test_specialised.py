@@ -75,11 +75,11 @@ def test_every_scene_is_evaluated_alike(path: Path) -> None:
     kernel, start = rates_kernel(model), initial.start_state(model)
     space.w[y : y + model.ny] = start
     keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
-    try:
-        made = program(kernel, wiring(model.arrays, h))
-    except UnsuitedError as reason:
-        assert "too long" in str(reason)
+    if path.stem == "four_bars_40":  # the longest of the checks
+        with pytest.raises(UnsuitedError, match="too long"):
+            program(kernel, wiring(model.arrays, h))
         return
+    made = program(kernel, wiring(model.arrays, h))
     start[model.speeds] += 0.1 * np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
         ways = []
@@ -143,7 +143,8 @@ def source(scene: Scene) -> str:
 
 
 @pytest.mark.parametrize(
-    "place, value", [("joint.A1.clearance", 2e-4), ("body.platform.mass", 3.0), ("load.gravity.acceleration", [0, 1, 2])]
+    "place, value",
+    [("joint.A1.clearance", 2e-4), ("body.platform.mass", 3.0), ("load.gravity.acceleration", [0, 1, 2])],
 )
 def test_no_number_is_in_the_code(place: str, value: Any) -> None:
     scene = load_scene(TREE / "scenes/sps4/csj.toml")

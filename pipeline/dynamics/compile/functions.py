@@ -25,9 +25,9 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
 from flexclear.pipeline.dynamics.compile.files import bring, compiled
-from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring

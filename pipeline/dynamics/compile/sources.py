@@ -52,6 +52,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
     Raises InputError when a name is not listed in its family.
     """
     found = {part.module for part in named(scene)}
+    found |= _reached(specialised(most_parts(scene), ()))
     for scheme in schemes(scene):
         for source in sources(most_parts(scene), scheme).values():
             found |= _reached(source)

@@ -1,1 +1,1 @@
-"""The right-hand side again, for one mechanism's wiring: kernels run on symbols, what they compute made straight code."""
+"""The right-hand side again, for one wiring: kernels run on symbols, what they compute made straight code."""

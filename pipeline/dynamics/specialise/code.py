@@ -15,7 +15,13 @@ FLAGS = ("contract", "reassoc", "nsz")
 TYPES = {FLOAT: ir.DoubleType(), INTEGER: ir.IntType(64), BIT: ir.IntType(1)}
 ARITHMETIC = {"add": "fadd", "sub": "fsub", "iadd": "add", "imul": "mul", "and": "and_"}
 #: functions of the processor, and of the mathematics library
-INTRINSICS = {"sqrt": "llvm.sqrt", "fabs": "llvm.fabs", "round": "llvm.rint", "pow": "llvm.pow", "copysign": "llvm.copysign"}
+INTRINSICS = {
+    "sqrt": "llvm.sqrt",
+    "fabs": "llvm.fabs",
+    "round": "llvm.rint",
+    "pow": "llvm.pow",
+    "copysign": "llvm.copysign",
+}
 LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2"}
 
 
@@ -99,11 +105,13 @@ class Emitter:
         if not joins:
             return
         builder, condition = self.builder, self.values[branch.condition]
-        if not any(self.uses[item] for block in branch.blocks for item in block if isinstance(item, Symbol)) and not any(
-            isinstance(item, Branch) for block in branch.blocks for item in block
-        ):
+        if not any(
+            self.uses[item] for block in branch.blocks for item in block if isinstance(item, Symbol)
+        ) and not any(isinstance(item, Branch) for block in branch.blocks for item in block):
             for joined, a, b in joins:
-                self.values[joined] = builder.select(condition, self._value(a, joined.kind), self._value(b, joined.kind))
+                self.values[joined] = builder.select(
+                    condition, self._value(a, joined.kind), self._value(b, joined.kind)
+                )
             return
         starts = [builder.append_basic_block() for _ in range(2)]
         after = builder.append_basic_block()

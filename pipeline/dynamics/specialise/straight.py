@@ -27,7 +27,7 @@ _INTEGER = ir.IntType(64)
 
 
 def program(rates: Callable, wiring: wired.Wiring) -> Program:
-    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too much, or divides by zero."""
+    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that."""
     h, trace = wired.header(wiring), Trace(LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
     w.values.update(wired.ground(h))
@@ -41,7 +41,7 @@ def program(rates: Callable, wiring: wired.Wiring) -> Program:
 
 
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
-    """Whether a place is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last ones."""
+    """Whether a place is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
     o = h[m.CLOSURE_ENVELOPE.place]
     rows = [(h[o + 2 * r], h[o + 2 * r + 1]) for r in range(h[m.N_KEPT_ROWS])]
     diagonal = {start - first + r for r, (first, start) in enumerate(rows)}

@@ -1,8 +1,9 @@
 """Kernels run in Python on symbols, so that what they compute for one wiring stands on a tape.
 
-Sizes, offsets and tables of h are numbers, so loops are counted and places known while the tape is written; w and f hold
-symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it stands, and what
-both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is repeated.
+Sizes, offsets and tables of h are numbers, so loops are counted and places known while the tape is written; w and f
+hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it stands, and
+what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
+repeated.
 """
 
 from __future__ import annotations
@@ -188,4 +189,3 @@ class _Names:
         found = self._trace.plain(getattr(self._module, name))
         setattr(self, name, found)
         return found
-

@@ -1,6 +1,6 @@
 """The wiring of a mechanism as its specialised code depends on it, and what the code keeps apart from it.
 
-Sizes and tables of h, without those that only laws of time and error norms read. Where w and f keep what, is none of it:
+Sizes and tables of h, without those that only laws of time and error norms read. Where w and f keep what is none of it:
 stretches of arrays are known by their place in the header, so that one code serves every integrator and any number of
 pieces of laws.
 """
@@ -39,7 +39,7 @@ def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
 
 
 def header(wired: Wiring) -> list[int]:
-    """h of a wiring, with a stretch in the place of every offset in f and w."""
+    """The array h of a wiring, with a stretch in the place of every offset in f and w."""
     h = [*wired[0], *((place + 1) << STRETCH for place in range(SIZES, m.HEADER))]
     for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
         h[table.place] = len(h)
