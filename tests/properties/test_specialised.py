@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from llvmlite import ir
 
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
@@ -24,6 +25,7 @@ from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Trace
@@ -159,3 +161,23 @@ def test_laws_of_time_and_integrators_are_not_in_the_code() -> None:
     other = edited(scene, {f"drive.{drive}.law": law, "solver.integrator": "radau", "time.end": 0.1})
     assert source(other) == source(scene)
     assert source(load_scene(TREE / "scenes/sps4/ideal.toml")) != source(scene)
+
+
+def test_equal_wirings_give_equal_code() -> None:
+    """The tape is written in one order, whatever the places of objects in memory are."""
+
+    def told() -> str:
+        model = tabulate(build(load_scene(TREE / "scenes/sps4/csj.toml"), {}))
+        made, builder = program(rates_kernel(model), wiring(model.arrays, model.arrays.h)), function()
+        Emitter(builder, made, lambda array, place: builder.alloca(ir.DoubleType() if array in "wf" else INT)).emit()
+        return str(builder.module)
+
+    assert told() == told()
+
+
+INT = ir.IntType(64)
+
+
+def function() -> ir.IRBuilder:
+    made = ir.Function(ir.Module("m"), ir.FunctionType(ir.VoidType(), []), "f")
+    return ir.IRBuilder(made.append_basic_block())

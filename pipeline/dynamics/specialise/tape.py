@@ -30,9 +30,13 @@ class Undecided(Exception):  # noqa: N818  (not an error: how a branch leaves th
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Symbol:
-    """A value that is known only when the code runs: an operation, and what it is applied to."""
+    """A value that is known only when the code runs: an operation, and what it is applied to.
+
+    number: in the order of their making, by which operands are ordered: equal wirings give equal code.
+    """
 
     tape: Tape
+    number: int
     kind: str
     operation: str
     arguments: tuple[Any, ...]
@@ -112,7 +116,7 @@ class Tape:
     """What has been computed; `block` is where the next operation goes."""
 
     def __init__(self, decide: Callable[[Symbol], bool], longest: int) -> None:
-        self.decide, self.left = decide, longest
+        self.decide, self.longest, self.count = decide, longest, 0
         self.block: list[Any] = []
         #: known: operations that have been done on the way to here; scopes: which of them began in each open block
         self._known: dict[Any, Symbol] = {}
@@ -123,13 +127,16 @@ class Tape:
         key = (operation, *(id(a) if isinstance(a, Symbol) else (type(a), a) for a in arguments))
         found = self._known.get(key)
         if found is None:
-            found = self._known[key] = Symbol(self, kind, operation, arguments)
+            found = self._known[key] = self._symbol(kind, operation, arguments)
             self._scopes[-1].append(key)
             self.block.append(found)
-            self.left -= 1
-            if self.left < 0:
+            if self.count > self.longest:
                 raise UnsuitedError("the computation is too long")
         return found
+
+    def _symbol(self, kind: str, operation: str, arguments: tuple[Any, ...]) -> Symbol:
+        self.count += 1
+        return Symbol(self, self.count, kind, operation, arguments)
 
     def add(self, a: Any, b: Any) -> Any:
         """The sum."""
@@ -229,7 +236,7 @@ class Tape:
         """What a place holds after a branch."""
         if same(a, b):
             return a
-        joined = Symbol(self, kind_of(a), "join", ())
+        joined = self._symbol(kind_of(a), "join", ())
         branch.joins.append((joined, a, b))
         return joined
 
@@ -239,7 +246,7 @@ def _negative(a: Any) -> bool:
 
 
 def _ordered(a: Any, b: Any) -> tuple[Any, Any]:
-    return (a, b) if not isinstance(b, Symbol) or id(a) <= id(b) else (b, a)
+    return (a, b) if not isinstance(b, Symbol) or a.number <= b.number else (b, a)
 
 
 def same(a: Any, b: Any) -> bool:
