@@ -1,8 +1,14 @@
 """flexclear from Python: ``import flexclear as fc``.
 
 ``flexclear.pipeline`` and ``flexclear.stages`` are the folders of these names at the top of the repository: links in
-a checkout, plain folders where flexclear is installed.
+a checkout, plain folders where flexclear is installed. Where a checkout has no links, as on Windows, the top itself is
+looked through.
 """
+
+import os
+
+if not os.path.isdir(os.path.join(os.path.dirname(__file__), "pipeline")):
+    __path__.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
 from flexclear.pipeline import (
     compare,

@@ -1,6 +1,6 @@
 """The command ``flexclear``.
 
-Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machine; 130 interrupted.
+Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machine, or of time; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import os
 import sys
 from importlib import import_module
 
-from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError
+from flexclear.pipeline.core.system import plain_output
 
-INTERRUPTED = 130
 CLOSED_PIPE = 141
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
@@ -37,6 +37,7 @@ COMMANDS = {
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; mistakes of the user are told without a traceback."""
+    plain_output()
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         return int(options.command(options) or 0)

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import argparse
 import ast
-import re
 from collections.abc import Iterator
 
+from flexclear.pipeline.core.citations import cited
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-
-#: a paragraph that starts like this names where a method is from
-SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,7 +41,7 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
     for name in sorted(sources.closure(roots)):
         base = sources.root.joinpath(*name.split("."))
         path = next(p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file())
-        for found in dict.fromkeys(named(path.read_text())):
+        for found in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
             yield name, found
 
 
@@ -52,5 +49,4 @@ def named(source: str) -> Iterator[str]:
     """Texts after ``Source:`` in all docstrings of a module, each on one line."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
-            for match in SOURCE.finditer(ast.get_docstring(node) or ""):
-                yield " ".join(match[1].split())
+            yield from cited(ast.get_docstring(node))

@@ -51,7 +51,7 @@ def command(options: argparse.Namespace) -> None:
     place = run.workplace(options)
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
     found = bring(scenes, place, options.ideal)
-    print(*(found.file(name).read_text() for name in TABLES), sep="\n")
+    print(*(found.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
     run.told(found.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
 
 
@@ -130,7 +130,7 @@ def parts(found: Comparison) -> list[Part]:
     from flexclear.pipeline.post.overview.page import Part, media
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    tables = "".join(as_html(from_markdown(found.file(name).read_text())) for name in TABLES)
+    tables = "".join(as_html(from_markdown(found.file(name).read_text(encoding="utf-8"))) for name in TABLES)
     pictures = [
         media(name, found.file(name).read_bytes(), text) for name, text in PICTURES.items() if _there(found, name)
     ]

@@ -53,9 +53,13 @@ def command(options: argparse.Namespace) -> None:
         if not options.integrators:
             # the points of the scene's own method come first: a table within a minute, of which the whole study is more
             _, folder = bring(scene, place, others, [scene.solver.integrator])
-            print((folder / PRINTED[0]).read_text(), f"so far {scene.solver.integrator} alone; going on\n", sep="\n")
+            print(
+                (folder / PRINTED[0]).read_text(encoding="utf-8"),
+                f"so far {scene.solver.integrator} alone; going on\n",
+                sep="\n",
+            )
         studies[scene.name] = _, folder = bring(scene, place, others, options.integrators)
-        print(*((folder / name).read_text() for name in PRINTED if (folder / name).is_file()), sep="\n")
+        print(*((folder / name).read_text(encoding="utf-8") for name in PRINTED if (folder / name).is_file()), sep="\n")
         print(f"figures and data: {folder}\n")
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
@@ -111,7 +115,7 @@ def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Stu
     """
     from flexclear.pipeline.post.cost.page import Studied, advice
 
-    tables = tuple((folder / file).read_text() for file in PRINTED if (folder / file).is_file())
+    tables = tuple((folder / file).read_text(encoding="utf-8") for file in PRINTED if (folder / file).is_file())
     files = {stem: folder / f"{stem}.png" for stem in FIGURES}
     shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem, file in files.items() if file.is_file()}
     said = Studied(name, advice(study, tables), tables, {FIGURES[stem]: path for stem, path in shown.items()})
@@ -132,7 +136,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
         found.append(said)
         for path, file in pictures.items():
             (page.parent / path).write_bytes(file.read_bytes())
-    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"))
+    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"), encoding="utf-8")
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:

@@ -17,7 +17,7 @@ def read(path: Path) -> dict[str, list[Track]]:
     Raises InputError for a file that cannot be read or says something else.
     """
     try:
-        table = json.loads(path.read_text())
+        table = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(f"--peer {path}", f"cannot be read: {error}", "docs/accuracy/exudyn.json is one") from None
     if not isinstance(table, dict):

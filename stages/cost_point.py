@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.system import peak_memory
 from flexclear.stages.kernels import warm
 from flexclear.stages.s4_simulate import bundles, rebuild
 
@@ -79,15 +80,6 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     kept = kept.assign_coords(quantity=list(errors))
     kept["standard_error"] = (("quantity",), list(errors.values()))
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
-
-
-def peak_memory() -> int:
-    """Largest resident memory of this process so far [B]."""
-    import resource
-    import sys
-
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else 1024 * peak
 
 
 def _twin(run: xr.Dataset) -> dict[str, float]:

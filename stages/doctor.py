@@ -125,7 +125,7 @@ def _graphics() -> tuple[str, bool]:
 def _self_test() -> tuple[str, bool]:
     expected = -0.5 * GRAVITY * T**2
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "fall.toml").write_text(SCENE)
+        (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8")
         done = subprocess.run(
             [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
             env={**os.environ, "NUMBA_DISABLE_JIT": "1", "FLEXCLEAR_RESULTS": folder, "PYTHONPATH": str(TREE)},

@@ -43,7 +43,9 @@ def command(options: argparse.Namespace) -> None:
 
 def write(kind: str, folder: Path) -> list[Path]:
     """The files of a new mechanism, the scene first; InputError where one of them is there already."""
-    sources = sorted((TEMPLATES / kind.replace("-", "_")).glob("*.toml"), key=lambda p: "[body" not in p.read_text())
+    sources = sorted(
+        (TEMPLATES / kind.replace("-", "_")).glob("*.toml"), key=lambda p: "[body" not in p.read_text(encoding="utf-8")
+    )
     targets = [folder / source.name for source in sources]
     for target in targets:
         if target.exists():

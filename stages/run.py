@@ -3,32 +3,33 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
+import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
-from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.artifacts.store import Store, write_dataset
+from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
+from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
 from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
+from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.workflow import stopping
+from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import WARNING, Monitor
 from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import owner
 from flexclear.stages.graph import STAGES, Graph
-
-#: folder with the scenes and meshes of the project, which are installed with it
-DATA = TREE / "flexclear"
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,9 +86,31 @@ def common_arguments(parser: argparse.ArgumentParser) -> None:
         help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
     )
     parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
+    limit_argument(parser)
     said = parser.add_mutually_exclusive_group()
     said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
     said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
+
+
+def limit_argument(parser: argparse.ArgumentParser) -> None:
+    """How long the command may take."""
+    parser.add_argument(
+        "--limit", metavar="TIME", help="stop in good order after, e.g., 2h (exit code 4); run again to go on"
+    )
+
+
+def _deadline(options: argparse.Namespace | None) -> tuple[float, str]:
+    """Seconds from now, and what is told then; InputError for what is no time."""
+    text = getattr(options, "limit", None)
+    if text is None:
+        return math.inf, ""
+    try:
+        seconds = quantity(re.sub(r"(?<=[0-9.])(?=[a-z])", " ", text.strip()), "time")
+        if not seconds > 0.0:
+            raise ValueError("it must be above zero")
+    except ValueError as error:
+        raise InputError(f"--limit {text}", f"is no time: {error}", "write --limit 2h, or '90 min'") from None
+    return seconds, f"the time that --limit {text} gives is over"
 
 
 def told(folder: Path, files: Mapping[str, str]) -> None:
@@ -104,16 +127,26 @@ def near(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where artifacts are kept, where the source lies, and who is told about progress."""
+    """Where artifacts are kept, where the source lies, and who is told about progress.
+
+    end: when the command is to stop, by the monotonic clock [s], and what is told then.
+    """
 
     store: Store
     sources: Sources
     monitor: Monitor = field(default_factory=Monitor)
     jobs: int | None = None
+    end: tuple[float, str] = (math.inf, "")
 
     def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
         """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
-        return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
+        with self.limited():
+            return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
+
+    def limited(self) -> AbstractContextManager[None]:
+        """Meanwhile work is to stop when the time is over that the command was given."""
+        end, why = self.end
+        return stopping.until(None if end == math.inf else end - time.monotonic(), why)
 
 
 class FailedTasksError(FlexclearError):
@@ -131,14 +164,15 @@ class MissedAccuracyError(SolverError):
 def workplace(options: argparse.Namespace | None = None) -> Workplace:
     """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says.
 
-    options: of a command, with `jobs` and how much is said.
+    options: of a command, with `jobs`, its `limit` and how much is said.
     """
     monitor = Monitor(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
     jobs = getattr(options, "jobs", None)
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
-    root = results_root()
-    return Workplace(Store(root, say=monitor.say), Sources(TREE, root / "cache" / "imports.json"), monitor, jobs)
+    root, (seconds, why) = results_root(), _deadline(options)
+    sources = Sources(TREE, root / "cache" / "imports.json")
+    return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (time.monotonic() + seconds, why))
 
 
 def find_scene(name: str) -> Path:
@@ -197,10 +231,15 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
     name = scene_name(Path(name)) if name.endswith(".toml") else name
     folder = results_root() / "runs" / name
-    files = sorted(path for path in folder.rglob("*.nc") if len(path.relative_to(folder).parts) <= 2)
+    files = sorted(
+        path
+        for path in folder.rglob("*.nc")
+        if len(path.relative_to(folder).parts) <= 2 and not path.stem.endswith(PARTIAL)
+    )
     if not files:
         raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
-    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.open_dataset(path) for path in files}
+    # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
+    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.load_dataset(path) for path in files}
     return xr.DataTree.from_dict(tree, name=folder.name)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.workflow import stopping
 from flexclear.stages import s4_simulate
 
 if TYPE_CHECKING:
@@ -27,4 +28,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """Sections (schema SECTIONS); inputs are ``bundle/<body>``."""
     from flexclear.pipeline import dynamics
 
-    return {"nc": dynamics.sections(s4_simulate.rebuild(params, inputs), s4_simulate.bundles(inputs), progress)}
+    scene = s4_simulate.rebuild(params, inputs)
+    with stopping.until(scene.limits.time, scene.limits.time_words):
+        return {"nc": dynamics.sections(scene, s4_simulate.bundles(inputs), progress)}

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene.demand import check_run
+from flexclear.pipeline.core.workflow import stopping
 from flexclear.stages import s3_rigid
 
 if TYPE_CHECKING:
@@ -59,7 +60,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
         progress(None, text)
-    found = dynamics.simulate(scene, reduced, progress)
+    with stopping.until(scene.limits.time, scene.limits.time_words):
+        found = dynamics.simulate(scene, reduced, progress)
     told = "\n".join(filter(None, [str(found.attrs.get("warnings", "")), *lacks]))
     return {"nc": found.assign_attrs(warnings=told) if told else found}
 
@@ -83,7 +85,8 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
 
     scene = rebuild(params, inputs)
     check_run(scene, results_root())
-    return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
+    with stopping.until(scene.limits.time, scene.limits.time_words):
+        return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
 
 
 def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:

@@ -26,6 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     for name, text in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
+    run.limit_argument(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
 
 
@@ -34,7 +35,7 @@ def command(options: argparse.Namespace) -> None:
     asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
         run.check_target(options.page, "--page")
-    place = run.workplace()
+    place = run.workplace(options)
     scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     outcome = place.bring([graph.verdict for graph in tasks.values()])
@@ -60,14 +61,15 @@ def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
 def write_page(
     verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
 ) -> None:
-    """The verdicts as a page, with the figures (PNG) in a folder of its name beside it."""
-    from flexclear.pipeline.post.verdict_page import markdown
+    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name beside it."""
+    from flexclear.pipeline.post.verdict_page import csv_text, markdown
 
     folder = page.parent / page.stem
     folder.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
-    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem))
+    (folder / "verdicts.csv").write_text(csv_text(verdicts), encoding="utf-8")
+    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem), encoding="utf-8")
 
 
 def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:

@@ -35,6 +35,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--workers", type=int, metavar="N", help="processes of this machine (default: its cores)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep)")
+    run.limit_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -43,10 +44,10 @@ def command(options: argparse.Namespace) -> None:
         if len(options.sweeps) > 1:
             raise InputError("--out", f"takes one sweep, not {len(options.sweeps)}", "run the sweeps one by one")
         run.check_target(options.out)
-    place = run.workplace()
+    place = run.workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
     wanted = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
-    with engine(width(options.workers), options.scheduler) as workers:
+    with engine(width(options.workers), options.scheduler) as workers, place.limited():
         for path, plan in zip(paths, wanted, strict=True):
             folder = place.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
             _show(plan, bring(plan, workers, place, folder), folder, options.out)

@@ -8,27 +8,31 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.workflow import workers
+from flexclear.pipeline.core.workflow import stopping, workers
 from flexclear.pipeline.core.workflow.schedule import TICK
 from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 SHARE, MOST, QUEUED = 0.5, 1000, 2
+#: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
+LONG = 5.0
 #: seconds in which a scheduler must have answered
 PATIENCE = 10.0
 
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: place of the scene -> value."""
+    """A point to be run. family: its key; point: place of the scene -> value; journal: where it keeps its work."""
 
     key: str
     family: str
     point: dict[str, Any]
+    journal: Path
 
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
@@ -36,23 +40,25 @@ Done = Callable[[Sequence[tuple[Job, Point]], float], None]
 
 @dataclass(frozen=True)
 class Engine:
-    """An executor (None: this process), and how many tasks it works on at a time."""
+    """An executor (None: this process), and how many tasks it works on at a time; whether on this machine."""
 
     executor: Executor | None
     width: int
+    here: bool = True
 
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
         """Run points; `done` is told finished ones and their processor time [s], in any order of the batches.
 
-        families: what `stages.sweep_points.work` is given of each.
+        families: what `stages.sweep_points.work` is given of each.  Raises StoppedError when all is to stop.
         """
         waiting, running, pace = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0
         while waiting or running:
+            stopping.check()
             # nothing is compiled twice: until the first point is there nothing else begins
             while waiting and len(running) < (QUEUED * self.width if pace else 1):
                 count = min(MOST, max(1, int(SHARE / pace))) if pace else 1
                 mine = _take(waiting, count)
-                future = self._submit(mine, families, alone=not pace)
+                future = self._submit(mine, families, alone=not pace, keep=self.here and not 0.0 < pace < LONG)
                 running[future] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
@@ -62,14 +68,15 @@ class Engine:
                 first = not pace  # what it took held compiling and fetching
                 pace = max(1e-6, seconds / len(mine)) if not first else SHARE / 2.0
 
-    def _submit(self, mine: list[Job], families: dict[str, bytes], *, alone: bool) -> Future[Any]:
+    def _submit(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
+        journals = [job.journal if keep else None for job in mine]
         if self.executor is None:
             future: Future[Any] = Future()
-            future.set_result(work(family, families[family], points, alone))
+            future.set_result(work(family, families[family], points, alone, journals))
             return future
         with workers.without_main():
-            return self.executor.submit(work, family, families[family], points, alone)
+            return self.executor.submit(work, family, families[family], points, alone, journals)
 
 
 def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
@@ -130,7 +137,7 @@ def _cluster(address: str) -> Iterator[Engine]:
             place, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
         ) from None
     try:
-        yield Engine(client.get_executor(), _threads(client, place))
+        yield Engine(client.get_executor(), _threads(client, place), here=False)
     finally:
         client.close()
 

@@ -232,7 +232,8 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
         family = families[text].key
         # what decides the bodies is in the family's scene, whose bodies are numbers by now
         rest = {name: value for name, value in point.items() if name not in own}
-        jobs.append(Job(_point_key(family, point), family, rest))
+        name, (stage, _) = _point_key(family, point), families[text].folder
+        jobs.append(Job(name, family, rest, place.store.path(stage, name, "part").with_suffix("")))
     return replace(wanted, families=tuple(families.values()), jobs=tuple(jobs))
 
 

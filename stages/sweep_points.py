@@ -6,6 +6,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.points import Point
@@ -48,25 +49,33 @@ def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
     return scene, Runner(bundles(family.inputs), kept, family.members, family.error)
 
 
-def work(key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool) -> tuple[list[Point], float]:
+def work(
+    key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool, journals: Sequence[Path | None] = ()
+) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
+    journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
     """
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
-    from flexclear.pipeline.core.workflow import cores
+    from flexclear.pipeline.core.workflow import cores, journal
 
     cores.tell(alone)
     scene, runner = _opened(key, packed)
     begun, found = time.process_time(), list[Point]()
-    for point in points:
+    for point, place in zip(points, journals or [None] * len(points), strict=True):
         try:
             edited = with_numbers(scene, point)
         except InputError as error:
             found.append(Point({}, {}, {}, 0, str(error)))
             continue
-        found.append(runner.run(edited))
+        if place is None:
+            found.append(runner.run(edited))
+            continue
+        with journal.kept(place.parent, place.name) as kept:
+            found.append(runner.run(edited))
+            kept.remove()
     return found, time.process_time() - begun
 
 
@@ -77,7 +86,8 @@ def source_digest() -> str:
     from flexclear.pipeline.core.workflow.fingerprint import TREE
 
     digest = hashlib.sha256()
-    for folder in ("flexclear", "pipeline", "stages"):
-        for path in sorted((TREE / folder).rglob("*.py")):
+    for folder in ("pipeline", "stages"):
+        # by the one import name, under which a checkout and an installed flexclear have the same files
+        for path in sorted((TREE / "flexclear" / folder).rglob("*.py")):
             digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())
     return digest.hexdigest()

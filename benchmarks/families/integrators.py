@@ -14,7 +14,6 @@ import xarray as xr
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.progress import silent
@@ -80,7 +79,7 @@ def _errors(run: xr.Dataset, known: xr.Dataset) -> Record:
 
 def _forces(run: xr.Dataset) -> np.ndarray:
     """Largest force [N] of every impact."""
-    hard = (run.event_kind.values == CLOSING) & (run.event_approach_speed.values > IMPACT)
+    hard = (run.event_kind.values == "closing") & (run.event_approach_speed.values > IMPACT)
     return run.event_peak_force.values[hard]
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from benchmarks.family import Family
 from benchmarks.family import Record as Row
 from benchmarks.page import Columns, table
-from benchmarks.reference_conditions import claims, figures, runs
+from benchmarks.reference_conditions import claims, figures, layouts, runs
 from benchmarks.reference_conditions.claims import at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
@@ -219,6 +219,10 @@ def _is_mesh_study(row: Row) -> bool:
     return (row["place_mm"], row["condition"], row["count"]) == (next(iter(PLACES)), "craig-bampton", COUNT)
 
 
+def _layouts(rows: dict[str, list[Row]]) -> str:
+    return layouts.told(rows["layouts"], rows)
+
+
 def _label(row: Row) -> str:
     """Name of a mode set."""
     return row["condition"] if row["condition"] in (FULL, RIGID) else f"{row['condition']} {row['count']}"
@@ -240,11 +244,18 @@ def _or_none(names: list[str]) -> str:
 
 
 #: by group of rows
-TABLES = {"statics": _statics, "frequencies": _frequencies, "far": _far, "clearance": _clearance, "mesh": _mesh}
+TABLES = {
+    "statics": _statics,
+    "frequencies": _frequencies,
+    "far": _far,
+    "clearance": _clearance,
+    "mesh": _mesh,
+    "layouts": _layouts,
+}
 
 FAMILY = Family(
     what="which mode sets of a rod give the answers of the full rod, and at what cost",
-    takes="40 min on two cores",
+    takes="an hour on two cores",
     page="reference-conditions.md",
     cases=runs.cases,
     measure=runs.measure,

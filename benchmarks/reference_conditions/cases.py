@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.dynamics.record.cost import Cost
 from flexclear.stages.s4_simulate import bundles, rebuild
 
@@ -29,7 +28,7 @@ def single(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
     if "event_peak_force" in run:
         kept.attrs["peak_acceleration"] = float(np.abs(run["acceleration"].sel(body=BODY, axis="z")).max())
         kept.attrs["peak_force"] = float(run["event_peak_force"].max())
-        kept.attrs["impacts"] = int(((run["event_kind"] == CLOSING) & (run["event_approach_speed"] > 1e-4)).sum())
+        kept.attrs["impacts"] = int(((run["event_kind"] == "closing") & (run["event_approach_speed"] > 1e-4)).sum())
     return {"nc": kept.assign_attrs(_costs(found))}
 
 

@@ -83,14 +83,16 @@ def verdicts(groups: dict[str, list[Row]]) -> list[tuple[Claim, dict[int, tuple[
     """Every claim with its outcome at each place [mm]."""
     found = []
     for claim in CLAIMS:
-        at = {}
-        for place in PLACES:
-            far, clearance = (
-                [r for r in groups[name] if r["place_mm"] == place and r["finer"] == 1] for name in ("far", "clearance")
-            )
-            at[place] = claim.test(Rows(far, clearance))
-        found.append((claim, at))
+        found.append((claim, {place: claim.test(numbers_of(groups, place)) for place in PLACES}))
     return found
+
+
+def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
+    """The rows at one place [mm] of the prismatic joint, on the paper's mesh."""
+    far, clearance = (
+        [r for r in groups[name] if r["place_mm"] == place and r["finer"] == 1] for name in ("far", "clearance")
+    )
+    return Rows(far, clearance)
 
 
 def told(groups: dict[str, list[Row]]) -> str:

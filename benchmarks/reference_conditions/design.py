@@ -9,6 +9,9 @@ from typing import Any
 
 import xarray as xr
 
+from benchmarks.geometry import identify
+from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.scenes import edits
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
@@ -39,6 +42,10 @@ MOST_COMPLETE = (25, 37)
 LARGE_SETS = 0.5
 #: factors of the recipe's elements
 FINER = (1, 2, 4)
+#: other layouts of the mechanism: every so manieth of the identified family on this grid [m], and the one that is taken
+LAYOUT_GRID, EVERY = 0.02, 10
+#: there, the sets: the paper's two as few as it has them, and Craig-Bampton, of which the last stands for the full rod
+LAYOUT_SETS = (("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 13), ("craig-bampton", 25))
 #: times at which the assembled mechanism's frequencies are taken: the start and the full stroke [s]
 TIMES = (0.0, 0.09)
 
@@ -48,6 +55,7 @@ class Case:
     """One scene with one mode set.
 
     place: of the prismatic joint [mm].  condition: of the modes, FULL or RIGID.  finer: factor of the elements.
+    layout: of the mechanism, where it is not that of the scenes; the prismatic joint is at 0 mm then.
     """
 
     place: int
@@ -56,6 +64,7 @@ class Case:
     clearance: bool = False
     finer: int = 1
     members: int = field(default=0)
+    layout: Layout | None = None
 
     @property
     def label(self) -> str:
@@ -74,11 +83,12 @@ def modes(case: Case) -> dict[str, Any]:
 def scene(case: Case) -> Scene:
     """The paper's scene with the joint at the case's place and the rod of its mode set."""
     stem, folder = ("", "sps4") if case.place == 0 else (f"prismatic_{case.place}mm", "sps4/variants")
+    moved = {} if case.layout is None else edits(case.layout, flexible=case.condition != RIGID)
     if case.condition == RIGID:
         name = "_".join(part for part in (stem, "csj" if case.clearance else "") if part) or "ideal"
-        return load_scene(find_scene(f"{folder}/{name}"))
+        return load_scene(find_scene(f"{folder}/{name}"), moved)
     name = "_".join(part for part in (stem, "far_csj_cb" if case.clearance else "far_cb") if part)
-    changes: dict[str, Any] = {f"body.{ROD}.modes": modes(case)}
+    changes: dict[str, Any] = moved | {f"body.{ROD}.modes": modes(case)}
     if case.clearance:
         changes["ensemble.members"] = case.members
     return load_scene(find_scene(f"{folder}/{name}"), changes)
@@ -97,8 +107,15 @@ def task(case: Case) -> Task:
         inputs={f"bundle/{body}": _told_apart(made, case) for body, made in graph.bundle.items()},
         modules=(module, *s4_simulate.modules(given)),
         folder="",
-        part=f"{case.place} mm, {case.label}" + (", clearance" if case.clearance else ""),
+        part=f"{_where(case)}, {case.label}" + (", clearance" if case.clearance else ""),
     )
+
+
+def _where(case: Case) -> str:
+    """What is special to a case's mechanism, for progress reports."""
+    if case.layout is None:
+        return f"{case.place} mm"
+    return "layout " + ", ".join(f"{1e3 * getattr(case.layout, name):.1f}" for name in ("ay", "bx", "by")) + " mm"
 
 
 def _told_apart(made: Task, case: Case) -> Task:
@@ -172,6 +189,22 @@ def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Cas
     for condition in ("free-free", "craig-bampton"):
         found += [(first, condition, whole(first, condition, n)) for n in CLEARANCE_COUNTS]
     return [Case(*key, clearance=True, members=_share(members, *key[1:])) for key in dict.fromkeys(found)]
+
+
+@cache
+def layouts() -> tuple[Layout, ...]:
+    """The identified layout that is taken, then members of its family by falling regularity."""
+    family = sorted(identify.family(LAYOUT_GRID), key=lambda member: member.answer.condition)
+    found = [identify.chosen(identify.family()), *family[::EVERY]]
+    return tuple(member.layout for member in found)
+
+
+def of_layout(layout: Layout, members: int) -> list[Case]:
+    """All runs of one layout: ideal joints, then clearance; ensembles have half the members."""
+    members = max(2, members // 2)
+    sets = [(RIGID, COUNT), *((c, whole(0, c, n)) for c, n in LAYOUT_SETS)]
+    far = [Case(0, *key, layout=layout) for key in sets]
+    return far + [Case(0, *key, clearance=True, members=_share(members, *key), layout=layout) for key in sets]
 
 
 def _share(members: int, condition: str, count: int) -> int:

@@ -37,7 +37,7 @@ VIBRATIONS = 6
 
 def cases(members: int) -> list[family.Case]:
     """The groups of rows that the page has."""
-    return [family.Case(name, members if name == "clearance" else None) for name in GROUPS]
+    return [family.Case(name, members if name in ENSEMBLES else None) for name in GROUPS]
 
 
 def measure(cases: Sequence[family.Case], jobs: int) -> Measured:
@@ -127,20 +127,38 @@ def clearance_rows(members: int) -> Iterator[Row]:
     runs = bring(design.clearance(members), place)
     rigid = bring([Case(where, RIGID) for where in PLACES], place)
     for case, run in runs.items():
-        ideal = rigid[Case(case.place, RIGID)]
-        costs = _costs(run)
-        if case.condition == RIGID:
-            spread = {"peak_force": [float(run.attrs["peak_force"])], "impacts": [int(run.attrs["impacts"])]}
-            effects = [max_deviation(run, ideal, BODY)]
-            acceleration = [float(run.attrs["peak_acceleration"])]
-        else:
-            spread = {
-                n: run[v].values[:, 0].tolist() for n, v in (("peak_force", "peak_force"), ("impacts", "impact_count"))
-            }
-            effects = ensemble_deviations(run, ideal, BODY)
-            acceleration = run["peak_acceleration"].values[:, 0, 2].tolist()
-        spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}
-        yield identity(case) | costs | _statistics(spread | {"acceleration": acceleration}) | {"members": len(effects)}
+        yield identity(case) | _with_clearance(case, run, rigid[Case(case.place, RIGID)])
+
+
+def _with_clearance(case: Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
+    """Means and standard deviations over the members of one set, or the one run of the rigid rod."""
+    if case.condition == RIGID:
+        spread = {"peak_force": [float(run.attrs["peak_force"])], "impacts": [int(run.attrs["impacts"])]}
+        effects = [max_deviation(run, ideal, BODY)]
+        acceleration = [float(run.attrs["peak_acceleration"])]
+    else:
+        spread = {
+            n: run[v].values[:, 0].tolist() for n, v in (("peak_force", "peak_force"), ("impacts", "impact_count"))
+        }
+        effects = ensemble_deviations(run, ideal, BODY)
+        acceleration = run["peak_acceleration"].values[:, 0, 2].tolist()
+    spread |= {name: [_deviation(effect)[name] for effect in effects] for name in _deviation(effects[0])}
+    return _costs(run) | _statistics(spread | {"acceleration": acceleration}) | {"members": len(effects)}
+
+
+def layout_rows(members: int) -> Iterator[Row]:
+    """Ideal joints and clearance for layouts of the identified family; of ideal joints deviations from rigid."""
+    place = workplace()
+    for number, layout in enumerate(design.layouts()):
+        runs = bring(design.of_layout(layout, members), place)
+        ideal = next(run for case, run in runs.items() if case.condition == RIGID and not case.clearance)
+        which = {"layout": number} | {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height")}
+        for case, run in runs.items():
+            row = which | identity(case) | {"clearance": case.clearance}
+            if case.clearance:
+                yield row | _with_clearance(case, run, ideal)
+            else:
+                yield row | _deviation(max_deviation(run, ideal, BODY)) | _costs(run) | {"force": _largest(run, ideal)}
 
 
 def _costs(run: xr.Dataset) -> Row:
@@ -171,4 +189,7 @@ GROUPS: dict[str, Callable[..., Iterator[Row]]] = {
     "frequencies": frequency_rows,
     "far": far_rows,
     "clearance": clearance_rows,
+    "layouts": layout_rows,
 }
+#: groups whose runs are ensembles
+ENSEMBLES = ("clearance", "layouts")

@@ -16,7 +16,6 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.stability.scenes import Parameters, scene, sweep
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.errors import FlexclearError, SolverError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.wanted import parse
@@ -119,7 +118,7 @@ def judge(run: xr.Dataset, deviation: float, seconds: float) -> Record:
     closure = float(run["constraint_error"].max())
     start, end = float(run["time"][0]), float(run["time"][-1])
     reason = fault(run, ledger, closure, deviation)
-    closings = run["event_kind"].values == CLOSING
+    closings = run["event_kind"].values == "closing"
     return dict(
         verdict=WRONG if reason else FINISHED,
         reason=reason,

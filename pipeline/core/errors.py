@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 #: bytes of each piece of an error that are shown, and of all errors of a file together
 LONGEST, TOGETHER = 1000, 3500
+#: exit code of a command that Ctrl-C has ended
+INTERRUPTED = 130
 
 
 def shown(text: str, longest: int = LONGEST) -> str:
@@ -67,3 +71,15 @@ class ResourceError(FlexclearError):
     """A limit of the machine (disk, memory) stopped the run; nothing half-written is left."""
 
     exit_code = 4
+
+
+class StoppedError(FlexclearError):
+    """The work was asked to stop before its end, and left what there is in good order.
+
+    interrupted: by Ctrl-C, not by a limit of time.  partial: dataset of what there is, of works that have one.
+    """
+
+    def __init__(self, why: str, partial: Any = None, *, interrupted: bool = False) -> None:
+        super().__init__(why)
+        self.partial, self.interrupted = partial, interrupted
+        self.exit_code = INTERRUPTED if interrupted else ResourceError.exit_code

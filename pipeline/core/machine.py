@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-import os
-import resource
-import shutil
 from pathlib import Path
 
 from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.system import free_space, memory
+
+__all__ = ["disk", "memory", "require_disk", "require_memory", "size"]
 
 #: share of what is left that one piece of work may take
 SHARE = 0.8
 
 
-def memory() -> int:
-    """Bytes that this process can still get: of the machine, of its container, of its own limit."""
-    found = [os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")]
-    lines = _text("/proc/meminfo").splitlines()
-    found += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
-    limit, used = _text("/sys/fs/cgroup/memory.max"), _text("/sys/fs/cgroup/memory.current")
-    if limit.isdigit() and used.isdigit():
-        found.append(int(limit) - int(used))
-    soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-    if soft != resource.RLIM_INFINITY:
-        found.append(soft)
-    return max(0, min(found))
-
-
 def disk(folder: Path) -> int:
     """Bytes free where a folder is or will be."""
-    return shutil.disk_usage(next(p for p in (folder, *folder.parents) if p.is_dir())).free
+    return free_space(next(p for p in (folder, *folder.parents) if p.is_dir()))
 
 
 def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:
@@ -52,10 +38,3 @@ def size(count: float) -> str:
     """Bytes in words: ``3.2 GB``."""
     power = next((k for k in range(5) if count < 1000.0 ** (k + 1)), 4)
     return f"{count / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
-
-
-def _text(path: str) -> str:
-    try:
-        return Path(path).read_text().strip()
-    except OSError:
-        return ""

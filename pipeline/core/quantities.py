@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import rotation_between
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
 if TYPE_CHECKING:
@@ -43,8 +42,7 @@ def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.nda
     """
     if quantity.kind == "impulse":
         return series(run, quantity)[-1]
-    contacts = [str(name) for name in run["contact"].values]
-    mine = (run["event_contact"].values == contacts.index(quantity.owner)) & (run["event_kind"].values == CLOSING)
+    mine = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
     mine &= run["event_time"].values <= until
     if quantity.kind == "peak_force":
         return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])
@@ -133,8 +131,7 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
         found |= {name: run[name] for name in ("contact_impulse",) if name in run}
     if "horizon" in run:
         found["horizon"] = run["horizon"]
-    kept = xr.Dataset(found)
-    return kept.assign_coords(contact=run["contact"]) if "contact" in run.coords else kept
+    return xr.Dataset(found)
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:

@@ -9,14 +9,15 @@ from dataclasses import dataclass
 class Variable:
     """One variable of an artifact. `optional` ones are absent where the scene has no such part.
 
-    flags: what the values 0, 1, .. of a variable that tells kinds mean.
+    units: as UDUNITS reads them; empty for words.  turning: units of entries that turn instead of sliding, where a
+    dimension has both.
     """
 
     dims: tuple[str, ...]
     units: str
     long_name: str
     optional: bool = False
-    flags: tuple[str, ...] = ()
+    turning: str = ""
 
 
 Schema = dict[str, Variable]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
 
 DISTRIBUTION = "flexclear"
 
 
+@cache
 def version() -> str:
     """Such as ``0.1.0``; ``not installed`` where only the sources are there."""
     try:

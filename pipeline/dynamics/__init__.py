@@ -20,13 +20,22 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for.
-    Raises InputError for a scene that cannot be built, SolverError when the run cannot go on.
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
+    there is of it, marked as incomplete, when it is asked to stop.
     """
+    from flexclear.pipeline.core.artifacts.schema import incomplete
+    from flexclear.pipeline.core.errors import StoppedError
     from flexclear.pipeline.dynamics.record.dataset import dataset, warnings
-    from flexclear.pipeline.dynamics.run.run import integrate
+    from flexclear.pipeline.dynamics.run.run import Run, integrate
 
     def once(edited: Scene) -> xr.Dataset:
-        done = integrate(edited, bundles, progress)
+        try:
+            done = integrate(edited, bundles, progress)
+        except StoppedError as stopped:
+            there = stopped.partial
+            # another one's motion, such as where the run begins, is nothing of this run
+            stopped.partial = incomplete(dataset(there), str(stopped)) if isinstance(there, Run) else None
+            raise
         for sentence in warnings(done):
             progress(None, f"warning: {sentence}")
         return dataset(done)

@@ -33,7 +33,7 @@ def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.n
 def faces(bundle: xr.Dataset) -> np.ndarray:
     """Corners of the faces between the points of `surface`, shape (face, corners); of one corner for bare nodes."""
     if not is_rod(bundle):
-        return bundle.cell.values.astype(int)
+        return bundle.cell_node.values.astype(int)
     around = rod_shape.AROUND + 1
     rings = rod_shape.PER_CELL * bundle.sizes["cell"] + 3
     index = np.arange(rings * around).reshape(rings, around)

@@ -40,15 +40,15 @@ def ensemble_statistics(ensemble: xr.Dataset) -> Variables:
     """
     position, per_contact = ensemble.position.values, ("contact",)
     members = {
-        "rotation_y": (("ensemble_time", "kept"), angle_about_y(ensemble.quaternion.values)),
-        "displacement": (("ensemble_time", "kept", "axis"), position - position[:, :1]),
-        "velocity": (("ensemble_time", "kept", "axis"), ensemble.velocity.values),
-        "acceleration": (("ensemble_time", "kept", "axis"), ensemble.acceleration.values),
+        "rotation_y": (("ensemble_time", "ensemble_body"), angle_about_y(ensemble.quaternion.values)),
+        "displacement": (("ensemble_time", "ensemble_body", "axis"), position - position[:, :1]),
+        "velocity": (("ensemble_time", "ensemble_body", "axis"), ensemble.velocity.values),
+        "acceleration": (("ensemble_time", "ensemble_body", "axis"), ensemble.acceleration.values),
         "normal_force": (("ensemble_time", "contact"), ensemble.contact_normal_force.values),
         "impact_count": (per_contact, ensemble.impact_count.values.astype(float)),
         "peak_force": (per_contact, ensemble.peak_force.values),
         "contact_time_share": (per_contact, ensemble.contact_time_share.values),
-        "peak_acceleration": (("kept", "axis"), ensemble.peak_acceleration.values),
+        "peak_acceleration": (("ensemble_body", "axis"), ensemble.peak_acceleration.values),
     }
     result: Variables = {"spread": (("ensemble_time",), spread(ensemble.velocity.values))}
     for name, (dims, values) in members.items():

@@ -17,7 +17,7 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """
     if "event_time" not in run or "contact" not in run.sizes:
         return {}
-    contact = run.event_contact.values.astype(int)
+    contact, names = run.event_contact.values, [str(name) for name in run.contact.values]
     speed = run.event_approach_speed.values
     closings, openings = of_kind(run, "closing"), of_kind(run, "opening")
     strong = np.flatnonzero(closings & (speed > IMPACT))
@@ -30,18 +30,16 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
         "impact_separation_speed": (("impact",), np.where(ended, speed[opens], np.nan)),
         "impact_peak_force": (("impact",), run.event_peak_force.values[strong]),
         "impact_duration": (("impact",), np.where(ended, run.event_time.values[opens] - begun, np.nan)),
-        "impact_count": (("contact",), np.bincount(contact[strong], minlength=run.sizes["contact"])),
+        "impact_count": (
+            ("contact",),
+            np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
+        ),
     }
 
 
 def of_kind(run: xr.Dataset, name: str) -> np.ndarray:
     """True for the events of a kind, e.g. those that close a gap, shape (event,)."""
-    kind = run.event_kind.values
-    if kind.dtype.kind in "US" or kind.dtype == object:
-        return np.array([str(k) == name for k in kind], dtype=bool)
-    meanings = str(run.event_kind.attrs.get("flag_meanings", "opening closing")).split()
-    values = np.atleast_1d(run.event_kind.attrs.get("flag_values", np.arange(len(meanings))))
-    return np.asarray(kind == values[meanings.index(name)])
+    return np.asarray(run.event_kind.values == name, dtype=bool)
 
 
 def _next_opening(i: int, contact: np.ndarray, openings: np.ndarray) -> int:

@@ -78,6 +78,6 @@ def believed_until(post: xr.Dataset) -> float:
 def _impacts(post: xr.Dataset) -> np.ndarray:
     if "impact_time" not in post:
         return np.empty((0, 2))
-    own = post.impact_contact.values.astype(int) == list(post.contact.values).index(JOINT)
+    own = post.impact_contact.values == JOINT
     middle = post.impact_time.values + 0.5 * np.nan_to_num(post.impact_duration.values)
     return np.column_stack([middle, post.impact_peak_force.values])[own]

@@ -1,8 +1,7 @@
-"""Sections of a motion: at contact events and at equal phases of a repeated drive.
+"""Sections of a motion at contact events.
 
 A phase plot draws the whole trajectory; a Poincare section keeps only the points at which the
-trajectory passes a chosen event.  One stroke of the drive gives a phase plot, never a
-stroboscopic section.
+trajectory passes a chosen event.  Sections at equal phases need a repeated motion: `dynamics.sections`.
 """
 
 from __future__ import annotations
@@ -18,9 +17,3 @@ def at_times(time: np.ndarray, wanted: np.ndarray, *values: np.ndarray) -> tuple
     nearest = np.clip(np.searchsorted(time, wanted - 1e-9), 0, time.size - 1)
     index = nearest[np.abs(time[nearest] - wanted) <= 1e-9]
     return tuple(value[index] for value in values)
-
-
-def strobe_times(start: float, end: float, period: float, transient: int, phase: float = 0.0) -> np.ndarray:
-    """Times ``phase + k period`` after `transient` whole periods, inside [start, end] [s]."""
-    count = int(np.floor((end - start - phase) / period + 1e-9)) + 1
-    return start + phase + period * np.arange(transient, max(count, transient))

@@ -21,7 +21,10 @@ def collect(results: Path, attributes: Mapping[str, Mapping[str, object]], rende
     attributes: scene -> attributes of its run.  rendered: the scene whose film and pictures are shown.
     Whatever is not there is left out.
     """
-    tables = {path.stem: from_markdown(path.read_text()) for path in sorted((results / "tables").glob("table*.md"))}
+    tables = {
+        path.stem: from_markdown(path.read_text(encoding="utf-8"))
+        for path in sorted((results / "tables").glob("table*.md"))
+    }
     drawn = tuple(name for name in figures.NAMES if (results / "figures" / f"{name}.png").is_file())
     folder = results / "runs" / rendered
     films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]

@@ -20,8 +20,8 @@ def centre_line(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[
     u = scale * bundle.shape_translation.values @ q
     rotation = scale * bundle.shape_rotation.values @ q
     s = np.linspace(0.0, 1.0, PER_CELL, endpoint=False)[:, None]
-    parts = [_element(x[[a, b]], u[[a, b]], rotation[[a, b]], s) for a, b in bundle.cell.values.astype(int)]
-    last = int(bundle.cell.values[-1, 1])
+    parts = [_element(x[[a, b]], u[[a, b]], rotation[[a, b]], s) for a, b in bundle.cell_node.values.astype(int)]
+    last = int(bundle.cell_node.values[-1, 1])
     parts.append((x[[last]], u[[last]], rotation[[last]]))
     points, displacement, turn = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return points, displacement, turn

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import rotation_between
-from flexclear.pipeline.core.artifacts.schema import conform
+from flexclear.pipeline.core.artifacts.schema import conform, require_complete
 from flexclear.pipeline.core.quantities import IMPACT, PARTED
 from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
 from flexclear.pipeline.post.impacts import impacts, of_kind
@@ -22,30 +22,28 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one there are no ensemble
     variables.  The horizon is the run's own (its end where it has none), the ensemble's is called so.
     Nothing is interpolated: series are on the run's own times, ensemble statistics on `ensemble_time`.
+    Raises InputError for what is left of a run that was stopped.
     """
+    require_complete(run)
     data: Variables = {**motion(run), **contacts(run), **impacts(run)}
-    names, force = reactions(run)
-    data["reaction"] = (("time", "joint"), force)
-    data["peak_reaction"] = (("joint",), force.max(axis=0, initial=0.0))
-    data["peak_acceleration"] = (("body", "axis"), np.abs(run.acceleration.values).max(axis=0, initial=0.0))
+    data["reaction"] = (("time", "joint"), reactions(run))
+    data |= extremes(run, data["reaction"][1])
     end = float(run["horizon"] if "horizon" in run else run.time.values[-1])
-    coords = {name: run[name].values for name in ("time", "body", "contact") if name in run.coords}
-    coords["joint"] = np.array(names, dtype=str)
+    used = {dim for dims, _ in data.values() for dim in dims}
+    coords: dict[str, object] = {str(name): run[name].variable for name in run.coords if {*run[name].dims} <= used}
     if ensemble is not None:
         data |= ensemble_statistics(ensemble)
         data["ensemble_horizon"] = ((), np.array(horizon(ensemble.time.values, ensemble.velocity.values)))
-        coords |= {"ensemble_time": ensemble.time.values, "kept": ensemble.body.values}
+        coords |= {"ensemble_time": ensemble.time.values, "ensemble_body": ensemble.body.values}
         coords["quantile"] = np.array(QUANTILES)
     data["horizon"] = ((), np.array(end))
     attributes = {
         "impact_threshold": f"{IMPACT:g} m/s",
         "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {PARTED:g} of the largest",
     }
-    result = conform(xr.Dataset(data, coords=coords), POST, **attributes)
-    if ensemble is not None:
-        result["ensemble_time"].attrs = {"units": "s", "long_name": "time of the ensemble's output"}
-        result["quantile"].attrs = {"units": "1", "long_name": "share of the members below"}
-    return result
+    attributes["references"] = str(run.attrs.get("references", ""))
+    title = f"What follows from: {run.attrs['title']}"
+    return conform(xr.Dataset(data, coords=coords), POST, title=title, **attributes)
 
 
 def motion(run: xr.Dataset) -> Variables:
@@ -58,25 +56,45 @@ def motion(run: xr.Dataset) -> Variables:
     }
 
 
-def reactions(run: xr.Dataset) -> tuple[list[str], np.ndarray]:
-    """Joint names, and the magnitude of what each transmits [N], shape (time, joint).
+def reactions(run: xr.Dataset) -> np.ndarray:
+    """Magnitude of what each joint transmits [N], shape (time, joint).
 
     For a joint with clearance that is the contact force.
     """
-    force = dict(_magnitudes(run, "joint", "joint_force"))
+    force: np.ndarray = np.linalg.norm(run.joint_force.values, axis=-1)
+    joints = list(run.joint.values)
     if "contact_force" in run:
-        force |= dict(_magnitudes(run, "contact", "contact_force"))
-    columns = list(force.values()) or [np.empty((run.sizes["time"], 0))]
-    return list(force), np.column_stack(columns)
+        for k, name in enumerate(run.contact.values):
+            if name in joints:  # the others are ends of stops
+                force[:, joints.index(name)] = np.linalg.norm(run.contact_force.values[:, k], axis=-1)
+    return force
 
 
-def _magnitudes(run: xr.Dataset, dim: str, name: str) -> list[tuple[str, np.ndarray]]:
-    values = np.linalg.norm(run[name].values, axis=-1)
-    return [(str(part), values[:, i]) for i, part in enumerate(run[dim].values)]
+def extremes(run: xr.Dataset, reaction: np.ndarray) -> Variables:
+    """Largest magnitudes and their times, of all rows: regular outputs, events, deepest points of contacts.
+
+    reaction: of every joint [N], shape (time, joint).
+    """
+    series = {
+        "reaction": (("joint",), reaction),
+        "acceleration": (("body", "axis"), np.abs(run.acceleration.values)),
+    }
+    if "drive_force" in run:
+        series["drive_force"] = (("drive",), np.abs(run.drive_force.values))
+    if "contact_penetration" in run:
+        series["penetration"] = (("contact",), run.contact_penetration.values)
+        series["force"] = (("contact",), run.contact_normal_force.values)
+    found: Variables = {}
+    for name, (dims, values) in series.items():
+        found[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
+        found[f"peak_{name}_time"] = (dims, run.time.values[values.argmax(axis=0)])
+    if "event_peak_force" in run:
+        found["peak_force"] = (("contact",), _peak_force(run))
+    return found
 
 
 def contacts(run: xr.Dataset) -> Variables:
-    """Eccentricity, clearance, peak force and share of time in contact, per clearance joint."""
+    """Eccentricity, clearance and share of time in contact, per contact."""
     if "contact_offset" not in run:
         return {}
     distance = np.linalg.norm(run.contact_offset.values, axis=-1)
@@ -85,28 +103,27 @@ def contacts(run: xr.Dataset) -> Variables:
         "eccentricity": (("time", "contact"), distance),
         # gap = clearance - eccentricity at every time; the median is free of rounding at single times
         "clearance": (("contact",), np.median(gap + distance, axis=0)),
-        "peak_force": (("contact",), _peak_force(run)),
         "contact_time_share": (("contact",), _time_share(run)),
     }
 
 
 def _time_share(run: xr.Dataset) -> np.ndarray:
     """Share of the run that each contact is closed, from its located begins and ends."""
-    time, share = run.time.values, np.zeros(run.sizes["contact"])
+    time, share, names = run.time.values, np.zeros(run.sizes["contact"]), list(run.contact.values)
     closings = of_kind(run, "closing")
     begun, lasted = run.event_time.values[closings], run.event_duration.values[closings]
     lasted = np.where(np.isfinite(lasted), lasted, time[-1] - begun)
-    np.add.at(share, run.event_contact.values.astype(int)[closings], lasted)
+    for name, seconds in zip(run.event_contact.values[closings], lasted, strict=True):
+        share[names.index(name)] += seconds
     return share / (time[-1] - time[0])
 
 
 def _peak_force(run: xr.Dataset) -> np.ndarray:
     """Largest normal force: of the outputs and of the peaks that the solver tracked between them."""
-    peak = run.contact_normal_force.values.max(axis=0)
-    if "event_peak_force" in run:
-        for i, value in zip(run.event_contact.values.astype(int), run.event_peak_force.values, strict=True):
-            if np.isfinite(value):
-                peak[i] = max(peak[i], value)
+    peak: np.ndarray = run.contact_normal_force.values.max(axis=0)
+    for k, name in enumerate(run.contact.values):
+        tracked = run.event_peak_force.values[run.event_contact.values == name]
+        peak[k] = max(peak[k], np.max(tracked[np.isfinite(tracked)], initial=0.0))
     return peak
 
 

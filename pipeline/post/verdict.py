@@ -131,16 +131,15 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
     data["power"] = (("frequency", "component"), np.stack([power for _, power in lines], axis=1))
     coordinates = {"section": sections.section.values, "frequency": lines[0][0]}
     if "impact_phase" in sections:
-        found = [first_impacts(sections, c) for c in range(sections.sizes["contact"])]
+        found = [first_impacts(sections, str(name)) for name in sections.contact.values]
         data["impact_correlation"] = (
             ("lag", "contact"),
             np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in found], axis=1)),
         )
         coordinates |= {"contact": sections.contact.values}
     told = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
-    made = conform(xr.Dataset(data, coords=coordinates), VERDICT, **told)
-    made["frequency"].attrs = {"units": "1", "long_name": "cycles per period"}
-    return made
+    title = f"Verdict on the {str(sections.attrs.get('title', 'sections')).lower()}"
+    return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **told)
 
 
 def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
@@ -164,7 +163,7 @@ def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:
     return np.concatenate(columns, axis=1), float(np.sqrt(len(columns)))
 
 
-def first_impacts(sections: xr.Dataset, contact: int) -> np.ndarray:
+def first_impacts(sections: xr.Dataset, contact: str) -> np.ndarray:
     """Phase of the first impact in each period that has one [s]."""
     mine = sections.impact_contact.values == contact
     _, first = np.unique(sections.impact_section.values[mine], return_index=True)

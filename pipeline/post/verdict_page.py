@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Mapping
 
 import xarray as xr
@@ -29,6 +31,7 @@ mean rate at which it parts is the largest Lyapunov exponent, with the confidenc
 A freedom on which nothing depends, such as the spin of a leg with balls at both ends, has an exponent of zero. So the
 largest exponent of a periodic motion is zero there, and the contraction tells how fast the rest settles.
 """
+COLUMNS = ("scene", "verdict", "periods", "exponent", "exponent_low", "exponent_high")
 HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "comes back after", "to", "contraction", "in 16 lines")
 
 
@@ -46,6 +49,17 @@ def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Datas
     table = pipe_table(HEAD, [row(name, verdict) for name, verdict in verdicts.items()])
     shown = [f"## {name}\n\n![Sections of {name}]({pictures}/{name.replace('/', '_')}.png)\n" for name in verdicts]
     return "\n".join([text, table, "", *shown])
+
+
+def csv_text(verdicts: Mapping[str, xr.Dataset]) -> str:
+    """The verdicts and their exponents [1/s] for programs: columns `COLUMNS`, a line for each scene."""
+    text = io.StringIO()
+    lines = csv.writer(text, lineterminator="\n")
+    lines.writerow(COLUMNS)
+    for name, verdict in verdicts.items():
+        exponents = (f"{float(verdict[column]):.3g}" for column in COLUMNS[3:])
+        lines.writerow([name, verdict.attrs["verdict"], verdict.sizes["section"], *exponents])
+    return text.getvalue()
 
 
 def row(name: str, verdict: xr.Dataset) -> tuple[str, ...]:

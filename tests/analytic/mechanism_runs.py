@@ -44,9 +44,8 @@ def run(name: str, overrides: Overrides = ()) -> xr.Dataset:
 def impacts(dataset: xr.Dataset, least: float = 1e-4) -> dict[str, np.ndarray]:
     """Closings with an approach speed [m/s] above `least`, with their times, speeds, forces and rebounds."""
     time, speed = dataset.event_time.values, dataset.event_approach_speed.values
-    meanings = dataset.event_kind.attrs["flag_meanings"].split()
-    kind = dataset.event_kind.values == meanings.index("closing")
-    ends = dataset.event_kind.values == meanings.index("opening")
+    kind = dataset.event_kind.values == "closing"
+    ends = dataset.event_kind.values == "opening"
     contact, rebound = dataset.event_contact.values, np.full(len(kind), np.nan)
     for i in np.flatnonzero(kind):
         later = np.flatnonzero(ends[i:] & (contact[i:] == contact[i]))

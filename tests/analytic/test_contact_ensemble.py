@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
@@ -62,7 +61,7 @@ def test_statistics_of_the_members_are_in_the_post_artifact() -> None:
     assert float(post.impact_count_mean.sel(contact="contact")) == 1.0
     assert float(post.contact_time_share_mean.sel(contact="contact")) > 0.0
     speed = members().velocity.sel(body="ball", axis="z").values
-    assert post.velocity_mean.sel(kept="ball", axis="z").values == pytest.approx(speed.mean(axis=0), abs=1e-12)
+    assert post.velocity_mean.sel(ensemble_body="ball", axis="z").values == pytest.approx(speed.mean(axis=0), abs=1e-12)
 
 
 def carried(**path: Any) -> Scene:
@@ -98,7 +97,7 @@ def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:
     """Nanometres apart, after a few impacts: what members and run differ by is the sensitivity of the impacts."""
     asked = carried(actuators=["rail"])
     known, members = dynamics.simulate(asked, {}, silent), dynamics.ensemble(asked, {}, silent)
-    closings = known.event_kind.values == CLOSING
+    closings = known.event_kind.values == "closing"
     assert 2 <= closings.sum() < 20
     assert members.impact_count.values.tolist() == [[closings.sum()]] * 2
     peak = float(np.nanmax(known.event_peak_force.values[closings]))

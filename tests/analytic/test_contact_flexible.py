@@ -14,8 +14,7 @@ PIN = Pin(0.05, 2.5e-6, 0.01, 2e-5, 5e9, 0.8, 0.1, 0.08, 1e-3, 2e-2)
 
 def rows(kind: str) -> np.ndarray:
     dataset = run(SCENE)
-    meanings = dataset.event_kind.attrs["flag_meanings"].split()
-    return np.flatnonzero(dataset.event_kind.values == meanings.index(kind))
+    return np.flatnonzero(dataset.event_kind.values == kind)
 
 
 def test_contacts_of_the_bent_rod_begin_and_end_as_those_of_its_modes() -> None:

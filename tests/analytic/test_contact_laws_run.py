@@ -38,8 +38,7 @@ def normal(**law: object) -> Overrides:
 
 
 def of_kind(dataset: xr.Dataset, kind: str) -> np.ndarray:
-    meanings = dataset.event_kind.attrs["flag_meanings"].split()
-    return np.flatnonzero(dataset.event_kind.values == meanings.index(kind))
+    return np.flatnonzero(dataset.event_kind.values == kind)
 
 
 def test_falling_ball_bounces_as_the_reference_says() -> None:

@@ -30,9 +30,7 @@ def known(scene: str) -> list[Impact]:
 
 def found(dataset: xr.Dataset, count: int) -> list[Impact]:
     """The first contacts of a run."""
-    kinds, names = dataset.event_kind.attrs["flag_meanings"].split(), dataset.contact.values
-    rows = zip(dataset.event_kind.values, dataset.event_contact.values, strict=True)
-    told = [(kinds[int(kind)], str(names[int(contact)])) for kind, contact in rows]
+    told = list(zip(dataset.event_kind.values.tolist(), dataset.event_contact.values.tolist(), strict=True))
     time, speed = dataset.event_time.values, dataset.event_approach_speed.values
     contacts = []
     for k, (kind, name) in enumerate(told):

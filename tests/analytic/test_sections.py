@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -13,6 +16,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post.verdict import derive
 from flexclear.stages.__main__ import main
+from flexclear.stages.sections import write_page
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
 CHAOTIC = 0.112
@@ -36,6 +40,19 @@ def test_a_pendulum_that_is_driven_hard_is_chaotic_with_the_exponent_of_its_tang
     assert float(verdict.exponent_low) < CHAOTIC < float(verdict.exponent_high)
     # batches of 2000 periods differ by 8 %
     assert float(verdict.exponent) == pytest.approx(CHAOTIC, rel=0.3)
+
+
+def test_a_page_of_verdicts_has_them_for_programs_too(pendulum: Scene, tmp_path: Path) -> None:
+    gentle = with_torque(pendulum, 1e-3, transient=0, periods=30, exponent_periods=30)
+    found = dynamics.sections(gentle, {}, silent)
+    verdict = derive(found)
+    write_page({"checks/pendulum": verdict}, {"checks/pendulum": found}, {}, tmp_path / "chaos.md")
+    with (tmp_path / "chaos/verdicts.csv").open(newline="") as file:
+        (row,) = csv.DictReader(file)
+    assert (row["scene"], row["verdict"], row["periods"]) == ("checks/pendulum", "periodic", "30")
+    # three digits are written
+    assert float(row["exponent"]) == pytest.approx(float(verdict.exponent), rel=5e-3)
+    assert "| `checks/pendulum` | periodic |" in (tmp_path / "chaos.md").read_text()
 
 
 def test_a_pendulum_that_is_driven_gently_is_periodic_and_forgets_its_start_at_its_damping(pendulum: Scene) -> None:

@@ -82,7 +82,7 @@ def test_materials_and_frames_by_physical_names(tmp_path: Path) -> None:
     assert mesh.sizes["tie"] == 4
     np.testing.assert_allclose(mesh["frame_position"].values, [[0.0, 0.0, 0.0]], atol=1e-15)
     density = mesh["density"].values[mesh["cell_region"].values]
-    x = mesh["node_position"].values[mesh["cell"].values].mean(axis=1)[:, 0]
+    x = mesh["node_position"].values[mesh["cell_node"].values].mean(axis=1)[:, 0]
     np.testing.assert_array_equal(density, np.where(x < 0.05, 7800.0, 2740.0))
 
 

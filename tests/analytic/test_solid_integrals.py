@@ -52,7 +52,7 @@ def displacements(mesh: xr.Dataset, modes: xr.Dataset) -> np.ndarray:
 def cloud(mesh: xr.Dataset, u: np.ndarray) -> Cloud:
     points, weight = gauss(6)
     value, gradient = shape_functions("hex27", points)
-    x, cells = mesh["node_position"].values, mesh["cell"].values
+    x, cells = mesh["node_position"].values, mesh["cell_node"].values
     J = np.einsum("cai,qaj->cqij", x[cells], gradient)
     mass = 2740.0 * np.linalg.det(J) * weight
     place = np.einsum("cai,qa->icq", x[cells], value)

@@ -20,10 +20,9 @@ SCENE = "checks/stops"
 
 def impacts_of(dataset: xr.Dataset, contact: str) -> dict[str, np.ndarray]:
     """Impacts of one end."""
-    names = list(dataset.contact.values)
-    kind = dataset.event_kind.values == dataset.event_kind.attrs["flag_meanings"].split().index("closing")
+    kind = dataset.event_kind.values == "closing"
     strong = kind & (dataset.event_approach_speed.values > 1e-4)
-    mine = dataset.event_contact.values[strong] == names.index(contact)
+    mine = dataset.event_contact.values[strong] == contact
     return {key: values[mine] for key, values in impacts(dataset).items()}
 
 

@@ -32,8 +32,6 @@ def everything() -> dict[str, xr.Dataset]:
     for k, name in enumerate(("free", "fixed", "cb")):
         run = synthetic.run(f"sps4/far_csj_{name}", clearance=True, noise=1e-4 * (1 + 0.2 * k), modes=7)
         _put(data, run, synthetic.ensemble(run))
-    for name in ("csj", "far_csj_cb"):
-        _put(data, synthetic.repeated(data[f"sps4/{name}:run"], f"sps4/repeated/{name}", strokes=4))
     sections = {
         "fixed_square": FIXED_SQUARE,
         "fixed_circle": FIXED_CIRCLE,

@@ -50,7 +50,7 @@ def run(name: str = "sps4/ideal", *, clearance: bool = False, modes: int = 0, no
         "angular_acceleration": (("time", "body", "axis"), np.zeros_like(position)),
         "frame_position": (("time", "frame", "axis"), frame_position),
     }
-    joints = [j for j in ("A1", "A2", "B1", "P1") if not (clearance and j == "A1")]
+    joints = ["A1", "A2", "B1", "P1"]
     force = 30.0 * np.cos(np.pi * time / 0.09)[:, None, None] * np.ones((1, len(joints), 3)) / np.sqrt(3.0)
     data["joint_force"] = (("time", "joint", "axis"), force)
     data["joint_moment"] = (("time", "joint", "axis"), np.zeros_like(force))
@@ -125,14 +125,6 @@ def _leg(axis: np.ndarray) -> np.ndarray:
     return np.stack([x, np.cross(axis, x), axis], axis=2)
 
 
-def repeated(run: xr.Dataset, name: str, strokes: int) -> xr.Dataset:
-    """The run again and again, the ball nearer to the socket's middle from stroke to stroke."""
-    nearer = [run.assign(contact_offset=run.contact_offset * 0.5**k) for k in range(strokes)]
-    parts = [part.isel(time=slice(int(k > 0), None)) for k, part in enumerate(nearer)]
-    later = [part.assign_coords(time=part.time + k * END) for k, part in enumerate(parts)]
-    return xr.concat(later, dim="time", data_vars="minimal", coords="minimal").assign_attrs(scene=name)
-
-
 def _contact(time: np.ndarray) -> dict:
     phase = (time[:, None] - (BURSTS + 3.3e-5)[None, :]) / BURST_LENGTH
     pulse = np.where((phase > 0) & (phase < 1), np.sin(np.pi * np.clip(phase, 0, 1)), 0.0)
@@ -159,7 +151,7 @@ def _contact(time: np.ndarray) -> dict:
         "contact_offset": (("time", "contact", "axis"), offset[:, None, :]),
         "contact_delivered_restitution": (("contact",), np.array([0.913])),
         "event_time": (("event",), events),
-        "event_contact": (("event",), np.zeros(2 * n)),
+        "event_contact": (("event",), np.full(2 * n, "A1")),
         "event_kind": (("event",), np.where(closing, "closing", "opening")),
         "event_approach_speed": (("event",), np.where(closing, 0.2, 0.18)),
         "event_peak_force": (("event",), nan * 1800.0),
@@ -215,7 +207,8 @@ def ensemble(base: xr.Dataset, members: int = 4, growth: float = 60.0) -> xr.Dat
         data[name] = (("member", "contact"), np.full((members, 1), value) + np.arange(members)[:, None])
     peak = np.abs(data["acceleration"][1]).max(axis=1)
     data["peak_acceleration"] = (("member", "body", "axis"), peak)
-    return conform(xr.Dataset(data, {"time": time, "body": ["platform"], "contact": ["A1"]}), ENSEMBLE)
+    made = xr.Dataset(data, {"time": time, "body": ["platform"], "contact": ["A1"]})
+    return conform(made, ENSEMBLE, title="made-up members")
 
 
 def rod_shapes(count: int, nodes: int = 13) -> np.ndarray:
@@ -245,11 +238,11 @@ def bundle(count: int = 7, nodes: int = 13, frequency: np.ndarray | None = None)
         "frame_rotation": (("frame", "axis", "axis2"), np.stack([np.eye(3)] * 2)),
         "frame_translation_shape": (("frame", "axis", "mode"), shape[[0, -1]]),
         "frame_rotation_shape": (("frame", "axis", "mode"), 0 * shape[[0, -1]]),
-        "node_position": (("node", "axis"), x), "cell": (("cell", "corner"), cell),
+        "node_position": (("node", "axis"), x), "cell_node": (("cell", "corner"), cell),
         "shape_translation": (("node", "axis", "mode"), shape), "shape_rotation": (("node", "axis", "mode"), 0 * shape),
         "radius": (("cell",), np.full(nodes - 1, 0.01)),
     }  # fmt: skip
-    return conform(xr.Dataset(data, {"frame": ["bottom", "top"]}), BUNDLE)
+    return conform(xr.Dataset(data, {"frame": ["bottom", "top"]}), BUNDLE, title="made-up rod")
 
 
 def mesh() -> xr.Dataset:
@@ -275,11 +268,11 @@ def modes(frequency: tuple[float, ...], kinds: tuple[str, ...]) -> xr.Dataset:
         "frequency": (("mode",), np.array(frequency)),
         "shape": (("node", "dof", "mode"), shape),
         "node_position": (("node", "axis"), place),
-        "cell": (("cell", "corner"), np.stack([np.arange(12), np.arange(1, 13)], axis=1)),
+        "cell_node": (("cell", "corner"), np.stack([np.arange(12), np.arange(1, 13)], axis=1)),
         "vector": (("unknown", "mode"), shape.reshape(-1, len(frequency))),
         "kind": (("mode",), np.array(kinds)),
     }
-    return conform(xr.Dataset(data), MODES)
+    return conform(xr.Dataset(data), MODES, title="made-up modes")
 
 
 def timing() -> xr.Dataset:

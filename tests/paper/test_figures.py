@@ -13,7 +13,7 @@ import pytest
 from flexclear import pipeline
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.post import figures
-from flexclear.pipeline.post.figures import fig06, sections
+from flexclear.pipeline.post.figures import fig06
 from tests.paper.material import everything
 
 TREE = Path(pipeline.__file__).parent.parent
@@ -29,7 +29,7 @@ def made(name):
 def test_all_figures_and_tables_of_the_paper_are_listed():
     # all but the paper's figures 2 and 7, a beam element and a leg, which figures 1 and 10 have
     plots = {f"fig{n:02d}" for n in (1, 3, 4, 5, 6, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17)}
-    assert set(figures.NAMES) == plots | {f"table{n:02d}" for n in range(1, 11)} | {"sections", "table_verdicts"}
+    assert set(figures.NAMES) == plots | {f"table{n:02d}" for n in range(1, 11)} | {"table_verdicts"}
 
 
 @pytest.mark.parametrize("name", figures.NAMES)
@@ -74,12 +74,6 @@ def test_friction_curve_goes_through_its_corners_and_is_odd():
     v = np.array([-1.0, -1e-2, -2e-4, 0.0, 2e-4, 1e-2, 1.0])
     # corners of the law, exact up to rounding
     np.testing.assert_allclose(fig06.coefficient(v, *law), [-0.1, -0.1, -0.15, 0.0, 0.15, 0.1, 0.1], atol=1e-15)
-
-
-def test_a_section_has_one_point_per_stroke_at_its_top():
-    found = sections.strobed(everything()["sps4/repeated/csj:run"], everything()["sps4/repeated/csj:post"])
-    once = everything()["sps4/csj:run"].contact_offset.sel(contact="A1", axis="x").sel(time=0.09, method="nearest")
-    np.testing.assert_allclose(found["x"], 1e3 * once.item() * 0.5 ** np.arange(4), rtol=1e-12)
 
 
 def test_observed_friction_is_read_from_force_and_power():

@@ -8,7 +8,7 @@ import io
 import numpy as np
 import pytest
 
-from flexclear.pipeline.post.figures import table04, table05, table07, table08, table09, table10
+from flexclear.pipeline.post.figures import table04, table05, table07, table08, table09, table10, table_verdicts
 from flexclear.pipeline.post.plotting.error_table import number
 from flexclear.pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
@@ -174,3 +174,24 @@ def test_deviations_carry_the_error_of_their_time_integration():
     data["sps4/ideal:tight"] = data["sps4/ideal:run"]
     moved = {row["largest error"]: row for row in rows(table08, "table08", data)}["velocity z0 (mm/s)"]["ours"]
     assert moved.endswith("± 3e-03")  # 3e-6 m/s in the printed unit
+
+
+@pytest.mark.parametrize(
+    "motions, verdict",
+    [
+        (("quasi-periodic", "chaotic", "chaotic", "chaotic"), "holds"),
+        (("periodic", "chaotic", "periodic", "chaotic"), "in part"),
+        (("periodic", "periodic", "periodic", "periodic"), "does not hold"),
+    ],
+)
+def test_the_claim_of_chaos_is_judged_by_the_sections_that_were_made(tmp_path, monkeypatch, motions, verdict):
+    scenes = [f"sps4/{name}" for name in ("csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")]
+    lines = [f"{scene},{motion},500,1.5,1.0,2.0" for scene, motion in zip(scenes, motions, strict=True)]
+    recorded = tmp_path / "verdicts.csv"
+    recorded.write_text("\n".join(["scene,verdict,periods,exponent,exponent_low,exponent_high", *lines]))
+    monkeypatch.setattr(table_verdicts, "SECTIONS", recorded)
+    last = rows(table_verdicts, "table_verdicts")[-1]
+    assert last["verdict"] == verdict
+    assert f"CSJ {motions[0]}" in last["numbers"]
+    recorded.unlink()
+    assert rows(table_verdicts, "table_verdicts")[-1]["verdict"] == "cannot be told from one stroke"

@@ -57,7 +57,7 @@ def cloud(rod: xr.Dataset, data: xr.Dataset) -> Cloud:
     node, weight = np.polynomial.legendre.leggauss(5)
     x, density = rod["node_position"].values[:, 0], float(rod["density"][0])
     masses, places, shapes = [], [], []
-    for start, stop in rod["cell"].values:
+    for start, stop in rod["cell_node"].values:
         h = x[stop] - x[start]
         for s, w in zip(0.5 * (1.0 + node), 0.5 * weight, strict=True):
             translation, rotation = element_motion(data, start, stop, float(s), h)

@@ -28,7 +28,7 @@ def test_every_recipe_builds_and_says_where_its_values_come_from(path: Path) -> 
     rod = mesh.build(mesh.read_recipe(path))
     assert rod.sizes["node"] == rod.sizes["cell"] + 1
     for part in ("shape", "material", "section", "elements"):
-        assert f"{part}: Table 2" in rod.attrs["source"]
+        assert f"{part}: Table 2" in rod.attrs["sources"]
 
 
 def test_the_equal_area_square_changes_only_the_mass() -> None:
@@ -96,7 +96,7 @@ def test_other_programs_read_the_mesh(recipe: dict[str, Any], tmp_path: Path) ->
     mesh.write_vtu(rod, tmp_path / "rod.vtu")
     read = meshio.read(tmp_path / "rod.vtu")
     np.testing.assert_array_equal(read.points, rod["node_position"])
-    np.testing.assert_array_equal(read.cells_dict["line"], rod["cell"])
+    np.testing.assert_array_equal(read.cells_dict["line"], rod["cell_node"])
     np.testing.assert_array_equal(read.cell_data["area"][0], rod["area"])
 
 

@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.cost import causes, page, price, split, work_precision
@@ -28,8 +27,8 @@ def run(error: float, *, seconds=(0.2, 0.1, 0.3), evaluations=100, impacts=3, ho
     data = {
         "position": (("time", "body", "axis"), position),
         "event_time": (("event",), 0.2 * (1 + np.arange(impacts)) + error),
-        "event_contact": (("event",), np.zeros(impacts, dtype=int)),
-        "event_kind": (("event",), np.full(impacts, CLOSING)),
+        "event_contact": (("event",), np.full(impacts, "pin")),
+        "event_kind": (("event",), np.full(impacts, "closing")),
         "event_approach_speed": (("event",), np.full(impacts, 0.5)),
         "cpu_repeat": (("repeat",), np.array(seconds)),
     }

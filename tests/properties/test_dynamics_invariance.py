@@ -16,7 +16,6 @@ from flexclear.pipeline.core.algebra import (
     quaternion_to_matrix,
     rotation_vector_to_matrix,
 )
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
@@ -87,7 +86,7 @@ def comparable(run: xr.Dataset) -> xr.Dataset:
     interval = json.loads(run.attrs["parameters"])["output"]["interval"]
     steps = run.time.values / interval
     regular = np.abs(steps - np.round(steps)) < 1e-9 * np.maximum(steps, 1.0)
-    located = run.event_time.values[run.event_kind.values <= CLOSING]
+    located = run.event_time.values[run.event_kind.isin(["opening", "closing"]).values]
     return run.isel(time=np.flatnonzero(regular | np.isin(run.time.values, located)))
 
 

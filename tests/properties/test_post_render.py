@@ -139,7 +139,7 @@ def solid(corners: int) -> xr.Dataset:
     return xr.Dataset(
         {
             "node_position": (("node", "axis"), np.stack([x, y, 0.0 * x], axis=1)),
-            "cell": (("cell", "corner"), cell),
+            "cell_node": (("cell", "corner"), cell),
             "radius": (("cell",), np.zeros(len(cell))),
             "shape_translation": (("node", "axis", "mode"), shape),
             "shape_rotation": (("node", "axis", "mode"), 0.0 * shape),
@@ -193,7 +193,7 @@ def test_shapes_of_solids_become_pages_and_files(corners, tmp_path):
     assert b"vtk" in content
     (tmp_path / "plate.vtu").write_bytes(shapes.vtu(plate))
     read = meshio.read(tmp_path / "plate.vtu")
-    np.testing.assert_array_equal(read.cells[0].data, plate.cell.values)
+    np.testing.assert_array_equal(read.cells[0].data, plate.cell_node.values)
     np.testing.assert_allclose(read.point_data["mode_2_200.0Hz"], plate.shape_translation.values[:, :, 1])
 
 

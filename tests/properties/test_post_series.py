@@ -12,7 +12,7 @@ from flexclear.pipeline.core.quantities import common_times
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.errors import ensemble_deviations, max_deviation
 from flexclear.pipeline.post.horizon import horizon, spread
-from flexclear.pipeline.post.poincare import at_times, strobe_times
+from flexclear.pipeline.post.poincare import at_times
 from flexclear.pipeline.post.rotations import angle_about_y
 from tests.paper import synthetic
 
@@ -164,14 +164,6 @@ def test_impacts_are_closings_paired_with_their_openings():
     assert float(post.clearance[0]) == pytest.approx(0.5e-3, rel=1e-12)
 
 
-def test_events_may_be_flags_instead_of_words():
-    run = synthetic.run("sps4/csj", clearance=True)
-    flags = (run.event_kind.values == "closing").astype(np.int8)
-    told = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "opening closing"}
-    other = run.assign(event_kind=("event", flags, told))
-    assert derive(other).identical(derive(run))
-
-
 def test_slow_closings_are_no_impacts():
     run = synthetic.run("sps4/csj", clearance=True)
     speed = run.event_approach_speed.values.copy()
@@ -217,8 +209,3 @@ def test_sections_are_never_interpolated():
     time = np.array([0.0, 0.1, 0.2, 0.3])
     (found,) = at_times(time, np.array([0.1, 0.15, 0.3]), 10.0 * time)
     np.testing.assert_allclose(found, [1.0, 3.0])
-
-
-def test_strobe_leaves_the_transient_out():
-    np.testing.assert_allclose(strobe_times(0.0, 1.0, 0.2, transient=2), [0.4, 0.6, 0.8, 1.0])
-    assert strobe_times(0.0, 0.18, 0.18, transient=5).size == 0

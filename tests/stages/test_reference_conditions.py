@@ -6,7 +6,8 @@ import pytest
 
 from benchmarks.families import reference_conditions
 from benchmarks.family import Record as Row
-from benchmarks.reference_conditions import claims, design, figures
+from benchmarks.geometry.kinematics import Layout
+from benchmarks.reference_conditions import claims, design, figures, layouts
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 
 EFFECT = {"angle": 3e-6, "displacement": 3e-7, "velocity": 7e-4}
@@ -113,3 +114,34 @@ def test_ensembles_of_dear_sets_have_half_the_members(monkeypatch: pytest.Monkey
     for place in PLACES:
         sets = {case.count for case in cases if (case.place, case.condition) == (place, "craig-bampton")}
         assert sets >= {COUNT, *MOST_COMPLETE}
+
+
+def layout_rows(layouts: int, **odd: float) -> list[Row]:
+    """The numbers under which every statement holds for some layouts; the last one's rigid rod differs by `odd`."""
+    found = []
+    for layout in range(layouts):
+        where = {"layout": layout, "ax": 0.12, "ay": 0.04, "bx": 0.2, "by": 0.3, "height": 0.22}
+        for group, of in rows().items():
+            for row in (r for r in of if r["place_mm"] == 0 and r["condition"] != FULL):
+                values = odd if layout == layouts - 1 and row["condition"] == RIGID and group == "clearance" else {}
+                found.append(where | row | values | {"clearance": group == "clearance"})
+    return found
+
+
+def test_a_statement_holds_of_the_paper_when_it_holds_for_every_layout() -> None:
+    every = layouts.told(layout_rows(3), rows())
+    assert "| holds | 3 of 3 | **holds** |" in " ".join(every.split())
+    assert "hangs on the layout" not in every
+    # a rigid rod whose impacts are as soft: the flexible one softens nothing there
+    some = " ".join(layouts.told(layout_rows(3, peak_force=1500.0), rows()).split())
+    assert "| The flexible rod softens the impacts. | holds | 2 of 3 | hangs on the layout |" in some
+
+
+def test_cases_of_a_layout_have_its_places_and_no_other() -> None:
+    layout = Layout(0.12, 0.04, 0.2, 0.3, 0.22)
+    cases = design.of_layout(layout, 8)
+    assert {case.members for case in cases if case.clearance and case.count == COUNT and case.condition != RIGID} == {4}
+    for case in (cases[0], cases[-1]):
+        scene = design.scene(case)
+        assert scene.body["platform"].pose.position == (0.0, 0.0, 0.22)
+        assert scene.body["ground"].frames["B3"].position == pytest.approx((-0.2, 0.3, 0.0))

@@ -76,7 +76,10 @@ def finished_run(**changes: Any) -> xr.Dataset:
     values = {name: ("time", one) for name in ("kinetic", "potential", "elastic", "dissipated", "drive_work")}
     values |= {"energy_error": ("time", 1e-9 * one), "constraint_error": ("time", 1e-14 * one)}
     values |= {"contact_friction_power": (("time", "contact"), -one[:, None]), "horizon": ((), 0.25)}
-    values |= {"event_kind": ("event", [1, 2, 1]), "event_peak_force": ("event", [3.0, np.nan, 7.0])}
+    values |= {
+        "event_kind": ("event", ["closing", "compression", "closing"]),
+        "event_peak_force": ("event", [3.0, np.nan, 7.0]),
+    }
     values |= {name: ("time", value * one) for name, value in changes.items()}
     return xr.Dataset(values, {"time": time_}, {"method": "dop853", "evaluations": 12})
 

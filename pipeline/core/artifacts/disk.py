@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import fcntl
 import hashlib
 import json
 import os
@@ -19,16 +18,20 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import ResourceError
+
+if TYPE_CHECKING:
+    from filelock import FileLock
 
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-#: temporary files of other machines that share the disk are swept when they are so old [s]
+#: temporary files of other machines that share the disk, and unfinished work, are swept when they are so old [s]
 FORGOTTEN = 7 * 86400.0
-#: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
-FICLONE = 0x40049409
+#: what a file system without locks answers
+LOCKLESS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)
 _TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\.[0-9a-f]{8}\.tmp")
 
 
@@ -72,14 +75,12 @@ def copy(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary(target) as made:
         with source.open("rb") as old, made.open("wb") as new:
-            try:
-                fcntl.ioctl(new.fileno(), FICLONE, old.fileno())
-            except OSError:
+            if not system.share(old, new):
                 shutil.copyfileobj(old, new, 1 << 20)
         status = source.stat()
         os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
         made.chmod(0o444)
-        os.replace(made, target)
+        system.replace(made, target)
 
 
 def is_copy(source: Path, target: Path) -> bool:
@@ -105,15 +106,10 @@ def temporary(path: Path) -> Iterator[Path]:
 
 def settle(made: Path, path: Path) -> None:
     """Force the bytes to the disk, give the file its name, and force that to the disk."""
-    with made.open("rb") as file:
+    with made.open("rb+") as file:  # Windows forces only what could be written
         os.fsync(file.fileno())
-    os.replace(made, path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        with contextlib.suppress(OSError):  # some file systems know no such thing
-            os.fsync(folder)
-    finally:
-        os.close(folder)
+    system.replace(made, path)
+    system.sync_folder(path.parent)
 
 
 @contextlib.contextmanager
@@ -132,61 +128,53 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
 
     The system drops the lock of a process that dies, whatever it dies of.
     """
-    handle = _locked(path, wait, waiting)
+    from filelock import FileLock  # here, since what finds everything fresh locks nothing
+
+    lock = FileLock(path, thread_local=False, fallback_to_soft=False)
+    mine = _acquire(lock, wait=False)
+    if mine is None and wait:
+        waiting()
+        mine = _acquire(lock, wait=True)
     try:
-        yield handle is not None
+        yield mine is not None
     finally:
-        if handle is not None:
-            path.unlink(missing_ok=True)  # while it is held: who waits for it will look for the file again
-            os.close(handle)
+        if mine is not None:
+            with contextlib.suppress(OSError):  # Windows removes no file that is open: `sweep` will
+                path.unlink(missing_ok=True)  # while it is held: who waits for it will look for the file again
+        lock.release()
 
 
-def _locked(path: Path, wait: bool, waiting: Callable[[], None]) -> int | None:
-    while True:
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-        try:
-            if not _try_lock(handle):
-                if not wait:
-                    os.close(handle)
-                    return None
-                waiting()
-                fcntl.flock(handle, fcntl.LOCK_EX)
-        except BaseException:
-            os.close(handle)
+def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
+    """The lock, or None when another process holds it.
+
+    A file system without locks counts as free: unique temporary names and atomic replacement keep results right, work
+    may then be done twice.
+    """
+    from filelock import Timeout
+
+    try:
+        lock.acquire(blocking=wait)
+    except Timeout:
+        return None
+    except OSError as error:
+        if error.errno not in LOCKLESS:
             raise
-        if _is(path, handle):
-            return handle
-        os.close(handle)
-
-
-def _is(path: Path, handle: int) -> bool:
-    """Whether a name still belongs to an open file."""
-    try:
-        return os.path.samestat(os.stat(path), os.fstat(handle))
-    except OSError:
-        return False
-
-
-def _try_lock(handle: int) -> bool:
-    """False when another process holds it. A file system without locks counts as free: unique
-    temporary names and atomic replacement keep results right, work may then be done twice."""
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return False
-    except OSError:
-        return True
-    return True
+    return lock
 
 
 def sweep(root: Path) -> int:
-    """Remove temporary files and locks below `root` that processes left which are no more; how many."""
+    """Remove temporary files and locks below `root` that processes left which are no more, and unfinished work that
+    nobody has gone on with for long; how many."""
     removed = 0
     for folder, _, names in os.walk(root):
         for name in names:
             path = Path(folder, name)
             if name.endswith(".tmp") and _abandoned(path):
                 with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps
+                    path.unlink()
+                    removed += 1
+            elif name.endswith(".part") and _old(path):
+                with contextlib.suppress(OSError):
                     path.unlink()
                     removed += 1
             elif name.endswith(".lock"):
@@ -200,15 +188,13 @@ def _abandoned(path: Path) -> bool:
     if found is None:
         return False  # none of ours
     if found["host"] != _host():
-        with contextlib.suppress(OSError):
-            return time.time() - path.stat().st_mtime > FORGOTTEN
-        return False
-    try:
-        os.kill(int(found["pid"]), 0)
-    except ProcessLookupError:
-        return True
-    except (OSError, OverflowError):
-        return False
+        return _old(path)
+    return not system.alive(int(found["pid"]))
+
+
+def _old(path: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return time.time() - path.stat().st_mtime > FORGOTTEN
     return False
 
 

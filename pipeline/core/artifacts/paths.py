@@ -7,7 +7,12 @@ from pathlib import Path
 
 from flexclear.pipeline.core.version import version
 
-CHECKOUT = Path(__file__).absolute().parents[4]
+#: folder that holds the packages `pipeline` and `stages`: `flexclear`, or, where links are not followed, a checkout
+PACKAGES = Path(__file__).absolute().parents[3]
+#: folder that holds the package `flexclear`; sources are read below it
+TREE = PACKAGES if (PACKAGES / "flexclear" / "__init__.py").is_file() else PACKAGES.parent
+#: folder with the scenes and meshes of the project, which are installed with it
+DATA = PACKAGES
 
 
 def results_root() -> Path:
@@ -16,7 +21,7 @@ def results_root() -> Path:
     named = os.environ.get("FLEXCLEAR_RESULTS")
     if named:
         return Path(named).resolve()
-    return (CHECKOUT if (CHECKOUT / "pyproject.toml").is_file() else Path.cwd()) / "results"
+    return (TREE if (TREE / "pyproject.toml").is_file() else Path.cwd()) / "results"
 
 
 def kernel_root() -> Path:

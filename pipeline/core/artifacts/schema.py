@@ -6,21 +6,28 @@ reads one may rely on this page.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
+from flexclear.pipeline.core.artifacts.coordinates import AXES, COORDINATES, QUATERNION, turning, with_names
 from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.version import DISTRIBUTION, version
 
 __all__ = [
+    "AXES",
     "BUNDLE",
     "DEFICITS",
     "ENSEMBLE",
     "MATRICES",
     "MESH",
     "MODES",
+    "QUATERNION",
     "RIGID",
     "RUN",
     "SOLID",
@@ -28,13 +35,11 @@ __all__ = [
     "Schema",
     "Variable",
     "conform",
+    "incomplete",
+    "require_complete",
 ]
 
 CONVENTIONS = "CF-1.11"
-AXES = ("x", "y", "z")
-QUATERNION = ("w", "x", "y", "z")
-
-
 _V = Variable
 
 #: stage 4: one run
@@ -52,16 +57,24 @@ RUN: Schema = {
     "joint_moment": _V(
         ("time", "joint", "axis"), "N m", "moment on the joint's second body at its frame's origin, world axes"
     ),
-    "modal_coordinate": _V(("time", "mode"), "kg0.5 m", "modal coordinate", optional=True),
-    "modal_velocity": _V(("time", "mode"), "kg0.5 m s-1", "rate of the modal coordinate", optional=True),
-    "drive_force": _V(("time", "drive"), "N or N m", "what the drive supplies along its coordinate", optional=True),
-    "drive_position": _V(("time", "drive"), "m or rad", "prescribed coordinate", optional=True),
-    "joint_position": _V(
-        ("time", "coordinate"), "m or rad", "joint coordinate of the second frame against the first", optional=True
+    "modal_coordinate": _V(("time", "mode"), "m", "modal coordinate, for a modal mass of 1 kg", optional=True),
+    "modal_velocity": _V(("time", "mode"), "m s-1", "rate of the modal coordinate", optional=True),
+    "drive_force": _V(
+        ("time", "drive"), "N", "what the drive supplies along its coordinate", optional=True, turning="N m"
     ),
-    "joint_velocity": _V(("time", "coordinate"), "m s-1 or rad s-1", "rate of the joint coordinate", optional=True),
+    "drive_position": _V(("time", "drive"), "m", "prescribed coordinate", optional=True, turning="rad"),
+    "joint_position": _V(
+        ("time", "coordinate"),
+        "m",
+        "joint coordinate of the second frame against the first",
+        optional=True,
+        turning="rad",
+    ),
+    "joint_velocity": _V(
+        ("time", "coordinate"), "m s-1", "rate of the joint coordinate", optional=True, turning="rad s-1"
+    ),
     "joint_acceleration": _V(
-        ("time", "coordinate"), "m s-2 or rad s-2", "second rate of the joint coordinate", optional=True
+        ("time", "coordinate"), "m s-2", "second rate of the joint coordinate", optional=True, turning="rad s-2"
     ),
     "load_force": _V(
         ("time", "load", "axis"), "N", "force of the load on its frame, or its second one, world axes", optional=True
@@ -73,7 +86,11 @@ RUN: Schema = {
         optional=True,
     ),
     "load_length": _V(
-        ("time", "load"), "m or rad", "length of a spring, or joint coordinate that a load acts along", optional=True
+        ("time", "load"),
+        "m",
+        "length of a spring, or joint coordinate that a load acts along",
+        optional=True,
+        turning="rad",
     ),
     "bushing_displacement": _V(
         ("time", "bushing", "axis"), "m", "second frame's origin in the first one's axes", optional=True
@@ -85,17 +102,29 @@ RUN: Schema = {
         ("time", "load"), "W", "power of the load on the mechanism, stored energy included", optional=True
     ),
     "controller_force": _V(
-        ("time", "controller"), "N or N m", "force of the controller along the coordinate it pushes", optional=True
+        ("time", "controller"),
+        "N",
+        "force of the controller along the coordinate it pushes",
+        optional=True,
+        turning="N m",
     ),
-    "controller_integral": _V(("time", "controller"), "N or N m", "integral part of that force", optional=True),
+    "controller_integral": _V(("time", "controller"), "N", "integral part of that force", optional=True, turning="N m"),
     "gear_force": _V(
-        ("time", "gear"), "N or N m", "force of the gear along its second coordinate, on its second body", optional=True
+        ("time", "gear"),
+        "N",
+        "force of the gear along its second coordinate, on its second body",
+        optional=True,
+        turning="N m",
     ),
-    "contact_gap": _V(("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True),
-    "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True),
-    "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True),
-    "contact_force": _V(("time", "contact", "axis"), "N", "contact force on the ball, world axes", optional=True),
-    "contact_normal_force": _V(("time", "contact"), "N", "normal contact force, >= 0", optional=True),
+    "contact_gap": _V(
+        ("time", "contact"), "m", "clearance minus eccentricity; negative in contact", optional=True, turning="rad"
+    ),
+    "contact_penetration": _V(("time", "contact"), "m", "max(0, -gap)", optional=True, turning="rad"),
+    "contact_rate": _V(("time", "contact"), "m s-1", "rate of penetration", optional=True, turning="rad s-1"),
+    "contact_force": _V(
+        ("time", "contact", "axis"), "N", "contact force on the ball, world axes", optional=True, turning="N m"
+    ),
+    "contact_normal_force": _V(("time", "contact"), "N", "normal contact force, >= 0", optional=True, turning="N m"),
     "contact_friction_power": _V(("time", "contact"), "W", "minus the power that friction takes, <= 0", optional=True),
     "contact_sliding_speed": _V(
         ("time", "contact"), "m s-1", "sliding speed at the contact; 0 without friction or contact", optional=True
@@ -104,7 +133,9 @@ RUN: Schema = {
     "contact_damping_loss": _V(
         ("time", "contact"), "J", "energy lost to the normal damping of the contact since the start", optional=True
     ),
-    "contact_impulse": _V(("time", "contact"), "N s", "impulse of the normal force since the start", optional=True),
+    "contact_impulse": _V(
+        ("time", "contact"), "N s", "impulse of the normal force since the start", optional=True, turning="N m s"
+    ),
     "contact_friction_loss": _V(
         ("time", "contact"), "J", "energy lost to the friction of the contact since the start", optional=True
     ),
@@ -114,7 +145,11 @@ RUN: Schema = {
     "load_loss": _V(("time",), "J", "energy lost to the loads since the start", optional=True),
     "modal_damping_loss": _V(("time",), "J", "energy lost to modal damping since the start", optional=True),
     "contact_offset": _V(
-        ("time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True
+        ("time", "contact", "axis"),
+        "m",
+        "ball centre relative to the socket centre, socket axes",
+        optional=True,
+        turning="rad",
     ),
     "kinetic": _V(("time",), "J", "kinetic energy"),
     "potential": _V(("time",), "J", "potential energy of the loads"),
@@ -145,21 +180,19 @@ RUN: Schema = {
         optional=True,
     ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
-    "event_contact": _V(("event",), "1", "index of the contact", optional=True),
-    "event_kind": _V(
-        ("event",),
-        "1",
-        "opening, closing, maximum compression, begin of sticking or slipping",
-        optional=True,
-        flags=EVENT_KINDS,
-    ),
+    "event_contact": _V(("event",), "", "name of the contact", optional=True),
+    "event_kind": _V(("event",), "", f"one of {', '.join(EVENT_KINDS)}", optional=True),
     "event_approach_speed": _V(
-        ("event",), "m s-1", "rate of penetration at a closing, minus it at an opening, 0 at compression", optional=True
+        ("event",),
+        "m s-1",
+        "rate of penetration at a closing, minus it at an opening, 0 at compression",
+        optional=True,
+        turning="rad s-1",
     ),
     "event_peak_force": _V(
-        ("event",), "N", "largest normal force of the contact that this closing begins", optional=True
+        ("event",), "N", "largest normal force of the contact that this closing begins", optional=True, turning="N m"
     ),
-    "event_peak_penetration": _V(("event",), "m", "largest penetration of that contact", optional=True),
+    "event_peak_penetration": _V(("event",), "m", "largest penetration of that contact", optional=True, turning="rad"),
     "event_duration": _V(("event",), "s", "duration of that contact", optional=True),
     **{name: variable for requested in VARIABLES.values() for name, variable in requested.items()},
 }
@@ -172,12 +205,15 @@ ENSEMBLE: Schema = {
     "velocity": _V(("member", "time", "body", "axis"), "m s-1", "velocity of the centre of mass, world axes"),
     "angular_velocity": _V(("member", "time", "body", "axis"), "rad s-1", "angular velocity, world axes"),
     "acceleration": _V(("member", "time", "body", "axis"), "m s-2", "acceleration of the centre of mass, world axes"),
-    "contact_normal_force": _V(("member", "time", "contact"), "N", "normal contact force, >= 0"),
+    "contact_normal_force": _V(("member", "time", "contact"), "N", "normal contact force, >= 0", turning="N m"),
     "contact_offset": _V(
-        ("member", "time", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes"
+        ("member", "time", "contact", "axis"),
+        "m",
+        "ball centre relative to the socket centre, socket axes",
+        turning="rad",
     ),
     "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
-    "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run"),
+    "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run", turning="N m"),
     "peak_acceleration": _V(
         ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
     ),
@@ -194,17 +230,29 @@ SECTIONS: Schema = _OF_SECTION | {
     "orbit_quaternion": _V(("waypoint", "body", "quat"), "1", "unit quaternion at waypoints of the last period"),
     "orbit_velocity": _V(("waypoint", "body", "axis"), "m s-1", "velocity at waypoints of the last period"),
     "orbit_contact_offset": _V(
-        ("waypoint", "contact", "axis"), "m", "ball centre relative to the socket centre there", optional=True
+        ("waypoint", "contact", "axis"),
+        "m",
+        "ball centre relative to the socket centre there",
+        optional=True,
+        turning="rad",
     ),
     "contact_offset": _V(
-        ("section", "contact", "axis"), "m", "ball centre relative to the socket centre, socket axes", optional=True
+        ("section", "contact", "axis"),
+        "m",
+        "ball centre relative to the socket centre, socket axes",
+        optional=True,
+        turning="rad",
     ),
     "growth": _V(("followed",), "1", "logarithm of how a neighbour's distance grew in the period"),
-    "impact_section": _V(("impact",), "1", "index of the period in which the impact began", optional=True),
-    "impact_contact": _V(("impact",), "1", "index of the contact", optional=True),
+    "impact_section": _V(("impact",), "1", "number of the period in which the impact began", optional=True),
+    "impact_contact": _V(("impact",), "", "name of the contact", optional=True),
     "impact_phase": _V(("impact",), "s", "time of the closing since the period began", optional=True),
-    "impact_approach_speed": _V(("impact",), "m s-1", "rate of penetration at the closing", optional=True),
-    "impact_peak_force": _V(("impact",), "N", "largest normal force of the contact that it begins", optional=True),
+    "impact_approach_speed": _V(
+        ("impact",), "m s-1", "rate of penetration at the closing", optional=True, turning="rad s-1"
+    ),
+    "impact_peak_force": _V(
+        ("impact",), "N", "largest normal force of the contact that it begins", optional=True, turning="N m"
+    ),
     "impact_duration": _V(("impact",), "s", "duration of that contact", optional=True),
     "impact_position": _V(("impact", "body", "axis"), "m", "centre of mass at the closing, world axes", optional=True),
     "impact_quaternion": _V(("impact", "body", "quat"), "1", "unit quaternion at the closing", optional=True),
@@ -217,58 +265,87 @@ _STILL = """position quaternion frame_position joint_force joint_moment joint_po
 drive_force drive_position load_force load_moment load_length contact_gap contact_penetration contact_force
 contact_normal_force contact_offset potential elastic"""
 #: static equilibrium, or steady motion: what a run says at one instant
-EQUILIBRIUM: Schema = {
-    name: _V(RUN[name].dims[1:], RUN[name].units, RUN[name].long_name, RUN[name].optional) for name in _STILL.split()
-}
+EQUILIBRIUM: Schema = {name: replace(RUN[name], dims=RUN[name].dims[1:]) for name in _STILL.split()}
 
-#: natural vibrations about it; shapes per unit of a coordinate with unit modal mass, parts real and imaginary
+#: natural vibrations about it; shapes per unit of a coordinate with a modal mass of 1 kg, parts real and imaginary
 LINEAR: Schema = EQUILIBRIUM | {
     "frequency": _V(("vibration",), "Hz", "frequency of the vibration, damping included"),
     "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
     "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
     "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
-    "dominant": _V(("vibration",), "1", "body with the largest share of the kinetic energy"),
+    "dominant": _V(("vibration",), "", "body with the largest share of the kinetic energy"),
     "energy_share": _V(("vibration", "moving_body"), "1", "share of the body in the kinetic energy"),
-    "frame_translation": _V(
-        ("vibration", "part", "frame", "axis"), "kg-0.5", "displacement of the named frame, world axes"
-    ),
+    "frame_translation": _V(("vibration", "part", "frame", "axis"), "1", "displacement of the named frame, world axes"),
     "frame_rotation": _V(
-        ("vibration", "part", "frame", "axis"), "kg-0.5 m-1", "rotation vector of the named frame, world axes"
+        ("vibration", "part", "frame", "axis"), "rad m-1", "rotation vector of the named frame, world axes"
     ),
     "modal_shape": _V(("vibration", "part", "mode"), "1", "modal coordinates of the flexible bodies", optional=True),
 }
 
 
-def conform(dataset: xr.Dataset, schema: Schema, **attributes: str | int | float) -> xr.Dataset:
+#: variables that say what the entries of their dimension are, where their schema has them
+_NAMING = ("event_time", "event_contact", "event_kind", "impact_time", "impact_contact")
+#: what the run's end cuts short has no duration
+_MAY_BE_OPEN = ("event_", "impact_")
+
+
+def conform(dataset: xr.Dataset, schema: Schema, *, title: str, **attributes: str | int | float) -> xr.Dataset:
     """`dataset` with units, long names and coordinates of `schema`; ValueError where it differs.
 
-    Every mandatory variable must be there with its dimensions; nothing undeclared may be.
+    Every mandatory variable must be there with its dimensions; nothing undeclared may be. The attribute `units` is that
+    of all entries; where some slide and others turn, the coordinate `<variable>_units` has the one of each instead.
+    title: of the dataset, in words.
     """
     missing = [n for n, v in schema.items() if not v.optional and n not in dataset.variables]
     unknown = [str(n) for n in dataset.data_vars if n not in schema]
+    unknown += [str(n) for n in dataset.coords if n not in schema and n not in COORDINATES and not _is_unit(str(n))]
     if missing or unknown:
         raise ValueError(f"artifact lacks {missing} and has undeclared {unknown}")
-    result = dataset.copy()
-    # a variable that is called like its dimension (`cell`) is a coordinate to xarray
-    for name in (n for n in schema if n in dataset.variables):
-        variable, values = schema[name], dataset[name]
+    result = with_names(dataset)
+    for name in [str(n) for n in result.variables if not _is_unit(str(n))]:
+        variable, values = schema.get(name) or COORDINATES[name], result.variables[name]
         if values.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
-        may_be_open = name.startswith(("event_", "impact_"))  # what the run's end cuts short has no duration
-        if values.dtype.kind == "f" and not may_be_open and not np.isfinite(values.values).all():
+        if values.dtype.kind == "f" and not name.startswith(_MAY_BE_OPEN) and not np.isfinite(values.values).all():
             raise ValueError(f"{name} holds values that are not finite")
-        result[name].attrs = {"units": variable.units, "long_name": variable.long_name}
-        if variable.flags and values.dtype.kind in "iu":
-            kinds = np.arange(len(variable.flags), dtype=values.dtype)
-            result[name].attrs |= {"flag_values": kinds, "flag_meanings": " ".join(variable.flags)}
-    for dim in ("axis", "axis2"):
-        if dim in result.dims:
-            result = result.assign_coords({dim: list(AXES)})
-    if "quat" in result.dims:
-        result = result.assign_coords(quat=list(QUATERNION))
-    if "bound_frequency" in result.coords:
-        result["bound_frequency"].attrs = {"units": "Hz", "long_name": "frequency of the load"}
-    if "time" in result.coords:
-        result["time"].attrs = {"units": "s", "long_name": "time"}
-    result.attrs = {"Conventions": CONVENTIONS, **attributes}
+        units, mixed = _units(result, name, variable)
+        values.attrs = ({"units": units} if units else {}) | {"long_name": variable.long_name}
+        if mixed is not None:
+            result = result.assign_coords({f"{name}_units": mixed})
+    result = result.set_coords([name for name in _NAMING if name in result])
+    made = {"Conventions": CONVENTIONS, "title": title, "source": f"{DISTRIBUTION} {version()}"}
+    result.attrs = made | attributes
     return result
+
+
+def _is_unit(name: str) -> bool:
+    return name.endswith("_units")
+
+
+def _units(dataset: xr.Dataset, name: str, variable: Variable) -> tuple[str, xr.Variable | None]:
+    """The unit of all entries, or none and the unit of each."""
+    if not variable.turning:
+        return variable.units, None
+    dim, turns = turning(dataset, variable.dims)
+    if not turns.any():
+        return variable.units, None
+    if turns.all():
+        return variable.turning, None
+    each, words = np.where(turns, variable.turning, variable.units), {"long_name": f"units of {name}"}
+    return "", xr.Variable(dim, each, words)
+
+
+def incomplete(run: xr.Dataset, why: str) -> xr.Dataset:
+    """What there is of a run that was stopped, marked: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
+    return run.assign_attrs(complete=0, stopped_at=float(run["time"].values[-1]), stopped_by=why)
+
+
+def require_complete(run: xr.Dataset, what: str = "the run") -> None:
+    """InputError for what is left of a run that was stopped, which is no result."""
+    if not run.attrs.get("complete", 1):
+        raise InputError(
+            what,
+            f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
+            f"({run.attrs.get('stopped_by', 'nobody knows why')})",
+            "run the scene again, which goes on from there",
+        )

@@ -43,6 +43,8 @@ MAIN = "nc"
 TOLD = ("warnings", "accuracy_verdict")
 #: lies beside what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
+#: between stem and suffix of what is left of a stopped run
+PARTIAL = ".partial"
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -140,6 +142,7 @@ class Store:
                 if not is_copy(source, target):
                     self._keep_edited(target, name, folder, label)
                     copy(source, target)
+            _partial(shown[MAIN] if MAIN in shown else self.root / folder / label).unlink(missing_ok=True)
             self._facts(folder, label, "failed").unlink(missing_ok=True)
             self._tell_outdated(folder)
 
@@ -152,6 +155,19 @@ class Store:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             os.replace(target, aside)
             self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
+
+    def show_partial(self, dataset: xr.Dataset, folder: str, name: str) -> Path | None:
+        """Put what is left of work that was stopped beside what is shown; its path, where anything is shown.
+
+        It is no artifact, and `show` takes it away.
+        """
+        if not folder:
+            return None
+        path = _partial(self.root / folder / name)
+        with disk_limits(path.parent):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_dataset(path, dataset)
+        return path
 
     def outdated(self, folder: str, label: str, why: str) -> None:
         """Note beside what is shown that it is of an earlier state, and why; `show` takes the note away."""
@@ -228,6 +244,11 @@ def read_record(path: Path) -> Record | None:
         return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]), said)
     except (ValueError, KeyError, TypeError):
         return None
+
+
+def _partial(shown: Path) -> Path:
+    """Where what is left of a stopped run stands, beside the shown file of a whole one."""
+    return shown.with_name(f"{shown.stem}{PARTIAL}{shown.suffix}")
 
 
 def _attributes(product: Product) -> Mapping[str, object]:

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Record, Store, read_record
 
 #: what stands beside artifacts and is none of their files
-BESIDE = (".json", ".lock", ".names", ".tmp")
+BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
 DAY = 86400.0
 #: a file of an artifact may be so long without its record [s]
 YOUNG = 3600.0

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from flexclear.pipeline.core.errors import ResourceError
-from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.fields import Part, Time
 
 _UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 _SIZE = re.compile(r"(\d{1,15}(?:\.\d{1,15})?) ?([kMGT]?B)")
@@ -32,16 +32,23 @@ Bytes = Annotated[float, BeforeValidator(_bytes), Field(gt=0.0), WithJsonSchema(
 class Limits(Part):
     """What the work may take at most; it is estimated first, and refused at once (exit code 4).
 
+    time: on the clock, of each run, ensemble or study of sections; what there is by then is left, and can go on.
     memory, disk: default: four fifths of what is free.
     parts: bodies, joints, drives and loads, of each at most so many.
     cells: elements or cells of one mesh.  modes: elastic coordinates of one body.
     """
 
+    time: Annotated[Time, Field(gt=0.0)] | None = None
     memory: Bytes | None = None
     disk: Bytes | None = None
     parts: Annotated[int, Field(ge=1)] = 2000
     cells: Annotated[int, Field(ge=1)] = 500_000
     modes: Annotated[int, Field(ge=1)] = 2000
+
+    @property
+    def time_words(self) -> str:
+        """What is told when the time is over."""
+        return f"it has taken the {self.time or 0.0:.6g} s that limits.time allows"
 
     def written(self) -> dict[str, Any]:
         """As a table that can be read again."""

@@ -46,7 +46,7 @@ def _coordinates(value: Any) -> Any:
 class ModalStart(Part):
     """Deformation of a flexible body at the start, by its modes in the order of the bundle; those left out are zero.
 
-    coordinate: modal coordinates [sqrt(kg) m].  velocity: their rates [sqrt(kg) m/s]; without them, the bodies'.
+    coordinate: modal coordinates [m].  velocity: their rates [m/s]; without them, the bodies'.
     """
 
     coordinate: tuple[Number, ...] = ()

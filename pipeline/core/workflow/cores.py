@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
+from flexclear.pipeline.core.system import cores
+
+__all__ = ["cores", "free", "tell"]
 
 _told: bool | None = None
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def tell(others_idle: bool) -> None:

@@ -8,7 +8,7 @@ from importlib import import_module
 
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow import journal, opened
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key, reasons
 
@@ -49,10 +49,15 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
             data = {name: store.load(above) for name, above in inputs.items()}
-            with opened.watched(task.base, outside=(store.root,)) as read:
+            begun = store.path(task.stage, key(_with_files(task, known, store)), "part")
+            with (
+                journal.kept(begun.parent, begun.stem) as kept,
+                opened.watched(task.base, outside=(store.root,)) as read,
+            ):
                 product = run({**task.params, **task.context}, data, progress)
             known |= _noted(task, plain, read, store)
             record = store.put(task.stage, key(known), product, known)
+            kept.remove()
     store.show(record, task.folder, task.names, task.label)
     return record
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import time
 
-#: the request that the system send a signal when the parent dies (linux/prctl.h)
-PR_SET_PDEATHSIG = 1
+from flexclear.pipeline.core import system
+
 #: where the system sends none, the parent is looked for so often [s]
 LOOK = 1.0
 
@@ -20,15 +19,11 @@ def follow(parent: int) -> None:
     parent: its number, as it says itself: by now the system may have given this process another one.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if sys.platform == "linux":
-        import ctypes
-
-        # compiled code and compilers do not let a thread of Python run; the system asks nobody
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    system.end_with_parent()
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
 def _watch(parent: int) -> None:
-    while os.getppid() == parent:
+    while system.is_parent(parent):
         time.sleep(LOOK)
     os._exit(1)

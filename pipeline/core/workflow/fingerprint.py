@@ -19,14 +19,13 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
+from flexclear.pipeline.core.artifacts.paths import TREE
+
+__all__ = ["TREE", "Sources", "imported", "library_version", "library_versions", "parents", "source_file"]
 
 OWN = ("flexclear", "benchmarks")
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
-
-
-#: folder that holds the packages; sources are read below it
-TREE = Path(__file__).absolute().parents[4]
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +107,11 @@ class Sources:
 
 def source_file(root: Path, name: str) -> Path | None:
     """The file of the module called `name` in the source tree under `root`, or None when there is none."""
-    base = root.joinpath(*name.split("."))
-    return next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
+    parts = name.split(".")
+    # in a checkout whose links are not followed the packages below `flexclear` stand beside it
+    bases = [root.joinpath(*parts), *([root.joinpath(*parts[1:])] if parts[0] == "flexclear" and parts[1:] else [])]
+    files = (path for base in bases for path in (base.with_suffix(".py"), base / "__init__.py"))
+    return next((path for path in files if path.is_file()), None)
 
 
 def parents(name: str) -> list[str]:

@@ -54,7 +54,9 @@ class Opened:
                 self.busy = False
 
     def _left_out(self, name: str) -> bool:
-        return name.endswith(CODE) or name.startswith(self.outside) or "/flexclear_kernels_" in name
+        # where modules are looked for there may be archives, which need not be there
+        code = name.endswith(CODE) or name in sys.path
+        return code or name.startswith(self.outside) or f"{os.sep}flexclear_kernels_" in name
 
 
 _current: Opened | None = None
@@ -77,7 +79,7 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
     _listen()
     places = (*_system(), str(kernel_root()), *(str(folder) for folder in outside))
     found: dict[str, str] = {}
-    before, _current = _current, Opened(tuple(f"{place.rstrip('/')}/" for place in places))
+    before, _current = _current, Opened(tuple(f"{place.rstrip(os.sep)}{os.sep}" for place in places))
     seen = _current
     try:
         yield found
@@ -90,7 +92,15 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
             continue  # the task's own, made by a library
         if now != then:
             raise ResourceError(f"{name} changed while it was read; run again")
-        found[os.path.relpath(name, base)] = then
+        found[_place(name, base)] = then
+
+
+def _place(name: str, base: Path) -> str:
+    """A file relative to a folder; on another drive there is no way from there."""
+    try:
+        return os.path.relpath(name, base)
+    except ValueError:
+        return name
 
 
 def digests(names: Iterable[str], base: Path) -> dict[str, str]:

@@ -4,6 +4,7 @@ their inputs are there."""
 from __future__ import annotations
 
 import os
+import time
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,10 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.errors import FlexclearError, ResourceError
+from flexclear.pipeline.core.artifacts.store import MAIN, Record, Store
+from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, ResourceError, StoppedError
 from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.workflow import cores, workers
+from flexclear.pipeline.core.workflow import cores, stopping, workers
 from flexclear.pipeline.core.workflow.execute import execute, find, key_of
 from flexclear.pipeline.core.workflow.family import follow
 from flexclear.pipeline.core.workflow.fingerprint import Sources
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 UNFINISHED = "making it again was begun and not finished"
 #: how often the progress of workers is looked at [s]
 TICK = 0.2
+#: workers that are asked to stop have so long for it [s]; a step of 20 000 evaluations, and writing what there is
+GRACE = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +86,8 @@ class _Plan:
 def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, jobs: int | None = None) -> Outcome:
     """Bring tasks and all their inputs up to date; a failure stops only what depends on it.
 
-    jobs: processes at most; default: the cores this process may use.  KeyboardInterrupt ends the
-    workers and passes through.
+    jobs: processes at most; default: the cores this process may use.  When it is asked to stop (`stopping`), works
+    that can leave what there is do so, and are among the failures; after Ctrl-C it then raises KeyboardInterrupt.
     """
     store.sweep()
     plan = _Plan(in_order(tasks), tuple(in_order(tasks)))
@@ -95,15 +98,20 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
                 store.outdated(task.folder, task.label, UNFINISHED)
         monitor.start(len(plan.waiting))
         width = min(jobs or cores.cores(), _width(plan.waiting))
-        if width == 1:
-            _alone(plan, store, sources, monitor)
-        else:
-            _together(plan, store, sources, monitor, width)
+        with stopping.gently(monitor.say):
+            if width == 1:
+                _alone(plan, store, sources, monitor)
+            else:
+                _together(plan, store, sources, monitor, width)
         monitor.end()
         for task in plan.tasks:
             if id(task) in plan.failed:
                 store.outdated(task.folder, task.label, plan.failed[id(task)].message)
     failures = {id(f): f for f in plan.failed.values()}
+    if any(failure.exit_code == INTERRUPTED for failure in failures.values()):
+        for failure in failures.values():
+            monitor.say(failure.message)
+        raise KeyboardInterrupt
     return Outcome(plan.done, tuple(failures.values()))
 
 
@@ -125,6 +133,10 @@ def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
 def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
     """One after the other in this process."""
     while ready := plan.ready():
+        why = stopping.requested()
+        if why:
+            _leave_waiting(plan, why)
+            return
         task = ready[0]
         plan.waiting.remove(task)
         name = monitor.begin(task.scene, task.label)
@@ -145,17 +157,56 @@ def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, wid
     server.start(follow, (os.getpid(),))
     with server:
         reports = server.Queue()
-        pool = workers.pool(width)
+        bell = workers.Bell.made()
+        pool = workers.pool(width, bell)
         running: dict[Future[Record | Failure], _Running] = {}
         try:
-            while plan.waiting or running:
-                _submit(plan, running, pool, width, (store, sources, reports), monitor)
-                _collect(plan, running, monitor)
-                _relay(reports, monitor)
+            with stopping.heeded():
+                while (plan.waiting or running) and not stopping.requested():
+                    _submit(plan, running, pool, width, (store, sources, reports), monitor)
+                    _collect(plan, running, monitor)
+                    _relay(reports, monitor)
+                if stopping.requested():
+                    _end_in_good_order(plan, running, bell, monitor)
         except BaseException:
             workers.kill(pool)
             raise
-        pool.shutdown()
+        if stopping.requested():
+            workers.kill(pool)
+        else:
+            pool.shutdown()
+
+
+def _end_in_good_order(
+    plan: _Plan, running: dict[Future[Record | Failure], _Running], bell: workers.Bell, monitor: Monitor
+) -> None:
+    """Ask the workers to stop, and wait for what they leave: not for those that cannot leave anything, nor for ever."""
+    from concurrent.futures import wait
+
+    why, end = stopping.requested(), time.monotonic() + GRACE
+    bell.ring(why)
+    while time.monotonic() < end:
+        _, late = wait(running, timeout=TICK)
+        if len(late) <= bell.deaf.value:
+            break
+    for future, job in running.items():
+        if future.done() and future.exception() is None:
+            result = future.result()
+            _note(plan, job.task, result)
+            monitor.finish(job.name, failed=isinstance(result, Failure))
+        else:
+            plan.waiting.append(job.task)
+    running.clear()
+    _leave_waiting(plan, why)
+
+
+def _leave_waiting(plan: _Plan, why: str) -> None:
+    """All that is not done is left, when all is to stop; that is told once."""
+    if plan.waiting:
+        code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
+        rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks are left undone: {why}")
+        plan.failed |= {id(task): rest for task in plan.waiting}
+        plan.waiting.clear()
 
 
 def _submit(
@@ -204,6 +255,9 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
         try:
             result = future.result()
         except BrokenProcessPool:
+            if stopping.requested():  # one that had just been started is not deaf to Ctrl-C yet
+                plan.waiting.append(task)
+                continue
             told = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
             raise ResourceError(told) from None
         _note(plan, task, result)
@@ -238,7 +292,8 @@ def _work(
     def progress(fraction: float | None, text: str) -> None:
         reports.put((name, fraction, text))
 
-    return attempt(task, inputs, Store(root, say=partial(progress, None)), Sources(source, memo), progress)
+    with stopping.busy():
+        return attempt(task, inputs, Store(root, say=partial(progress, None)), Sources(source, memo), progress)
 
 
 def attempt(
@@ -248,6 +303,8 @@ def attempt(
     its traceback, since only that helps then."""
     try:
         return execute(task, inputs, store, sources, progress)
+    except StoppedError as stopped:
+        code, told = stopped.exit_code, _left(task, stopped, store)
     except FlexclearError as error:
         code, told = error.exit_code, str(error)
     except MemoryError:
@@ -255,3 +312,14 @@ def attempt(
     except Exception:
         code, told = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
     return Failure(task, code, f"{task.scene} {task.label}: {told}")
+
+
+def _left(task: Task, stopped: StoppedError, store: Store) -> str:
+    """What is told of a task that was stopped: what there is of it, and that it can go on."""
+    told = f"{stopped}; run it again, and it goes on from there"
+    if stopped.partial is not None:
+        path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
+        if path is not None:
+            time = stopped.partial.attrs["stopped_at"]
+            told += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
+    return told

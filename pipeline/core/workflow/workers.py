@@ -6,23 +6,63 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.family import follow
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
 
-def pool(width: int) -> ProcessPoolExecutor:
-    """That many workers at most; spawned, because compiled kernels and forks do not mix."""
+@dataclass(frozen=True)
+class Bell:
+    """How workers are told to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
+
+    rung: Any
+    why: Any
+    deaf: Any
+
+    @staticmethod
+    def made() -> Bell:
+        """A bell for the workers of one pool."""
+        context = _context()
+        return Bell(context.Event(), context.Array("c", 1000), context.Value("i", 0))
+
+    def ring(self, why: str) -> None:
+        """Tell all workers."""
+        self.why.value = why.encode()[:999]
+        self.rung.set()
+
+    def count_deaf(self) -> None:
+        """In a worker: one more."""
+        with self.deaf.get_lock():
+            self.deaf.value += 1
+
+
+def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
+    """That many workers at most; spawned, because compiled kernels and forks do not mix.
+
+    bell: what asks them to stop in good order.
+    """
     # imported here, because a run that finds everything fresh must start quickly
-    import multiprocessing
     from concurrent.futures import ProcessPoolExecutor
 
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(width, mp_context=context, initializer=follow, initargs=(os.getpid(),))
+    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(os.getpid(), bell))
+
+
+def _begin(parent: int, bell: Bell | None) -> None:
+    follow(parent)
+    if bell is not None:
+        stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
+
+
+def _context() -> Any:
+    import multiprocessing
+
+    return multiprocessing.get_context("spawn")
 
 
 def kill(workers: ProcessPoolExecutor) -> None:

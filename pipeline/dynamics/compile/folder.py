@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import stat
 import time
 from collections.abc import Callable
 from functools import cache
@@ -19,6 +18,7 @@ from numba import config
 
 from flexclear.pipeline.core.artifacts.disk import sweep
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system import others_can_write
 from flexclear.pipeline.dynamics.compile.files import claimed, set_aside
 
 #: kernels that nobody fetched for so long are removed [s], and the oldest ones beyond so many bytes
@@ -47,10 +47,7 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
 def refuse_shared(folder: Path) -> None:
     """InputError when anybody but this user (and the system's) can write to a folder of kernels, or replace it."""
     for place in (folder / "__pycache__", folder, *folder.parents):
-        status = place.stat()
-        inside = place.name == "__pycache__" or place == folder
-        open_to_all = bool(status.st_mode & stat.S_IWOTH) and not (status.st_mode & stat.S_ISVTX and not inside)
-        if open_to_all or (inside and status.st_mode & stat.S_IWGRP) or status.st_uid not in (0, os.geteuid()):
+        if others_can_write(place, inside=place in (folder / "__pycache__", folder)):
             raise InputError(
                 str(folder),
                 f"compiled kernels are not loaded from there, since others can write to {place}",

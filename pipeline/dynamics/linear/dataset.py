@@ -13,7 +13,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.linear.bench import Bench, observe, rows, state
 from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
-from flexclear.pipeline.dynamics.record.dataset import attributes, dataset
+from flexclear.pipeline.dynamics.record.dataset import attributes, dataset, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
@@ -33,6 +33,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     return conform(
         result,
         EQUILIBRIUM,
+        title=f"Equilibrium of {subject(bench.scene)}",
         **attributes(bench.scene),
         time=bench.time,
         drives="moving" if moving else "held",
@@ -74,7 +75,8 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
         moving_body=parts,
         frame=list(bench.model.mechanism.frames),
     )
-    return conform(made, LINEAR, **still.attrs, motions_without_stiffness=small.free)
+    told = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
+    return conform(made, LINEAR, **told, motions_without_stiffness=small.free)
 
 
 def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

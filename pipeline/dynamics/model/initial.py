@@ -192,13 +192,13 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
         if apart > max(WRITTEN * unit, WRONG * largest):
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
-                f"joints and drives do not allow this deformation: they change it by {apart:.3g} sqrt(kg) m",
+                f"joints and drives do not allow this deformation: they change it by {apart:.3g} m",
                 "give another one, or let a joint give way",
             )
         if apart > WRITTEN * max(largest, WRITTEN * unit):
             found.append(
                 f"the deformation given for {name} was mended so that joints and drives allow it: by up to {apart:.3g} "
-                "sqrt(kg) m"
+                "m"
             )
     return found
 

@@ -68,7 +68,7 @@ def _measure(value: float | str | None, dimension: str, place: str) -> float | N
 
 
 def given_modes(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:
-    """Modal coordinates at the start of the flexible bodies that the scene gives some, [sqrt(kg) m], shape (mode,).
+    """Modal coordinates at the start of the flexible bodies that the scene gives some, [m], shape (mode,).
 
     Raises InputError for bodies that are not flexible, and for more numbers than modes.
     """
@@ -77,7 +77,7 @@ def given_modes(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np
 
 
 def given_modal_velocities(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:
-    """The same for their rates [sqrt(kg) m/s], of the bodies that the scene gives some."""
+    """The same for their rates [m/s], of the bodies that the scene gives some."""
     given = scene.start.modal if scene.start is not None else {}
     return {
         name: _padded(scene, bundles, name, "velocity", start.velocity)

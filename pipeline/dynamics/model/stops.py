@@ -38,6 +38,11 @@ class End:
     type: str = STOP
 
 
+def ends_an_angle(joint: object) -> bool:
+    """Whether what a contact belongs to is an end of an angle, so that its gap is one and its force a torque."""
+    return isinstance(joint, End) and joint.coordinate.turning
+
+
 def ends(scene: Scene, length: float) -> list[tuple[str, End]]:
     """The ends of all stops by name, ``stop.lower`` and ``stop.upper``; InputError for what cannot be.
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.loads.sampled_pid import INTEGRAL
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.loads import along_coordinates
+from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 
 
 def controllers(
@@ -26,5 +27,6 @@ def controllers(
     dims = ("time", "controller")
     forces = along_coordinates(model, seen, list(kinds))
     return {"controller_force": (dims, forces), "controller_integral": (dims, seen.state[:, places])}, {
-        "controller": list(kinds)
+        "controller": list(kinds),
+        "controller_motion": ("controller", [motion(turns) for turns in turning_loads(model, list(kinds))]),
     }

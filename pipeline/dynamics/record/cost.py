@@ -6,7 +6,6 @@ both together say little of either.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
@@ -14,6 +13,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.record.dataset import dataset
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed, twin_of
@@ -69,6 +69,6 @@ def _repeated(task: Callable[[], object], most: int) -> tuple[float, ...]:
 
 
 def _once(task: Callable[[], object]) -> float:
-    begun = time.process_time()
+    begun = journal.seconds()
     task()
-    return time.process_time() - begun
+    return journal.seconds() - begun

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.coordinates import motion
+from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.artifacts.schema import RUN, conform
+from flexclear.pipeline.core.citations import cited
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.compile.sources import named
 from flexclear.pipeline.dynamics.effects import RECORDS
 from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.stops import ends_an_angle
 from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run import ledger
-from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
@@ -46,7 +53,7 @@ def dataset(run: Run) -> xr.Dataset:
 
         parts.append(gear_series(model, seen))
     if model.contacts:
-        parts += [_contacts(model, seen), (_events(trajectory), {})]
+        parts += [_contacts(model, seen), (_events(model, trajectory), {})]
     if run.twin is not None:
         horizon: Variables = {"horizon": ((), np.array(run.twin.horizon))}
         separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}
@@ -59,11 +66,33 @@ def dataset(run: Run) -> xr.Dataset:
     for part in parts:
         variables |= part[0]
         coordinates |= part[1]
-    return conform(xr.Dataset(variables, coords=coordinates), RUN, **attributes(run.scene), **_report(run))
+    made = xr.Dataset(variables, coords=coordinates)
+    return conform(made, RUN, title=f"Motion of {subject(run.scene)}", **attributes(run.scene), **_report(run))
+
+
+def subject(scene: Scene) -> str:
+    """What moves, in words, for titles; nothing that a scene is only called."""
+    moving = [name for name, body in scene.body.items() if body.type != "ground"]
+    shown = moving if len(moving) < 5 else [*moving[:3], f"{len(moving) - 3} more bodies"]
+    words = ", ".join(shown[:-1]) + " and " + shown[-1] if len(shown) > 1 else "".join(shown)
+    for what, names in (("flexible", list(scene.flexible())), ("clearance", list(scene.contacts()))):
+        words += f"; {what}: {', '.join(names)}" if names else ""
+    return words
+
+
+def references(scene: Scene) -> str:
+    """Publications of the methods that the scene's parts stand for, one a line."""
+    found = list[str]()
+    for name in sorted({part.module for part in named(scene)}):
+        module = import_module(name)
+        own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
+        for thing in (module, *own):
+            found += cited(getattr(thing, "__doc__", None))
+    return "\n".join(dict.fromkeys(found))
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """What the run was made from: parameters, assumptions, sources, versions; no times, no names of files."""
+    """What the run was made from: parameters, assumptions, sources, references, versions; no times, no file names."""
     parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
         del parameters["body"][body]["mesh"]
@@ -71,6 +100,7 @@ def attributes(scene: Scene) -> dict[str, str]:
         "parameters": json.dumps(parameters, sort_keys=True),
         "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
         "sources": json.dumps(scene.sources(), sort_keys=True),
+        "references": references(scene),
         "versions": " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
     }
 
@@ -174,7 +204,21 @@ def _motion(motions: Motions) -> Part:
     variables["frame_position"] = (("time", "frame", "axis"), _stacked([p + origin for p in frames.values()], rows))
     for name, k in (("joint_moment", 0), ("joint_force", 1)):
         variables[name] = (("time", "joint", "axis"), _stacked([w[k] for w in wrenches.values()], rows))
-    return variables, {"body": list(bodies), "frame": list(frames), "joint": list(wrenches)}
+    owners = [name.partition(".")[0] for name in frames]
+    coordinates = {"body": list(bodies), "frame": list(frames), "frame_body": ("frame", owners)}
+    return variables, coordinates | _joints(motions.model)
+
+
+def _joints(model: Model) -> dict[str, object]:
+    """Names of the joints, their types, and what they join."""
+    joints, frames = model.scene.joint, model.mechanism.frames
+    between = [joint.between for joint in joints.values()]
+    found: dict[str, object] = {"joint": list(joints)}
+    found["joint_type"] = ("joint", [joint.type for joint in joints.values()])
+    for k, side in enumerate(("first", "second")):
+        found[f"joint_{side}_frame"] = ("joint", [pair[k] for pair in between])
+        found[f"joint_{side}_body"] = ("joint", [frames[pair[k]].body for pair in between])
+    return found if joints else {"joint": []}
 
 
 def _modes(motions: Motions) -> Part:
@@ -188,7 +232,7 @@ def _modes(motions: Motions) -> Part:
         "modal_coordinate": (("time", "mode"), np.concatenate([state.q for state in states.values()], axis=1)),
         "modal_velocity": (("time", "mode"), np.concatenate([state.u for state in states.values()], axis=1)),
     }, {
-        "mode": np.arange(len(owners)),
+        "mode": [f"{owner}.{number}" for owner, number in zip(owners, numbers, strict=True)],
         "mode_body": ("mode", owners),
         "mode_number": ("mode", np.array(numbers)),
     }
@@ -199,18 +243,20 @@ def _drives(run: Run) -> Part:
     if not names:
         return {}, {}
     force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]
+    turning = {coordinate.name: coordinate.dimension == "angle" for coordinate in prescribed(model.scene)}
     sharing = [name for name in model.scene.forces() if name not in run.scene.load]
     if sharing:  # actuators beyond the freedoms, which the engine has as loads
-        from flexclear.pipeline.dynamics.record.loads import along_coordinates
+        from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 
         names += sharing
+        turning |= dict(zip(sharing, turning_loads(model, sharing), strict=True))
         known = joint_coordinates(model, seen)
         force = np.concatenate([force, along_coordinates(model, seen, sharing)], axis=1)
         position = np.concatenate([position, np.stack([known[name][0] for name in sharing], axis=1)], axis=1)
     return {
         "drive_force": (("time", "drive"), force),
         "drive_position": (("time", "drive"), position),
-    }, {"drive": names}
+    }, {"drive": names, "drive_motion": ("drive", [motion(turning[name]) for name in names])}
 
 
 def _joint_coordinates(model: Model, seen: Observed) -> Part:
@@ -220,13 +266,23 @@ def _joint_coordinates(model: Model, seen: Observed) -> Part:
     names = ("joint_position", "joint_velocity", "joint_acceleration")
     series = (np.stack(values, axis=1) for values in zip(*every.values(), strict=True))
     variables: Variables = {name: (("time", "coordinate"), s) for name, s in zip(names, series, strict=True)}
-    return variables, {"coordinate": list(every)}
+    kinds = {label: (joint, turns) for label, joint, turns in named_coordinates(model.scene)}
+    return variables, {
+        "coordinate": list(every),
+        "coordinate_joint": ("coordinate", [kinds[name][0] for name in every]),
+        "coordinate_motion": ("coordinate", [motion(kinds[name][1]) for name in every]),
+    }
 
 
 def _loads(model: Model, seen: Observed) -> Part:
-    from flexclear.pipeline.dynamics.record.loads import load_series
+    from flexclear.pipeline.dynamics.record.loads import load_series, turning_loads
 
-    return load_series(model, seen), {"load": list(model.scene.forces())}
+    forces = model.scene.forces()
+    return load_series(model, seen), {
+        "load": list(forces),
+        "load_type": ("load", [load.type for load in forces.values()]),
+        "load_motion": ("load", [motion(turns) for turns in turning_loads(model, list(forces), measured=True)]),
+    }
 
 
 def _contacts(model: Model, seen: Observed) -> Part:
@@ -243,15 +299,24 @@ def _contacts(model: Model, seen: Observed) -> Part:
     variables["contact_force"] = (("time", "contact", "axis"), touch["force"])
     variables["contact_offset"] = (("time", "contact", "axis"), touch["offset"])
     variables["contact_delivered_restitution"] = (("contact",), np.array([law.delivered for law in model.laws]))
-    return variables, {"contact": [contact.name for contact in model.contacts]}
+    return variables, contact_names(model)
 
 
-def _events(trajectory: Trajectory) -> Variables:
-    events = trajectory.events
+def contact_names(model: Model) -> dict[str, object]:
+    """Names of the contacts, of what joints or stops they are, and whether they end an angle."""
+    return {
+        "contact": [contact.name for contact in model.contacts],
+        "contact_type": ("contact", [contact.joint.type for contact in model.contacts]),
+        "contact_motion": ("contact", [motion(ends_an_angle(contact.joint)) for contact in model.contacts]),
+    }
+
+
+def _events(model: Model, trajectory: Trajectory) -> Variables:
+    events, names = trajectory.events, np.array([contact.name for contact in model.contacts], dtype=str)
     columns = {
         "event_time": events["time"],
-        "event_contact": events["contact"].astype(np.int32),
-        "event_kind": events["kind"].astype(np.int8),
+        "event_contact": names[events["contact"].astype(np.int64)],
+        "event_kind": np.array(EVENT_KINDS, dtype=str)[events["kind"].astype(np.int64)],
         "event_approach_speed": events["speed"],
         "event_peak_force": events["peak_force"],
         "event_peak_penetration": events["peak_depth"],

@@ -18,7 +18,7 @@ from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.dataset import attributes
+from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions, quaternions
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -51,7 +51,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
-    return conform(made, ENSEMBLE, **attributes(scene), seed=wanted.seed, perturbation=wanted.perturbation, **told)
+    told |= attributes(scene) | {"title": f"{wanted.members} motions of {subject(scene)}"}
+    return conform(made, ENSEMBLE, **told, seed=wanted.seed, perturbation=wanted.perturbation)
 
 
 def ball_offsets(model: Model, wanted: Ensemble, members: int) -> Iterator[np.ndarray]:
@@ -93,8 +94,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), share),
     }
-    contacts = [contact.name for contact in model.contacts]
-    return xr.Dataset(variables, coords={"time": regular, "body": names, "contact": contacts})
+    return xr.Dataset(variables, coords={"time": regular, "body": names, **contact_names(model)})
 
 
 def motion_series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:

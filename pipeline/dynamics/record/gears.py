@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
 from flexclear.pipeline.dynamics.model.model import Model
@@ -14,8 +15,12 @@ def gear_series(
 ) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
     """Force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
     found = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
+    turns = {coupling.gear: coupling.second.coordinate.turning for _, coupling in _couplings(model)}
     names = list(model.scene.gear)
-    return {"gear_force": (("time", "gear"), np.stack([found[name] for name in names], axis=1))}, {"gear": names}
+    return {"gear_force": (("time", "gear"), np.stack([found[name] for name in names], axis=1))}, {
+        "gear": names,
+        "gear_motion": ("gear", [motion(turns[name]) for name in names]),
+    }
 
 
 def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:

@@ -42,6 +42,14 @@ def along_coordinates(model: Model, seen: Observed, names: list[str]) -> np.ndar
     return np.stack(forces, axis=1)
 
 
+def turning_loads(model: Model, names: list[str], *, measured: bool = False) -> list[bool]:
+    """Which loads act along an angle; measured: whose length is one, which of controllers is another coordinate."""
+    wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
+    looks = np.where((wiring["measured"] >= 0) & measured, wiring["measured"], wiring["gauge"])
+    rows = dict(zip((name for name, _ in model.loads), looks.tolist(), strict=True))
+    return [rows[name] >= 0 and bool(gauges[int(rows[name])]["turning"]) for name in names]
+
+
 def on_loaded_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Each load on every frame that it acts on: frame, moment about the kernels' origin, force; (time, 3) each."""
     ends = [

@@ -15,17 +15,22 @@ from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.scene.schema import Scene, Sections
+from flexclear.pipeline.core.workflow import journal
+from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.dataset import attributes
+from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies, motion_series
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.periods import APART, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.periods import APART, Cursor, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
 from flexclear.pipeline.dynamics.run.run import engines, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
+#: of impacts, known when they end
+LATER = ("peak_force", "duration")
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
@@ -54,23 +59,31 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     require_periodic(parts, start)
     count = wanted.transient + wanted.periods
     followed = range(wanted.transient, min(count, wanted.transient + wanted.exponent_periods))
-    tape = _Tape(names, engine.start + wanted.phase)
-    for done in periods(parts, start, followed):
+    tape, begin = _Tape(names, engine.start + wanted.phase), Cursor()
+    kept = _Kept.found(engine, start)
+    if kept is not None and kept.state is not None:
+        remember(engine, kept.state.arrays)
+        tape.unpack(kept.state.arrays)
+        begin = Cursor.unpacked(kept.state.arrays)
+    for done in periods(parts, start, followed, begin):
         progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
         if done.number >= wanted.transient:
             tape.add(parts, done, number=done.number - wanted.transient)
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
+        if kept is not None:
+            kept.keep({**memory(engine), **done.after.packed()}, tape)
     growth = np.array(tape.growth[: len(followed)])
     told = {"period": period, "phase": wanted.phase, "transient": wanted.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
     coordinates = {"section": np.arange(wanted.periods), "body": names, "followed": np.arange(len(followed))}
     coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
     if engine.model.contacts:
-        coordinates["contact"] = [contact.name for contact in engine.model.contacts]
+        coordinates |= contact_names(engine.model)
     made = xr.Dataset(variables, coords=coordinates)
-    return conform(made, SECTIONS, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
+    title = f"Sections of the periodic motion of {subject(scene)}"
+    return conform(made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
 
 
 def _require_inside(wanted: Sections, period: float, span: float) -> None:
@@ -86,6 +99,30 @@ def _require_inside(wanted: Sections, period: float, span: float) -> None:
             f"{wanted.phase:.6g} s is no time within the period of {period:.6g} s",
             "give a time from 0 to below the period",
         )
+
+
+@dataclass
+class _Kept:
+    """What the task's journal knows of these sections: what an earlier attempt left, if anything."""
+
+    journal: Journal
+    name: str
+    begun: float
+    state: State | None
+
+    @staticmethod
+    def found(engine: Engine, start: np.ndarray) -> _Kept | None:
+        """None where nothing is kept."""
+        current, begun = journal.current(), journal.seconds()
+        if current is None:
+            return None
+        name = current.name(digest(engine, start))
+        return _Kept(current, name, begun, current.find(name))
+
+    def keep(self, arrays: Mapping[str, np.ndarray], tape: _Tape) -> None:
+        """From here on the work can go on without the pieces that led here; the tape is as it is until the next."""
+        seconds = journal.seconds() - self.begun
+        self.journal.cover(self.name, lambda: State({**arrays, **tape.packed()}, {}, np.zeros(0), seconds))
 
 
 @dataclass
@@ -146,6 +183,30 @@ class _Tape:
             if begun is not None and "duration" not in begun:
                 begun |= {"peak_force": event["peak_force"], "duration": event["duration"]}
 
+    def packed(self) -> dict[str, np.ndarray]:
+        """All of it so far as arrays."""
+        arrays = {"growth": np.array(self.growth), "lost": np.array(self.lost)}
+        for name in self.motions[0] if self.motions else ():
+            arrays[f"motion.{name}"] = _joined(self.motions, name)
+        for name in self.impacts[0] if self.impacts else ():
+            if name not in LATER:
+                arrays[f"impact.{name}"] = np.array([impact[name] for impact in self.impacts])
+        arrays["ended"] = np.array(["duration" in impact for impact in self.impacts])
+        arrays |= {f"later.{name}": self._column(name, np.nan) for name in LATER}
+        last = {id(impact): k for k, impact in enumerate(self.impacts)}
+        arrays["open"] = np.array([[c, last[id(impact)]] for c, impact in self.open.items()], int).reshape(-1, 2)
+        return arrays
+
+    def unpack(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Take up what `packed` gave."""
+        self.growth, self.lost = arrays["growth"].tolist(), int(arrays["lost"])
+        motion = _named(arrays, "motion.")
+        self.motions = [{name: (_dimensions(name), values) for name, values in motion.items()}] if motion else []
+        for k, ended in enumerate(arrays["ended"]):
+            impact = {name: values[k] for name, values in _named(arrays, "impact.").items()}
+            self.impacts.append(impact | ({name: arrays[f"later.{name}"][k] for name in LATER} if ended else {}))
+        self.open = {int(c): self.impacts[k] for c, k in arrays["open"]}
+
     def variables(self, model: Model) -> Variables:
         """All of it, by the names of the schema SECTIONS."""
         kept = {
@@ -155,7 +216,8 @@ class _Tape:
         if not model.contacts:
             return kept
         kept["impact_section"] = (("impact",), self._column("section", -1).astype(np.int32))
-        kept["impact_contact"] = (("impact",), self._column("contact", -1).astype(np.int32))
+        names = np.array([contact.name for contact in model.contacts], dtype=str)
+        kept["impact_contact"] = (("impact",), names[self._column("contact", -1).astype(np.int64)])
         for name in ("phase", "approach_speed", "peak_force", "duration"):
             kept[f"impact_{name}"] = (("impact",), self._column(name, np.nan))
         for name in ("position", "quaternion", "velocity"):
@@ -167,6 +229,17 @@ class _Tape:
 
     def _column(self, name: str, absent: float) -> np.ndarray:
         return np.array([float(impact.get(name, absent)) for impact in self.impacts])
+
+
+def _dimensions(name: str) -> tuple[str, ...]:
+    """Of a series of the motion, see `motion_series`."""
+    if name == "contact_offset":
+        return ("time", "contact", "axis")
+    return ("time", "body", "quat" if name == "quaternion" else "axis")
+
+
+def _named(arrays: Mapping[str, np.ndarray], begin: str) -> dict[str, np.ndarray]:
+    return {name.removeprefix(begin): values for name, values in arrays.items() if name.startswith(begin)}
 
 
 def _joined(motions: Iterable[Variables], name: str) -> np.ndarray:

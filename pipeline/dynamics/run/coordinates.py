@@ -35,7 +35,7 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
         a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
         for place, coordinate in enumerate(joint_class(edge.kind).COORDINATES):
             series[label(edge.name, edge.kind, place)] = _measured(a, b, coordinate)
-    return {name: series[name] for name in _names(model.scene) if name in series}
+    return {name: series[name] for name, _, _ in named_coordinates(model.scene) if name in series}
 
 
 def label(joint: str, kind: str, k: int) -> str:
@@ -44,10 +44,14 @@ def label(joint: str, kind: str, k: int) -> str:
     return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
-def _names(scene: Scene) -> list[str]:
-    """Coordinates of all joints, as the scene lists them."""
+def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
+    """Coordinates of all joints, as the scene lists them: name in records, joint, whether it is an angle."""
     kinds = {name: joint.type for name, joint in scene.joint.items() if name not in scene.contacts()}
-    return [label(name, kind, k) for name, kind in kinds.items() for k in range(len(joint_class(kind).COORDINATES))]
+    return [
+        (label(name, kind, k), name, coordinate.turning)
+        for name, kind in kinds.items()
+        for k, coordinate in enumerate(joint_class(kind).COORDINATES)
+    ]
 
 
 def _measured(a: np.ndarray, b: np.ndarray, coordinate: Coordinate) -> Series:

@@ -31,10 +31,11 @@ SHORTEST_SEGMENT = 1e-12
 class Straight:
     """Code for one wiring (`run.specialised`), shared by the engines of one work space.
 
-    wanted: whether there shall be some.  addresses: where it is, by the closure rows that it solves for; 0: nowhere.
+    wanted: whether all integrations shall use it.  used: whether the present one does.  addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     """
 
     wanted: bool = False
+    used: bool = False
     addresses: dict[bytes, int] = field(default_factory=dict)
 
 
@@ -95,7 +96,8 @@ class Engine:
 
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
-        self.h[m.RATES] = self.straight.addresses.get(self.kept.tobytes()) or self.h[m.EVALUATE]
+        found = self.straight.addresses.get(self.kept.tobytes()) if self.straight.used else None
+        self.h[m.RATES] = found or self.h[m.EVALUATE]
 
     def view(self, place: int) -> np.ndarray:
         """A stretch of the work space, not copied."""

@@ -13,7 +13,7 @@ discontinuities, Chaos, Solitons & Fractals 5, 1671-1681 (what a neighbour does 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -53,18 +53,44 @@ class Moment:
 
 
 @dataclass(frozen=True)
+class Cursor:
+    """Where a motion stands between two periods: number of the next one, the motion itself, and its neighbour."""
+
+    number: int = 0
+    here: Moment | None = None
+    beside: Moment | None = None
+
+    def packed(self) -> dict[str, np.ndarray]:
+        """All of it as arrays; what is not there has none."""
+        moments = {"here": self.here, "beside": self.beside}
+        arrays = {f"{name}.{k}": v for name, one in moments.items() if one is not None for k, v in vars(one).items()}
+        return {**arrays, "number": np.array(self.number)}
+
+    @staticmethod
+    def unpacked(arrays: Mapping[str, np.ndarray]) -> Cursor:
+        """From what `packed` gave."""
+
+        def moment(name: str) -> Moment | None:
+            mine = {k.removeprefix(f"{name}."): v for k, v in arrays.items() if k.startswith(f"{name}.")}
+            return Moment(**mine) if mine else None
+
+        return Cursor(int(arrays["number"]), moment("here"), moment("beside"))
+
+
+@dataclass(frozen=True)
 class Period:
     """One period of the motion, and by how much the neighbour's distance grew.
 
     parts: the stretches between waypoints; times start over with each period.
     growth: logarithm of the distance's growth, 0 where no neighbour is followed.  lost: how often the neighbour was
-    beyond what is linear.
+    beyond what is linear.  after: from where the next one begins.
     """
 
     number: int
     parts: tuple[Trajectory, ...]
     growth: float
     lost: int
+    after: Cursor
 
 
 def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
@@ -113,18 +139,17 @@ def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
     return [replace(engine, start=float(a), end=float(b)) for a, b in pairwise(times)]
 
 
-def periods(parts: list[Engine], y: np.ndarray, followed: range) -> Iterator[Period]:
+def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) -> Iterator[Period]:
     """Period after period from a consistent start y, for ever.
 
     parts: stretches of a period.  followed: numbers of the periods in which a neighbour is followed.
+    begin: from where it goes on.
     Raises SolverError where the run cannot go on.
     """
     period = parts[-1].end - parts[0].start
     scales = state_scales(parts[0], period)
     apart = APART * parts[0].rtol
-    here: Moment | None = None
-    beside: Moment | None = None
-    number = 0
+    number, here, beside = begin.number, begin.here, begin.beside
     while True:
         done, growth, lost = list[Trajectory](), 0.0, 0
         if number not in followed:
@@ -139,9 +164,9 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range) -> Iterator[Per
                 beside = _set_beside(part, scales, there, apart)
             done.append(trajectory)
             here = there
-        yield Period(number, tuple(done), growth, lost)
         here, beside = (None if moment is None else _earlier(moment, period) for moment in (here, beside))
         number += 1
+        yield Period(number - 1, tuple(done), growth, lost, Cursor(number, here, beside))
 
 
 def state_scales(engine: Engine, period: float) -> np.ndarray:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.registry import lookup
@@ -98,18 +98,29 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 
     bundles: reduced flexible bodies by name.  Raises InputError for a scene that cannot be built, SolverError when the
-    run cannot go on.
+    run cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
     mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
     for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
-    engine, trajectory, switched = follow(engine, start, progress, other)
+    try:
+        engine, trajectory, switched = follow(engine, start, progress, other)
+    except StoppedError as stopped:
+        if stopped.partial is not None:
+            last, there = stopped.partial
+            stopped.partial = Run(scene, last, there, observed(last, there), mended=mended)
+        raise
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    return Run(scene, engine, trajectory, seen, twin_of(engine, start, trajectory), switched, mended)
+    done = Run(scene, engine, trajectory, seen, None, switched, mended)
+    try:
+        return replace(done, twin=twin_of(engine, start, trajectory))
+    except StoppedError as stopped:
+        stopped.partial = done
+        raise
 
 
 def follow(

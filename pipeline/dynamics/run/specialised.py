@@ -11,6 +11,7 @@ from __future__ import annotations
 from numba import config
 
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
@@ -22,11 +23,25 @@ MANY = 1_000_000
 SELECTIONS = 4
 
 
-def specialise(engine: Engine, progress: Progress = silent) -> None:
-    """Let the engine's steps evaluate with code for its wiring and the closure rows that are solved for now.
+def settle(engine: Engine, progress: Progress) -> None:
+    """Let the steps from here on evaluate with what this integration calls for.
 
-    Nothing changes where there is so much to compute that straight code would be no faster.
+    That is told by the engine and its count of evaluations, so an integration that was interrupted goes on as it would.
     """
+    engine.straight.used = engine.straight.wanted or bool(engine.n[m.EVALUATIONS] >= MANY)
+    if engine.straight.used:
+        _make(engine, progress)
+    engine.connect()
+
+
+def specialise(engine: Engine, progress: Progress = silent) -> None:
+    """Let all of the engine's integrations use straight code, from now on."""
+    engine.straight.wanted = True
+    settle(engine, progress)
+
+
+def _make(engine: Engine, progress: Progress) -> None:
+    """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster."""
     known, kept = engine.straight.addresses, engine.kept.tobytes()
     if config.DISABLE_JIT or kept in known or len(known) >= SELECTIONS:
         return
@@ -35,4 +50,3 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
         known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
     except UnsuitedError:
         known[kept] = 0
-    engine.connect()

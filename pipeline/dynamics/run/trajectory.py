@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.pieces import Piece, Tape, piece
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
-from flexclear.pipeline.dynamics.run.specialised import MANY, specialise
+from flexclear.pipeline.dynamics.run.specialised import settle
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
 
 #: evaluations between two looks at the clock and the keyboard
@@ -120,22 +122,6 @@ class StiffError(SolverError):
         self.handover = handover
 
 
-@dataclass
-class _Tape:
-    """The arrays of one integration; rows and events may be replaced by larger ones.
-
-    doubted: flexible bodies of which has been said that they left the range of their modes.
-    """
-
-    outputs: np.ndarray
-    rows: np.ndarray
-    events: np.ndarray
-    selections: list[tuple[float, np.ndarray]]
-    collocations: list[Collocation] = field(default_factory=list)
-    passes: list[Pass] = field(default_factory=list)
-    doubted: set[str] = field(default_factory=set)
-
-
 def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     """Regular output times and all breaks, increasing; times nearer than rounding are one."""
     span = breaks[-1] - breaks[0]
@@ -158,28 +144,64 @@ def integrate(
     stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is gone on with from there.
     outputs: times of output [s], the start first; the scene's where there are none.
+    Where the task keeps a journal, what an earlier attempt left there is gone on with.  Raises StoppedError, with the
+    engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
     """
-    sample = _sampler(engine)
     if outputs is None:
         outputs = output_times(engine.breaks, engine.model.scene.output.interval)
-    if left is None:
-        y = sample(y, engine.start)
-    tape = _begin(engine, y, outputs) if left is None else _resume(engine, left, outputs)
-    if left is None and engine.mobility.singular_start:
+    mine = piece(engine, y, outputs, left)
+    why = stopping.requested()
+    if why and (mine is None or not mine.done):  # many short integrations never pause
+        if mine is not None:
+            mine.journal.write()
+        raise StoppedError(why, interrupted=why == stopping.INTERRUPTED)
+    with stopping.heeded():
+        if mine is None or mine.tape is None:
+            tape = _begun(engine, y, left, outputs)
+            _advance(engine, tape, progress, stop, left, mine, resumed=False)
+        else:
+            tape = mine.tape
+            if not mine.done:
+                _advance(engine, tape, progress, stop, left, mine, resumed=True)
+    if mine is not None:
+        mine.finish(tape)
+    return _collect(engine, tape)
+
+
+def _begun(engine: Engine, y: np.ndarray, left: Handover | None, outputs: np.ndarray) -> Tape:
+    """The tape of an integration that begins, at the start or where another method left it."""
+    if left is not None:
+        return _resume(engine, left, outputs)
+    tape = _begin(engine, _sampler(engine)(y, engine.start), outputs)
+    if engine.mobility.singular_start:
         _leave_singular_start(engine, tape)
-    if engine.straight.wanted:
-        specialise(engine, progress)
-    control = engine.control
+    return tape
+
+
+def _advance(
+    engine: Engine,
+    tape: Tape,
+    progress: Progress,
+    stop: Stop,
+    left: Handover | None,
+    mine: Piece | None,
+    *,
+    resumed: bool,
+) -> None:
+    """From segment to segment to the end; resumed: the first of them has been begun in an earlier attempt."""
+    sample, control = _sampler(engine), engine.control
+    settle(engine, progress)
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
-        if a > (engine.start if left is None else left.time):
-            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-        engine.select_pieces(0.5 * (a + b))
-        control[m.END], engine.n[m.FRESH] = b, 1
-        if _segment(engine, tape, progress, stop):
+        if not resumed:
+            if a > (engine.start if left is None else left.time):
+                engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+            engine.select_pieces(0.5 * (a + b))
+            control[m.END], engine.n[m.FRESH] = b, 1
+        resumed = False
+        if _segment(engine, tape, progress, stop, mine):
             break
-    return _collect(engine, tape)
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
@@ -191,7 +213,7 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     return sampler(engine)
 
 
-def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> _Tape:
+def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
     """A tape with its first row, and contacts that are closed at the start."""
     tape = _prepare(engine, y, engine.start, outputs)
     first = m.record(tape.rows[:1], len(engine.model.contacts))
@@ -203,7 +225,7 @@ def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> _Tape:
     return tape
 
 
-def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> _Tape:
+def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     """A tape with what another method has recorded; the engine as that method left it."""
     tape, n = _prepare(engine, left.y, left.time, outputs), engine.n
     cap = n[m.CAP]
@@ -218,7 +240,7 @@ def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> _Tape:
     return tape
 
 
-def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> _Tape:
+def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Tape:
     """Work space and tape of an integration from state y at time t, nothing recorded yet."""
     model, n, control = engine.model, engine.n, engine.control
     solver, contacts = model.scene.solver, len(model.contacts)
@@ -235,7 +257,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> _T
     room = EVENT_ROWS if contacts else m.ROOM
     rows = m.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
-    return _Tape(outputs, rows, events, [(t, _select(engine, y, t))])
+    return Tape(outputs, rows, events, [(t, _select(engine, y, t))])
 
 
 def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
@@ -246,7 +268,7 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
     return engine.kept.copy()
 
 
-def _leave_singular_start(engine: Engine, tape: _Tape) -> None:
+def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
     first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
@@ -273,11 +295,12 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
         n[m.N_EVENTS] += 1
 
 
-def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> bool:
+def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: Piece | None) -> bool:
     """To the end of the segment; True when it was stopped before."""
     n, control = engine.n, engine.control
     while True:
-        n[m.BUDGET] = n[m.EVALUATIONS] + SLICE
+        if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
+            n[m.BUDGET] = n[m.EVALUATIONS] + SLICE
         engine.entry.advance(engine.h, engine.model.arrays.f, engine.w, n, tape.outputs, tape.rows, tape.events)
         t = float(control[m.TIME])
         progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
@@ -300,15 +323,25 @@ def _segment(engine: Engine, tape: _Tape, progress: Progress, stop: Stop) -> boo
         elif _crawls(engine):
             raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
         else:
-            engine.straight.wanted |= bool(n[m.EVALUATIONS] >= MANY)
-            if engine.straight.wanted:
-                specialise(engine, progress)
+            settle(engine, progress)
             _warn(engine, tape, progress)
             if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):
                 return True
+            if mine is not None:
+                mine.keep(tape)
+            _stop_when_asked(engine, tape, mine)
 
 
-def _warn(engine: Engine, tape: _Tape, progress: Progress) -> None:
+def _stop_when_asked(engine: Engine, tape: Tape, mine: Piece | None) -> None:
+    """Leave what there is in good order, and go."""
+    why = stopping.requested()
+    if why:
+        if mine is not None:
+            mine.save(tape)
+        raise StoppedError(why, (engine, _collect(engine, tape)), interrupted=why == stopping.INTERRUPTED)
+
+
+def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:
     """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
     if not engine.model.numbering.flexible:
         return
@@ -321,7 +354,7 @@ def _warn(engine: Engine, tape: _Tape, progress: Progress) -> None:
             progress(None, f"warning: {sentence}")
 
 
-def _pass_over(engine: Engine, tape: _Tape) -> bool:
+def _pass_over(engine: Engine, tape: Tape) -> bool:
     """Get the stepper on where closure rows come to depend on each other; whether there is a way.
 
     Other rows, if these alone do; else a polynomial over the singular pose.
@@ -338,7 +371,7 @@ def _pass_over(engine: Engine, tape: _Tape) -> bool:
     return made is not None
 
 
-def _rescued(engine: Engine, tape: _Tape) -> bool:
+def _rescued(engine: Engine, tape: Tape) -> bool:
     """Whether a stepper that cannot go on has got a polynomial: the singular pose ahead may be what stopped it."""
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
@@ -357,7 +390,7 @@ def _crawls(engine: Engine) -> bool:
     return bool(n[m.STIFF_STEPS] > refusal.STIFF_SHARE * n[m.STEPS] and n[m.EVALUATIONS] / done > too_many)
 
 
-def _hand_over(engine: Engine, tape: _Tape) -> Handover:
+def _hand_over(engine: Engine, tape: Tape) -> Handover:
     """What a paused integration leaves to another method."""
     n = engine.n
     return Handover(
@@ -383,7 +416,7 @@ def _in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
     return rows[order[np.append(np.diff(time[order]) > 0.0, True)]]
 
 
-def _collect(engine: Engine, tape: _Tape) -> Trajectory:
+def _collect(engine: Engine, tape: Tape) -> Trajectory:
     n, contacts = engine.n, len(engine.model.contacts)
     rows = _in_order(tape.rows[: n[m.N_RECORDED]], contacts)
     counters = {

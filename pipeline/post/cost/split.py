@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
 from flexclear.pipeline.post.cost.study import Point, horizon_of, relative
@@ -98,7 +97,7 @@ def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: f
     if quantity.kind == "velocity":
         return relative(float(reference.attrs.get("growth", 0.0)) * displacement, size)
     if quantity.kind == "impact_times":
-        speed = reference["event_approach_speed"].values[reference["event_kind"].values == CLOSING]
+        speed = reference["event_approach_speed"].values[reference["event_kind"].values == "closing"]
         hard = speed[speed > quantities.IMPACT]
         return relative(displacement / float(hard.min()), size) if len(hard) else np.nan
     return np.nan

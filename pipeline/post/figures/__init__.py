@@ -28,7 +28,6 @@ NAMES = {
     "fig15": "fig15:make",
     "fig16": "fig16:make",
     "fig17": "fig17:make",
-    "sections": "sections:make",
     "table01": "table01:make",
     "table02": "table02:make",
     "table03": "table03:make",

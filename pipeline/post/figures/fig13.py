@@ -46,6 +46,6 @@ def _peaks(posts: list[xr.Dataset]) -> str:
     rigid, *flexible = posts
     texts = [f"{float(rigid.peak_acceleration.sel(body=PLATFORM, axis='z')):.0f} (CSJ)"]
     for model, post in zip(FAR_CSJ, flexible, strict=True):
-        mean = float(post.peak_acceleration_mean.sel(kept=PLATFORM, axis="z"))
+        mean = float(post.peak_acceleration_mean.sel(ensemble_body=PLATFORM, axis="z"))
         texts.append(f"{mean:.0f} ({model.label.removeprefix('FAR-CSJ, ').split(' ')[0]})")
     return ", ".join(texts)

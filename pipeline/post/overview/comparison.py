@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import curves, has, scaled
@@ -30,8 +31,10 @@ def assemble(
     Variables over (run, quantity): `largest`, `error` (largest distance from the tighter run), `difference` (largest
     distance from the reference); over (run, quantity, time): `value`, as it is drawn, and `distance`; all in the SI
     units of the coordinate `unit`; NaN where a run does not have a quantity, infinite where the number of impacts
-    differs.  Raises InputError when the runs have no time in common.
+    differs.  Raises InputError when the runs have no time in common, or one was stopped before its end.
     """
+    for label, run in runs.items():
+        require_complete(run, label)
     labels = list(runs)
     time = _common(runs)
     shape = (len(labels), len(chosen))

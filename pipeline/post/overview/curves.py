@@ -91,7 +91,7 @@ def _force(run: xr.Dataset, joint: str) -> Curve | None:
 
 def _peaks(run: xr.Dataset, contact: str) -> np.ndarray:
     """Time and largest force of each contact so short that outputs may miss it."""
-    mine = run["event_contact"].values == list(run["contact"].values).index(contact)
+    mine = run["event_contact"].values == contact
     mine &= np.isfinite(run["event_peak_force"].values) & np.isfinite(run["event_duration"].values)
     mine &= run["event_duration"].values < SHORT * float(np.median(np.diff(run["time"].values)))
     middle = run["event_time"].values + 0.5 * run["event_duration"].values

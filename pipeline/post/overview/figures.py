@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import by_unit
 from flexclear.pipeline.post.plotting import style
@@ -38,6 +39,7 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
 
     run: schema RUN.  watched: quantities whose owners are drawn first.  post: schema POST, made here when None.
     """
+    require_complete(run)
     post = derive(run) if post is None else post
     first = [quantity.owner for quantity in watched]
     with style.style():

@@ -243,8 +243,8 @@ def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset, refe
 
 
 def _column(variable: xr.DataArray) -> np.ndarray:
-    if "kept" in variable.dims:
-        variable = variable.sel(kept=PLATFORM)
+    if "ensemble_body" in variable.dims:
+        variable = variable.sel(ensemble_body=PLATFORM)
     if "axis" in variable.dims:
         variable = variable.sel(axis="z")
     return variable.values.reshape(variable.sizes["ensemble_time"], -1)[:, 0]

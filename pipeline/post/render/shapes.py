@@ -34,7 +34,7 @@ def page(bundle: xr.Dataset, mode: int) -> bytes:
 
 def vtu(bundle: xr.Dataset) -> bytes:
     """All mode shapes as node vectors ``mode_1``.. on the undeformed body, for ParaView."""
-    cells = bundle.cell.values.astype(int)
+    cells = bundle.cell_node.values.astype(int)
     corners = cells.shape[1]
     connectivity = np.column_stack([np.full(len(cells), corners), cells]).ravel()
     kinds = np.full(len(cells), CELLS[corners])

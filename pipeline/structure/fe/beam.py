@@ -175,7 +175,7 @@ def _work_of_tension(kinematics: Kinematics, trial: Any, test: Any, p: Any) -> A
 
 def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
     # along the rod from its own start: far from the mesh origin lengths of cells would lose digits
-    line = MeshLine(mesh["abscissa"].values[None, :].copy(), mesh["cell"].values.T.copy())
+    line = MeshLine(mesh["abscissa"].values[None, :].copy(), mesh["cell_node"].values.T.copy())
     extension, twist = (DEGREE[mesh.attrs[name]] for name in ("extension", "torsion"))
     element = ElementComposite(*kinematics.elements(extension, twist))
     return Basis(line, element, quadrature=(POINTS[None, :], WEIGHTS))
@@ -183,7 +183,7 @@ def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
 
 def _unknowns(mesh: xr.Dataset, basis: Basis, kinematics: Kinematics) -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
     """Component and place of each unknown, and the signed permutation from vectors to scikit-fem's order."""
-    x, cells = mesh["abscissa"].values, mesh["cell"].values
+    x, cells = mesh["abscissa"].values, mesh["cell_node"].values
     place = np.argsort(NODE_COMPONENT)
     nodal = basis.nodal_dofs[place].T.ravel()
     inside = [c for e, c in zip(basis.elem.elems, kinematics.component, strict=True) for _ in range(e.interior_dofs)]

@@ -39,7 +39,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
         "node_position": (("node", "axis"), position),
         "abscissa": (("node",), x),
         "rod_rotation": (("axis", "axis2"), R_MR),
-        "cell": (("cell", "corner"), np.stack([cells, cells + 1], axis=1)),
+        "cell_node": (("cell", "corner"), np.stack([cells, cells + 1], axis=1)),
         "frame_node": (("frame",), nodes),
         "frame_position": (("frame", "axis"), position[nodes]),
         "frame_rotation": (("frame", "axis", "axis2"), R_MR @ np.array(turned)),
@@ -138,7 +138,7 @@ def _attributes(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[S
         "theory": recipe.theory,
         "torsion": recipe.torsion,
         "extension": recipe.extension,
-        "source": sources(recipe),
+        "sources": sources(recipe),
     }
 
 

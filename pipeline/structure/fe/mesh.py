@@ -32,6 +32,6 @@ def write_vtu(mesh: xr.Dataset, path: str | Path) -> None:
 
     names = ("area", "youngs_modulus", "shear_modulus", "density", "second_moment", "inertia_moment")
     cell_data = {name: [mesh[name].values] for name in names}
-    meshio.Mesh(mesh["node_position"].values, [("line", mesh["cell"].values)], cell_data=cell_data).write(
+    meshio.Mesh(mesh["node_position"].values, [("line", mesh["cell_node"].values)], cell_data=cell_data).write(
         path, file_format="vtu"
     )

@@ -82,7 +82,7 @@ def _drawn(mesh: xr.Dataset, beam: Beam) -> Drawn:
     # drawn as a round rod of the true area, whatever the section
     radius = np.sqrt(mesh["area"].values / np.pi)
     translation, rotation = (sp.csr_array(unit[nodal[:, part].ravel()]) for part in (slice(0, 3), slice(3, 6)))
-    return Drawn(beam.node_position, mesh["cell"].values, radius, translation, rotation)
+    return Drawn(beam.node_position, mesh["cell_node"].values, radius, translation, rotation)
 
 
 def _build(recipe: Mapping[str, Any], folder: Path) -> xr.Dataset:

@@ -19,7 +19,7 @@ def build(mesh: xr.Dataset, modes: xr.Dataset, extra: Mapping[str, Any] | None =
     extra: further variables, as those of stress recovery.
 
     The body frame is the mesh frame when nothing deforms; how it follows the deformation is what the
-    reference condition of the modes says.  Units per modal coordinate: q in sqrt(kg) m.
+    reference condition of the modes says.  Units per modal coordinate: q in m, for modal masses of 1 kg.
     """
     model = of_mesh(mesh).assemble(mesh)
     vectors = modes["vector"].values
@@ -60,7 +60,7 @@ def _drawn(model: Model, vectors: np.ndarray) -> dict[str, Any]:
     drawn, n = model.drawn, vectors.shape[1]
     return {
         "node_position": (("node", "axis"), drawn.position),
-        "cell": (("cell", "corner"), drawn.cell),
+        "cell_node": (("cell", "corner"), drawn.cell),
         "shape_translation": (("node", "axis", "mode"), (drawn.translation @ vectors).reshape(-1, 3, n)),
         "shape_rotation": (("node", "axis", "mode"), (drawn.rotation @ vectors).reshape(-1, 3, n)),
         "radius": (("cell",), drawn.radius),

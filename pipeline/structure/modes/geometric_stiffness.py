@@ -34,7 +34,7 @@ def variables(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:
     """
     _require_plain_rod(mesh)
     x, vectors = mesh["abscissa"].values, modes["vector"].values
-    ends = np.sort(x[mesh["cell"].values], axis=1)
+    ends = np.sort(x[mesh["cell_node"].values], axis=1)
     s = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * POINTS
     node = {str(n): int(k) for n, k in zip(mesh["frame"].values, mesh["frame_node"].values, strict=True)}
     interfaces = modes.attrs["interfaces"].split()

@@ -25,7 +25,7 @@ def vtu(modes: xr.Dataset) -> bytes:
         points[name] = shape[:, :3] / (size or 1.0)
         if shape[:, 3:].any():
             points[f"{name}_rotation"] = shape[:, 3:] / (size or np.linalg.norm(shape[:, 3:], axis=1).max())
-    cells = [(CELLS[modes.sizes["corner"]], modes["cell"].values)]
+    cells = [(CELLS[modes.sizes["corner"]], modes["cell_node"].values)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "modes.vtu"
         meshio.Mesh(modes["node_position"].values, cells, point_data=points).write(path, file_format="vtu")

@@ -22,4 +22,5 @@ def build(mesh: xr.Dataset) -> xr.Dataset:
         "frame_position": (("frame", "axis"), np.stack([frame.position for frame in model.interfaces])),
         "frame_rotation": (("frame", "axis", "axis2"), np.stack([frame.rotation for frame in model.interfaces])),
     }
-    return conform(xr.Dataset(data, coords={"frame": [frame.name for frame in model.interfaces]}), RIGID)
+    made = xr.Dataset(data, coords={"frame": [frame.name for frame in model.interfaces]})
+    return conform(made, RIGID, title=f"Rigid body made of the mesh: {mesh.attrs['title']}")

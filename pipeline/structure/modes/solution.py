@@ -21,7 +21,7 @@ from flexclear.pipeline.structure.modes.select import Wanted
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 REFERENCES = "flexclear.pipeline.structure.modes.reference"
-CARRIED = ("title", "section", "inertia_section", "source")
+CARRIED = ("title", "section", "inertia_section", "sources")
 
 
 def solve(
@@ -91,7 +91,7 @@ def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[st
         "shape": (("node", "dof", "mode"), np.concatenate(moved, axis=1)),
         "vector": (("unknown", "mode"), vectors),
         "node_position": (("node", "axis"), model.drawn.position),
-        "cell": (("cell", "corner"), model.drawn.cell),
+        "cell_node": (("cell", "corner"), model.drawn.cell),
         "dof": (("dof",), ["ux", "uy", "uz", "rx", "ry", "rz"]),
         "frame": (("frame",), [frame.name for frame in model.interfaces]),
     }

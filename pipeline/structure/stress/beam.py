@@ -29,7 +29,7 @@ CONSTANTS = ("area", "second_moment")
 def recover(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:
     """Variables STRESS of a bundle; without `fibre_stress` where some section has no known outline."""
     beam, vectors = beams.assemble(mesh), modes["vector"].values
-    nodes = mesh["cell"].values.ravel()
+    nodes = mesh["cell_node"].values.ravel()
     return _sections(mesh, beam, vectors, nodes) | _slices(mesh, beam, vectors, nodes) | _fibres(mesh)
 
 

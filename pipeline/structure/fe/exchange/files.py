@@ -71,7 +71,7 @@ def write_matrix_market(model: Model, folder: Path) -> None:
     for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
         scipy.io.mmwrite(folder / f"{name}.mtx", sp.coo_array(matrix), symmetry="symmetric", precision=17)
     found = table(model)
-    with (folder / "unknowns.csv").open("w", newline="") as file:
+    with (folder / "unknowns.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
         for node, place, component in zip(found.node, found.position, found.component, strict=True):
@@ -153,7 +153,7 @@ def _component(text: str) -> int:
 
 def _table(path: Path, where: str) -> Table:
     try:
-        with path.open(newline="") as file:
+        with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file, skipinitialspace=True))
         node = np.array([int(row["node"]) for row in rows])
         position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])

@@ -51,7 +51,7 @@ def build(recipe: MatricesRecipe, folder: Path, place: str) -> xr.Dataset:
         section="matrices",
         inertia_section="matrices",
         interfaces=" ".join(recipe.interfaces),
-        source=sources(recipe),
+        sources=sources(recipe),
     )
 
 

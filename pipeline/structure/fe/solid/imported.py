@@ -69,7 +69,7 @@ def _read(path: Path, where: str) -> Any:
 def _note_companions(path: Path) -> None:
     """XDMF keeps its numbers in HDF5 files, which a library in C opens."""
     if path.suffix in (".xdmf", ".xmf"):
-        for name in set(re.findall(r"([^\s<>]+\.h5):", path.read_text(errors="replace"))):
+        for name in set(re.findall(r"([^\s<>]+\.h5):", path.read_text(encoding="utf-8", errors="replace"))):
             opened.note(path.parent / name)
 
 

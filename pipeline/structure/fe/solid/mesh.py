@@ -32,7 +32,7 @@ def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
     materials = [recipe.materials.get(name) or recipe.material for name in names]
     data: dict[str, Any] = {
         "node_position": (("node", "axis"), geometry.nodes),
-        "cell": (("cell", "corner"), geometry.cells),
+        "cell_node": (("cell", "corner"), geometry.cells),
         "cell_region": (("cell",), region),
         "region": (("region",), names),
     }
@@ -48,7 +48,7 @@ def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
         section="solid",
         inertia_section="solid",
         interfaces=" ".join(recipe.interfaces),
-        source=sources(recipe),
+        sources=sources(recipe),
     )
 
 
@@ -115,7 +115,7 @@ def write_vtu(mesh: xr.Dataset, path: Path) -> None:
     cell = ELEMENTS[mesh.attrs["element"]].cell
     region = mesh["cell_region"].values
     data = {name: [mesh[name].values[region]] for name in ("youngs_modulus", "poisson", "density")}
-    cells = [(cell, mesh["cell"].values)]
+    cells = [(cell, mesh["cell_node"].values)]
     meshio.Mesh(mesh["node_position"].values, cells, cell_data=data | {"region": [region]}).write(
         path, file_format="vtu"
     )

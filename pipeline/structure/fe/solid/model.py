@@ -82,7 +82,7 @@ def _solid(mesh: xr.Dataset) -> Solid:
     region = mesh["cell_region"].values
     E, nu, rho = (mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density"))
     lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))
-    return Solid(mesh.attrs["element"], mesh["node_position"].values, mesh["cell"].values, lame, shear, rho)
+    return Solid(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, lame, shear, rho)
 
 
 def _unknowns(mesh: xr.Dataset) -> _Unknowns:
@@ -141,7 +141,7 @@ def _families(unknowns: _Unknowns) -> Families:
 
 def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
     """The boundary: faces with nodes between their corners are cut into several."""
-    geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell"].values, {}, {})
+    geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, {}, {})
     found = face_nodes(geometry, *boundary(geometry))
     pieces = found[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(found.shape[1])[0]))
     used, cell = np.unique(pieces, return_inverse=True)

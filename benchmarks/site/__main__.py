@@ -1,0 +1,44 @@
+"""``python -m benchmarks.site``: write the pages of docs/ that follow from the sources; ``--check``: compare only."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+
+from benchmarks.page import DOCS
+from benchmarks.site import datasets
+
+#: page below docs/ -> what makes its text
+PAGES: dict[str, Callable[[], str]] = {"datasets.md": datasets.text}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """1 where a page is not what it would be now, and only a comparison was asked for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.site", description=__doc__)
+    parser.add_argument("--check", action="store_true", help="tell which pages are out of date; write nothing")
+    options = parser.parse_args(arguments)
+    old = stale()
+    for page, text in old.items():
+        if options.check:
+            print(f"docs/{page} is not what the sources say: python -m benchmarks.site writes it again")
+        else:
+            (DOCS / page).parent.mkdir(parents=True, exist_ok=True)
+            (DOCS / page).write_text(text)
+            print(f"docs/{page}")
+    return int(options.check and bool(old))
+
+
+def stale() -> dict[str, str]:
+    """Pages that are not what their sources say, and what they would be."""
+    made = {page: make() for page, make in PAGES.items()}
+    return {page: text for page, text in made.items() if _written(page) != text}
+
+
+def _written(page: str) -> str | None:
+    path = DOCS / page
+    return path.read_text() if path.is_file() else None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""Coordinates of the artifacts: what the entries of each dimension are called, and what belongs to them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.variable import Schema, Variable
+
+AXES = ("x", "y", "z")
+QUATERNION = ("w", "x", "y", "z")
+#: what an entry of `<dimension>_motion` says; it decides the unit of variables whose entries slide or turn
+TRANSLATION, ROTATION = "translation", "rotation"
+
+
+def _words(dim: str, long_name: str) -> Variable:
+    return Variable((dim,), "", long_name, optional=True)
+
+
+def _number(dim: str, long_name: str, units: str = "1") -> Variable:
+    return Variable((dim,), units, long_name, optional=True)
+
+
+_MOTION = "translation or rotation: what it is along or about"
+COORDINATES: Schema = {
+    "time": _number("time", "time", "s"),
+    "twin_time": _number("twin_time", "time at which run and twin were compared", "s"),
+    "ensemble_time": _number("ensemble_time", "time of the ensemble's output", "s"),
+    "waypoint": _number("waypoint", "time since the period began", "s"),
+    "axis": _words("axis", "component along x, y, z"),
+    "axis2": _words("axis2", "component along x, y, z"),
+    "quat": _words("quat", "component of a quaternion"),
+    "body": _words("body", "name of the body"),
+    "ensemble_body": _words("ensemble_body", "name of the body whose motion the ensemble keeps"),
+    "frame": _words("frame", "name of the frame; of a mechanism body.frame"),
+    "frame_body": _words("frame", "body that the frame is fixed to"),
+    "frame_held": _words("frame_held", "frame that is held meanwhile"),
+    "joint": _words("joint", "name of the joint"),
+    "joint_type": _words("joint", "type of the joint"),
+    "joint_first_frame": _words("joint", "its first frame, whose axes are those of its motion"),
+    "joint_second_frame": _words("joint", "its second frame, on which its force acts"),
+    "joint_first_body": _words("joint", "body of the first frame"),
+    "joint_second_body": _words("joint", "body of the second frame"),
+    "coordinate": _words("coordinate", "joint, or joint.coordinate where it has several"),
+    "coordinate_joint": _words("coordinate", "name of its joint"),
+    "coordinate_motion": _words("coordinate", _MOTION),
+    "drive": _words("drive", "name of the drive, of its coordinate, or of an actuator"),
+    "drive_motion": _words("drive", _MOTION),
+    "load": _words("load", "name of the load"),
+    "load_type": _words("load", "type of the load"),
+    "load_motion": _words("load", "translation or rotation: what its length measures"),
+    "bushing": _words("bushing", "name of the bushing"),
+    "controller": _words("controller", "name of the controller"),
+    "controller_motion": _words("controller", _MOTION),
+    "gear": _words("gear", "name of the gear"),
+    "gear_motion": _words("gear", "translation or rotation: what its second coordinate is"),
+    "contact": _words("contact", "name of the joint with clearance, or of the stop's end"),
+    "contact_type": _words("contact", "type of that joint, or stop"),
+    "contact_motion": _words("contact", "rotation where it ends an angle, else translation"),
+    "pass_joint": _words("singular_pass", "joint on whose coordinate the branches differ most"),
+    "mode": _words("mode", "body.number, or in the files of one body its number"),
+    "mode2": _number("mode2", "number of the mode"),
+    "mode_body": _words("mode", "body that the mode belongs to"),
+    "mode_number": _number("mode", "number of the mode in the body's bundle"),
+    "rigid_mode": _number("rigid_mode", "number of the rigid-body mode"),
+    "dof": _words("dof", "displacement along, rotation about x, y, z"),
+    "direction": _words("direction", "displacement along, rotation about x, y, z"),
+    "direction_motion": _words("direction", _MOTION),
+    "bound_frequency": _number("bound_frequency", "frequency of the load", "Hz"),
+    "node": _number("node", "number of the node, from 0; `cell_node` refers to it"),
+    "cell": _number("cell", "number of the cell, from 0"),
+    "corner": _number("corner", "number of the corner of a cell, from 0"),
+    "point": _number("point", "number of the Gauss point, from 0"),
+    "region": _words("region", "name of the region of cells of one material"),
+    "lump": _number("lump", "number of the lumped mass, from 0"),
+    "section": _number("section", "number of the section, from 0"),
+    "section_body": _words("section", "body that the section belongs to"),
+    "section_place": _number("section", "place of the section along the rod", "m"),
+    "section_load": _words("section_load", "section force N, Qy, Qz, or moment T, My, Mz"),
+    "section_load_motion": _words("section_load", "translation for forces, rotation for moments"),
+    "stress": _words("stress", "axial stress, and shear stress along y and z"),
+    "slice": _number("slice", "number of the slice, from 0"),
+    "fibre": _number("fibre", "number of the fibre, from 0"),
+    "member": _number("member", "number of the member, from 0"),
+    "quantile": _number("quantile", "share of the members below"),
+    "followed": _number("followed", "number of the period in which a neighbour was followed, from 0"),
+    "vibration": _number("vibration", "number of the vibration, from 1"),
+    "part": _words("part", "real or imaginary part"),
+    "moving_body": _words("moving_body", "name of the body"),
+    "frequency": _number("frequency", "cycles per period"),
+    "lag": _number("lag", "number of periods later"),
+    "component": _number("component", "direction of the motion, by variance, from 0"),
+}
+#: dimensions whose entries have no other name than their number, and the number of the first
+NUMBERED = {
+    **dict.fromkeys(("node", "cell", "corner", "point", "lump", "section", "slice", "fibre"), 0),
+    **dict.fromkeys(("followed", "lag", "component"), 0),
+    **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
+}
+#: dimensions whose entries are always the same
+NAMED: Mapping[str, tuple[str, ...]] = {
+    "axis": AXES,
+    "axis2": AXES,
+    "quat": QUATERNION,
+    "section_load": ("N", "Qy", "Qz", "T", "My", "Mz"),
+    "stress": ("axial", "shear_y", "shear_z"),
+}
+#: motions of entries that are always the same
+MOTIONS: Mapping[str, tuple[str, ...]] = {
+    dim: (TRANSLATION,) * 3 + (ROTATION,) * 3 for dim in ("direction", "section_load")
+}
+
+
+def motion(turning: bool) -> str:
+    """How `<dimension>_motion` calls an entry."""
+    return ROTATION if turning else TRANSLATION
+
+
+def with_names(dataset: xr.Dataset) -> xr.Dataset:
+    """The same with the coordinates that follow from its dimensions alone."""
+    found: dict[str, object] = {}
+    for name in (str(dim) for dim in dataset.dims):
+        if name in NAMED:
+            found[name] = list(NAMED[name])
+        elif name in NUMBERED and name not in dataset.coords:
+            found[name] = np.arange(dataset.sizes[name], dtype=np.int32) + NUMBERED[name]
+        if name in MOTIONS:
+            found[f"{name}_motion"] = (name, list(MOTIONS[name]))
+    return dataset.assign_coords(found)
+
+
+def turning(dataset: xr.Dataset, dims: tuple[Hashable, ...]) -> tuple[str, np.ndarray]:
+    """The dimension among `dims` whose entries slide or turn, and which of them turn; of none, an empty name.
+
+    Events and impacts are of the kind of their contacts.
+    """
+    for dim in (str(dim) for dim in dims):
+        if f"{dim}_motion" in dataset.coords:
+            return dim, np.asarray(dataset[f"{dim}_motion"].values == ROTATION)
+        if f"{dim}_contact" in dataset.coords and "contact_motion" in dataset.coords:
+            turns = set(dataset["contact"].values[dataset["contact_motion"].values == ROTATION].tolist())
+            return dim, np.array([name in turns for name in dataset[f"{dim}_contact"].values.tolist()], dtype=bool)
+    return "", np.zeros(0, dtype=bool)

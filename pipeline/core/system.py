@@ -1,0 +1,186 @@
+"""What systems do differently: Linux, macOS, Windows. Nothing else of this program asks on which one it runs.
+
+Modules that only some systems have are imported here, where they are used, and their absence is no error.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import stat
+import sys
+from pathlib import Path
+from typing import Any
+
+#: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
+FICLONE = 0x40049409
+#: the request that the system send a signal when the parent dies (linux/prctl.h)
+PR_SET_PDEATHSIG = 1
+#: access to a process of Windows that allows to ask whether it runs, and what it answers then (winbase.h, minwinbase.h)
+QUERY_LIMITED, STILL_ACTIVE, ACCESS_DENIED = 0x1000, 259, 5
+
+
+def _module(name: str) -> Any:
+    """A module of some systems; None elsewhere."""
+    try:
+        return __import__(name)
+    except ImportError:
+        return None
+
+
+def _windows() -> Any:
+    """Functions of Windows; None elsewhere."""
+    import ctypes
+
+    return getattr(ctypes, "windll", None)
+
+
+def cores() -> int:
+    """Processors that this process may use."""
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
+
+
+def memory() -> int:
+    """Bytes that this process can still get: of the machine, of its container, of its own limit."""
+    found = [_physical()]
+    lines = _text("/proc/meminfo").splitlines()
+    found += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    limit, used = _text("/sys/fs/cgroup/memory.max"), _text("/sys/fs/cgroup/memory.current")
+    if limit.isdigit() and used.isdigit():
+        found.append(int(limit) - int(used))
+    resource = _module("resource")
+    if resource is not None:
+        soft, _ = resource.getrlimit(resource.RLIMIT_AS)
+        found += [soft] if soft != resource.RLIM_INFINITY else []
+    return max(0, min(found))
+
+
+def _physical() -> int:
+    """Memory of the machine [B]; of Windows what is free of it; where nobody says, more than there is anywhere."""
+    if hasattr(os, "sysconf"):
+        with contextlib.suppress(ValueError, OSError):
+            return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    windows = _windows()
+    if windows is None:
+        return sys.maxsize
+    import ctypes
+
+    # MEMORYSTATUSEX: its size, load in percent, then total and free memory, and five more
+    status = (ctypes.c_uint64 * 8)()
+    ctypes.cast(status, ctypes.POINTER(ctypes.c_uint32))[0] = ctypes.sizeof(status)
+    windows.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
+    return int(status[2]) or sys.maxsize
+
+
+def peak_memory() -> int:
+    """Largest resident memory of this process so far [B]; 0 where the system does not tell."""
+    resource = _module("resource")
+    if resource is None:
+        return 0
+    peak: int = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak if sys.platform == "darwin" else 1024 * peak
+
+
+def share(source: Any, target: Any) -> bool:
+    """Whether an open file could be made to share the bytes of another (Linux, on file systems that can)."""
+    fcntl = _module("fcntl")
+    if fcntl is None or sys.platform != "linux":
+        return False
+    try:
+        fcntl.ioctl(target.fileno(), FICLONE, source.fileno())
+    except OSError:
+        return False
+    return True
+
+
+def replace(made: Path, path: Path) -> None:
+    """Give a file the name of another, which may be read-only: Windows does not replace such."""
+    try:
+        os.replace(made, path)
+    except PermissionError:
+        if not path.exists() or os.access(path, os.W_OK):
+            raise
+        path.chmod(stat.S_IREAD | stat.S_IWRITE)
+        os.replace(made, path)
+
+
+def sync_folder(folder: Path) -> None:
+    """Force the names in a folder to the disk, where folders can be opened, and the file system knows such a thing."""
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
+
+def free_space(folder: Path) -> int:
+    """Bytes free on the disk of a folder."""
+    return shutil.disk_usage(folder).free
+
+
+def others_can_write(place: Path, *, inside: bool) -> bool:
+    """Whether anybody but this user and the system's can write to a folder, or it is not theirs.
+
+    inside: whether what lies in it counts, not only its replacement.  Where folders belong to nobody by number
+    (Windows) the user's own folders are closed to others.
+    """
+    if not hasattr(os, "geteuid"):
+        return False
+    status = place.stat()
+    open_to_all = bool(status.st_mode & stat.S_IWOTH) and not (status.st_mode & stat.S_ISVTX and not inside)
+    return open_to_all or bool(inside and status.st_mode & stat.S_IWGRP) or status.st_uid not in (0, os.geteuid())
+
+
+def alive(process: int) -> bool:
+    """Whether a process of this number runs, for all that this user may know."""
+    windows = _windows()
+    if windows is None:
+        try:
+            os.kill(process, 0)
+        except ProcessLookupError:
+            return False
+        except (OSError, OverflowError):
+            return True
+        return True
+    # os.kill would end it
+    handle = windows.kernel32.OpenProcess(QUERY_LIMITED, False, process)
+    if not handle:
+        return bool(windows.kernel32.GetLastError() == ACCESS_DENIED)
+    import ctypes
+
+    code = ctypes.c_ulong()
+    windows.kernel32.GetExitCodeProcess(handle, ctypes.byref(code))
+    windows.kernel32.CloseHandle(handle)
+    return code.value == STILL_ACTIVE
+
+
+def end_with_parent() -> None:
+    """Ask the system to end this process when its parent dies, where systems do that (Linux)."""
+    if sys.platform == "linux":
+        import ctypes
+
+        # compiled code and compilers do not let a thread of Python run; the system asks nobody
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+def is_parent(process: int) -> bool:
+    """Whether a process is still the parent of this one: Windows goes on telling the number of one that is gone."""
+    return os.getppid() == process and (_windows() is None or alive(process))
+
+
+def plain_output() -> None:
+    """Let consoles of old code pages show what they cannot show as escapes, instead of ending the command."""
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def _text(path: str) -> str:
+    try:
+        return Path(path).read_text(encoding="utf-8").strip()
+    except OSError:
+        return ""

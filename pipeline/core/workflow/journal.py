@@ -1,0 +1,195 @@
+"""Unfinished work of a task on disk, so that what was killed goes on where it was, to the last bit.
+
+A task does its work in pieces, one integration each. A piece is named by all that decides it, so that a later
+attempt at the same task asks for the same pieces, in the same order; what it finds, it need not do again. Pieces lie
+beside the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with its own digest, and hold
+numbers only: arrays and JSON, no code. They go when the artifact is there.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from flexclear.pipeline.core.artifacts.disk import publish, sha256
+
+#: how often unfinished work is written [s], and the share of the time that writing may take where it is slow
+EVERY, SHARE = 20.0, 0.05
+#: what a file of a piece begins with is a digest of so many characters, and a line's end
+DIGEST = 64
+
+
+@dataclass(frozen=True)
+class State:
+    """What a piece needs to go on.
+
+    arrays: by name.  notes: what JSON can say.  grown: rows that are only added to.  seconds: what it has taken so far.
+    """
+
+    arrays: Mapping[str, Any]
+    notes: Mapping[str, Any]
+    grown: Any
+    seconds: float = 0.0
+
+
+@dataclass
+class Journal:
+    """The pieces of one task.
+
+    folder, key: where they lie, and what their names begin with.
+    restored: processor time [s] that pieces took in earlier attempts.  aside: what keeping them has taken of this one.
+    """
+
+    folder: Path
+    key: str
+    clock: Callable[[], float] = time.monotonic
+    restored: float = 0.0
+    aside: float = 0.0
+    _waiting: dict[str, State | Callable[[], State]] = field(default_factory=dict)
+    _asked: dict[str, int] = field(default_factory=dict)
+    _chunks: dict[str, list[tuple[int, str]]] = field(default_factory=dict)
+    _covered: set[str] = field(default_factory=set)
+    _written: float = field(default_factory=time.monotonic)
+    _took: float = 0.0
+
+    def name(self, digest: str) -> str:
+        """Name of the piece that is asked for next with this digest of all that decides it: work may be repeated."""
+        count = self._asked.get(digest, 0)
+        self._asked[digest] = count + 1
+        return f"{digest[:24]}-{count}"
+
+    def find(self, name: str) -> State | None:
+        """What an earlier attempt left of a piece; None where there is nothing, or something is damaged."""
+        import numpy as np
+
+        found = self._read(name)
+        if found is None:
+            return None
+        arrays, notes = found
+        chunks, rows = [(int(count), str(digest)) for count, digest in notes["chunks"]], []
+        for k, (_, digest) in enumerate(chunks):
+            more = self._read(f"{name}-{k}", digest)
+            if more is None:
+                return None
+            rows.append(more[0]["rows"])
+        self._chunks[name] = chunks
+        self.restored += float(notes["seconds"])
+        return State(arrays, notes["notes"], np.concatenate(rows), float(notes["seconds"]))
+
+    def due(self) -> bool:
+        """Whether it is time to write."""
+        return self.clock() - self._written > max(EVERY, self._took / SHARE)
+
+    def finish(self, name: str, state: State) -> None:
+        """A piece is done; it is written with what is written next."""
+        self._waiting[name] = state
+        if self.due():
+            self.write()
+
+    def cover(self, name: str, state: Callable[[], State]) -> None:
+        """From this state on, which is asked for when it is written, the work needs none of the pieces so far."""
+        self._covered |= {*self._waiting, *self._chunks} - {name}
+        self._waiting = {name: state}
+        if self.due():
+            self.write()
+
+    def write(self, name: str | None = None, state: State | None = None) -> None:
+        """Write what waits, and this piece; where the disk is full, nothing is lost but that."""
+        begun = self.clock()
+        waiting = self._waiting | ({} if name is None or state is None else {name: state})
+        with contextlib.suppress(OSError):
+            self.folder.mkdir(parents=True, exist_ok=True)
+            for piece, content in waiting.items():
+                self._put(piece, content() if callable(content) else content)
+            self._waiting = {}
+            for piece in self._covered:
+                self._drop(piece)
+            self._covered = set()
+        self._written, self._took = self.clock(), self.clock() - begun
+
+    @contextlib.contextmanager
+    def uncounted(self) -> Iterator[None]:
+        """What is done meanwhile is none of the work, whose time may be measured."""
+        begun, before = time.process_time(), self.aside
+        try:
+            yield
+        finally:
+            self.aside = before + time.process_time() - begun
+
+    def remove(self) -> None:
+        """The task is done."""
+        for path in self.folder.glob(f"{self.key}.*.part"):
+            path.unlink(missing_ok=True)
+
+    def _put(self, name: str, state: State) -> None:
+        chunks = self._chunks.setdefault(name, [])
+        have = sum(count for count, _ in chunks)
+        if len(state.grown) > have or not chunks:
+            digest = self._publish(f"{name}-{len(chunks)}", {"rows": state.grown[have:]}, {})
+            chunks.append((len(state.grown) - have, digest))
+        whole = {"chunks": chunks, "seconds": state.seconds, "notes": dict(state.notes)}
+        self._publish(name, state.arrays, whole)
+
+    def _drop(self, name: str) -> None:
+        for k in range(len(self._chunks.pop(name, []))):
+            self._path(f"{name}-{k}").unlink(missing_ok=True)
+        self._path(name).unlink(missing_ok=True)
+
+    def _publish(self, name: str, arrays: Mapping[str, Any], notes: Mapping[str, Any]) -> str:
+        import numpy as np
+
+        told = np.frombuffer(json.dumps(notes).encode(), np.uint8)
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, notes=told, **arrays)
+        content = buffer.getvalue()
+        digest = sha256(content)
+        publish(self._path(name), digest.encode() + b"\n" + content)
+        return digest
+
+    def _read(self, name: str, digest: str | None = None) -> tuple[dict[str, Any], dict[str, Any]] | None:
+        import numpy as np
+
+        try:
+            whole = self._path(name).read_bytes()
+        except OSError:
+            return None
+        content = whole[DIGEST + 1 :]
+        noted = whole[:DIGEST].decode(errors="replace")
+        if sha256(content) != noted or digest not in (None, noted):
+            return None
+        with np.load(io.BytesIO(content), allow_pickle=False) as file:
+            arrays = {key: file[key] for key in file.files}
+        return arrays, json.loads(arrays.pop("notes").tobytes())
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{self.key}.{name}.part"
+
+
+_current: Journal | None = None
+
+
+def current() -> Journal | None:
+    """The journal of the task that this process works on; None where nothing is kept."""
+    return _current
+
+
+@contextlib.contextmanager
+def kept(folder: Path, key: str) -> Iterator[Journal]:
+    """Meanwhile unfinished work is written; whoever has stored what came of it removes it."""
+    global _current
+    before, _current = _current, Journal(folder, key)
+    try:
+        yield _current
+    finally:
+        _current = before
+
+
+def seconds() -> float:
+    """Processor time of this process [s], as if the work had never been interrupted, and nothing were kept of it."""
+    return time.process_time() + (_current.restored - _current.aside if _current is not None else 0.0)

@@ -1,0 +1,170 @@
+"""An integration as a piece of work in the task's journal: all that its stepper has, as arrays.
+
+The work space, the wiring with the rows solved for, the integers and the record are all that steps depend on, whatever
+the method keeps there; so an integration that goes on from them is the same to the last bit.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numba import config
+
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow import journal
+from flexclear.pipeline.core.workflow.journal import Journal, State
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile.folder import processor
+from flexclear.pipeline.dynamics.run.collocation import Collocation
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.singular_pass import Pass
+
+#: arrays of an engine that change as it works
+MEMORY = ("w", "n", "h", "kept")
+
+
+@dataclass
+class Tape:
+    """The arrays of one integration; rows and events may be replaced by larger ones.
+
+    doubted: flexible bodies of which has been said that they left the range of their modes.
+    """
+
+    outputs: np.ndarray
+    rows: np.ndarray
+    events: np.ndarray
+    selections: list[tuple[float, np.ndarray]]
+    collocations: list[Collocation] = field(default_factory=list)
+    passes: list[Pass] = field(default_factory=list)
+    doubted: set[str] = field(default_factory=set)
+
+
+@dataclass
+class Piece:
+    """One integration. done: whether it had come to its end when it was found.  tape: as it was found; or nothing."""
+
+    journal: Journal
+    engine: Engine
+    name: str
+    begun: float
+    tape: Tape | None = None
+    done: bool = False
+
+    def keep(self, tape: Tape) -> None:
+        """Write the state, when it is time to."""
+        if self.journal.due():
+            self.save(tape)
+
+    def save(self, tape: Tape) -> None:
+        """Write the state now."""
+        with self.journal.uncounted():
+            self.journal.write(self.name, self._state(tape, done=False))
+
+    def finish(self, tape: Tape) -> None:
+        """The end has been reached."""
+        if not self.done:
+            with self.journal.uncounted():
+                self.journal.finish(self.name, self._state(tape, done=True))
+
+    def _state(self, tape: Tape, *, done: bool) -> State:
+        """All that the integration goes on from, copied; record and events may be written over by nobody else."""
+        n, arrays = self.engine.n, memory(self.engine)
+        arrays["events"] = tape.events[: n[m.N_EVENTS]].copy()
+        arrays["selections"] = np.array([rows for _, rows in tape.selections])
+        for k, laid in enumerate(tape.collocations):
+            arrays[f"series{k}"], arrays[f"independence{k}"] = laid.series, laid.independence
+        notes = {
+            "done": done,
+            "room": [len(tape.rows), len(tape.events)],
+            "selections": [float(time) for time, _ in tape.selections],
+            "collocations": [[laid.start, laid.span, laid.evaluations] for laid in tape.collocations],
+            "passes": [[getattr(one, item.name) for item in fields(Pass)] for one in tape.passes],
+            "doubted": sorted(tape.doubted),
+        }
+        return State(arrays, notes, tape.rows[: n[m.N_RECORDED]], journal.seconds() - self.begun)
+
+    def restore(self, found: State, outputs: np.ndarray) -> None:
+        """Put engine and tape into the state that was found."""
+        arrays, notes = found.arrays, found.notes
+        remember(self.engine, arrays)
+        rows, events = (int(count) for count in notes["room"])
+        tape = Tape(
+            outputs,
+            np.zeros((rows, found.grown.shape[1])),
+            np.full((events, m.EVENT.size), np.nan),
+            list(zip(notes["selections"], arrays["selections"], strict=True)),
+            [
+                Collocation(start, span, arrays[f"series{k}"], arrays[f"independence{k}"], evaluations)
+                for k, (start, span, evaluations) in enumerate(notes["collocations"])
+            ],
+            [Pass(*one) for one in notes["passes"]],
+            set(notes["doubted"]),
+        )
+        tape.rows[: len(found.grown)], tape.events[: len(arrays["events"])] = found.grown, arrays["events"]
+        self.tape, self.done = tape, bool(notes["done"])
+
+
+def memory(engine: Engine) -> dict[str, np.ndarray]:
+    """All that an engine holds, copied."""
+    return {name: getattr(engine, name).copy() for name in MEMORY}
+
+
+def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
+    """Let an engine hold what `memory` gave, but for the addresses of functions, which are this process's own."""
+    addresses = engine.h[list(m.ADDRESSES)].copy()
+    for name in MEMORY:
+        getattr(engine, name)[:] = arrays[name]
+    engine.h[list(m.ADDRESSES)] = addresses
+
+
+def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Any) -> Piece | None:
+    """The piece of an integration from state y, as an earlier attempt left it; None where nothing is kept.
+
+    left: what another method left (`trajectory.Handover`), or None.
+    """
+    kept = journal.current()
+    if kept is None:
+        return None
+    begun = journal.seconds()
+    with kept.uncounted():
+        made = Piece(kept, engine, kept.name(digest(engine, y, outputs, *_arrays(left))), begun)
+        found = kept.find(made.name)
+        if found is not None:
+            made.restore(found, outputs)
+    return made
+
+
+def digest(engine: Engine, *arrays: np.ndarray) -> str:
+    """Of all that decides what an engine makes of some arrays, the processor included."""
+    told = f"{processor()} {config.DISABLE_JIT} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
+    found = hashlib.sha256(told.encode())
+    h = engine.h.copy()
+    h[list(m.ADDRESSES)] = 0
+    for array in (h, engine.model.arrays.f, engine.w, engine.n, engine.kept, *arrays):
+        found.update(np.ascontiguousarray(array).tobytes())
+    return found.hexdigest()
+
+
+_last: list[tuple[Scene, str]] = []
+
+
+def _told(scene: Scene) -> str:
+    """All that a scene says; remembered of the last one, since studies ask for thousands of pieces of it."""
+    if not _last or _last[0][0] is not scene:
+        _last[:] = [(scene, scene.model_dump_json(exclude={"title", "description", "view", "limits"}))]
+    return _last[0][1]
+
+
+def _arrays(left: Any) -> Iterator[np.ndarray]:
+    for item in fields(left) if left is not None else ():
+        value = getattr(left, item.name)
+        if isinstance(value, np.ndarray):
+            yield value
+        else:  # selections
+            for time, rows in value:
+                yield np.array([time])
+                yield rows

@@ -1,0 +1,213 @@
+"""What is interrupted goes on where it was and gives the same, to the last bit; what it leaves is no result."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError, StoppedError
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow import journal, stopping
+from flexclear.pipeline.dynamics.run import pieces, trajectory
+from flexclear.pipeline.post import derive
+from flexclear.pipeline.post.overview import comparison
+from tests.analytic.integrator_scenes import double_pendulum, engine_with
+
+#: evaluations between two looks, so few that a short run has many
+SLICE = 30
+
+
+class KilledError(BaseException):
+    """Nothing is written any more."""
+
+
+@pytest.fixture
+def often(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Work is looked at often, and its state is written each time."""
+    monkeypatch.setattr(trajectory, "SLICE", SLICE)
+    monkeypatch.setattr(journal, "EVERY", -1.0)
+    monkeypatch.setattr(journal, "SHARE", np.inf)
+    monkeypatch.setattr(os, "fsync", lambda file: None)  # a busy disk takes its time
+
+
+def interrupted(
+    work: Callable[[], Any], folder: Path, monkeypatch: pytest.MonkeyPatch, looks_each: int = 4
+) -> tuple[Any, int]:
+    """The result of work that is killed again and again after some looks, and how often it was."""
+    kills, looks = 0, 0
+    proper = trajectory._stop_when_asked
+
+    def look(*arguments: Any) -> None:
+        nonlocal looks
+        looks += 1
+        if looks % looks_each == 0:
+            raise KilledError
+        proper(*arguments)
+
+    monkeypatch.setattr(trajectory, "_stop_when_asked", look)
+    while True:
+        try:
+            with journal.kept(folder, "key") as kept:
+                found = work()
+        except KilledError:
+            kills += 1
+            assert kills < 2000, "work does not get on"
+        else:
+            assert list(folder.glob("key.*.part"))
+            kept.remove()
+            assert not list(folder.iterdir())
+            monkeypatch.setattr(trajectory, "_stop_when_asked", proper)
+            return found, kills
+
+
+def check(root: Path, name: str, **changes: Any) -> Scene:
+    return edited(load_scene(root / "scenes" / "checks" / f"{name}.toml"), changes)
+
+
+def smooth(solver: dict[str, Any]) -> Scene:
+    """Two hinges, and of adaptive methods a tolerance that gives some hundred evaluations or more."""
+    rtol = 1e-5 if INTEGRATORS[solver["integrator"]].implicit else 1e-9
+    return Scene.model_validate({**double_pendulum(), "solver": {"rtol": rtol, **solver}})
+
+
+ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]
+SOLVERS = [{"integrator": name, "step": 4e-3} for name in INTEGRATORS] + [{"integrator": name} for name in ADAPTIVE]
+
+
+@pytest.mark.usefixtures("often")
+@pytest.mark.parametrize("solver", SOLVERS, ids=lambda solver: " ".join(map(str, solver.values())))
+def test_a_killed_run_goes_on_to_the_same_bits_under_every_integrator(
+    solver: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = smooth(solver)
+    whole = dynamics.simulate(scene, {}, silent)
+    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch)
+    assert kills >= 1
+    assert found.identical(whole)
+
+
+#: scene -> a kill after so many looks, and changes of the scene
+RUNS: dict[str, tuple[int, dict[str, Any]]] = {
+    # contacts and the run's twin
+    "bounce": (20, {}),
+    "bounce, implicit": (200, {"solver.integrator": "radau"}),
+    # runs at several tolerances, each with a twin
+    "bounce, accurate": (60, {"accuracy": {"ball.position": "1e-4 m"}, "solver.rtol": 1e-7}),
+    # controllers whose samples end steps
+    "controllers": (2, {"solver.rtol": 1e-12}),
+    # polynomials over singular poses, redundant closures
+    "four_bars_2": (3, {"time.end": 2.0}),
+}
+
+
+@pytest.mark.usefixtures("often")
+@pytest.mark.parametrize("name", RUNS)
+def test_a_killed_run_goes_on_to_the_same_bits_whatever_it_has(
+    name: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looks, changes = RUNS[name]
+    scene = check(root, name.partition(",")[0], **changes)
+    whole = dynamics.simulate(scene, {}, silent)
+    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, looks)
+    assert kills >= 1
+    assert found.identical(whole)
+
+
+@pytest.mark.usefixtures("often")
+def test_a_killed_ensemble_goes_on_to_the_same_bits(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = check(root, "bounce", ensemble={"members": 3})
+    whole = dynamics.ensemble(scene, {}, silent)
+    found, kills = interrupted(lambda: dynamics.ensemble(scene, {}, silent), tmp_path, monkeypatch)
+    assert kills >= 3
+    assert found.identical(whole)
+
+
+@pytest.mark.usefixtures("often")
+def test_killed_sections_go_on_to_the_same_bits(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    sections = {"transient": 2, "periods": 20, "exponent_periods": 20}
+    scene = check(root, "driven_pendulum", sections=sections, **{"solver.rtol": 1e-10})
+    whole = dynamics.sections(scene, {}, silent)
+    found, kills = interrupted(lambda: dynamics.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
+    assert kills >= 1
+    assert found.identical(whole)
+
+
+@pytest.mark.usefixtures("often")
+def test_times_that_are_measured_are_those_of_all_attempts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = smooth({"integrator": "dop853", "rtol": 1e-13})
+    alone = dynamics.cost(scene, {}, silent)
+    found, kills = interrupted(lambda: dynamics.cost(scene, {}, silent), tmp_path, monkeypatch)
+    assert kills >= 1
+    assert found.run.identical(alone.run)
+    # ten times either way: what is measured here are milliseconds of a machine that is shared
+    assert 0.1 < np.median(found.integration) / np.median(alone.integration) < 10.0
+
+
+@pytest.mark.usefixtures("often")
+def test_what_is_left_of_a_piece_is_not_used_when_a_bit_of_it_has_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = smooth({"integrator": "dop853"})
+    whole = dynamics.simulate(scene, {}, silent)
+
+    def damaged() -> xr.Dataset:
+        for path in tmp_path.glob("*.part"):
+            content = bytearray(path.read_bytes())
+            content[len(content) // 2] ^= 1
+            path.write_bytes(content)
+        monkeypatch.setattr(trajectory, "SLICE", 2 * trajectory.SLICE)  # else it would never end
+        return dynamics.simulate(scene, {}, silent)
+
+    found, kills = interrupted(damaged, tmp_path, monkeypatch)
+    assert kills >= 1
+    assert found.identical(whole)
+
+
+@pytest.mark.usefixtures("often")
+def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = smooth({"integrator": "dop853"})
+    whole = dynamics.simulate(scene, {}, silent)
+    monkeypatch.setattr(stopping, "_why", "")
+
+    def progress(share: float | None, text: str) -> None:
+        if share is not None and share > 0.3:
+            stopping.request("the time is over")
+
+    with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):
+        dynamics.simulate(scene, {}, progress)
+    monkeypatch.setattr(stopping, "_why", "")
+    assert told.value.exit_code == 4
+    left = told.value.partial
+    assert left.attrs["complete"] == 0
+    assert left.attrs["stopped_at"] == left.time[-1] < whole.time[-1]
+    assert left.position.identical(whole.position[: left.sizes["time"]])
+    with pytest.raises(InputError, match=r"not complete: it was stopped at t = 0\.\d+ s \(the time is over\)"):
+        derive(left)
+    with pytest.raises(InputError, match="not complete"):
+        comparison.assemble({"whole": whole, "left": left}, {}, [])
+    with journal.kept(tmp_path, "key") as kept:
+        assert dynamics.simulate(scene, {}, silent).identical(whole)
+    assert kept.restored > 0.0
+
+
+def test_work_on_another_processor_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its numbers differ in their last bits."""
+    engine = engine_with(smooth({"integrator": "dop853"}))
+    here = pieces.digest(engine)
+    assert pieces.digest(engine) == here
+    monkeypatch.setattr(pieces, "processor", lambda: "another")
+    assert pieces.digest(engine) != here
