@@ -31,7 +31,8 @@ SHORTEST_SEGMENT = 1e-12
 class Straight:
     """Code for one wiring (`run.specialised`), shared by the engines of one work space.
 
-    wanted: whether all integrations shall use it.  used: whether the present one does.  addresses: where it is, by the closure rows that it solves for; 0: nowhere.
+    wanted: whether all integrations shall use it.  used: whether the present one does.
+    addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     """
 
     wanted: bool = False
