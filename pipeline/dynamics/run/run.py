@@ -135,6 +135,7 @@ def follow(
     except StiffError as stiff:
         progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
         second = other()
+        second.straight.wanted = engine.straight.wanted
         return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
 
 
