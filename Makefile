@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow bench atlas chaos clean
+.PHONY: all help setup check test test-slow bench atlas chaos docs clean
 
 VENV := .venv
 READY := $(VENV)/.ready
@@ -39,6 +39,12 @@ chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (two hours;
 
 atlas: $(READY) ## Stability of 301 hard cases: docs/stability.md (half an hour; goes on where it stopped)
 	@$(RUN) -m benchmarks stability
+
+docs: $(READY) ## The documentation as a site: results/site/index.html
+	@$(RUN) -c 'import mkdocs' 2>/dev/null || \
+	$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	@$(RUN) -m mkdocs build --quiet --strict --config-file benchmarks/site/mkdocs.yml
+	@echo results/site/index.html
 
 clean: ## Remove results and caches; .venv stays
 	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

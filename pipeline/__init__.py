@@ -60,6 +60,10 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
 
     override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
+
+    >>> import flexclear as fc
+    >>> fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
+    <Scene checks/pendulum: 1 rigid body, 1 joint, 1 load; 0 to 0.2 s>
     """
     from flexclear.pipeline.core.scene.load import load_scene as load
     from flexclear.pipeline.core.scene.load import scene_of
@@ -71,6 +75,10 @@ def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
     """A copy of a scene with dotted places changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
 
     Raises InputError.
+
+    >>> import flexclear as fc
+    >>> fc.edited(fc.load_scene("scenes/checks/pendulum.toml"), {"body.bob.mass": "200 g"}).body["bob"].mass
+    0.2
     """
     from flexclear.pipeline.core.scene.load import edited as changed
 
@@ -81,6 +89,11 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     """Dataset of the simulate stage (schema RUN), from the cache when fresh.
 
     Raises FlexclearError: InputError, SolverError or ResourceError.
+
+    >>> import flexclear as fc
+    >>> run = fc.run(fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"}))
+    >>> round(float(run["joint_position"].sel(coordinate="hinge")[-1]), 4)  # [rad]
+    0.1959
     """
     return _stages("run").run(_loaded(scene))
 
@@ -110,6 +123,13 @@ def sweep(
     workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
     more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
     The result has the parameters as dimensions.  Raises FlexclearError.
+
+    >>> import flexclear as fc
+    >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
+    >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
+    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    [1.954, 0.324]
     """
     given = {name: _plain(values) for name, values in vary.items()}
     table = {"vary": given, "keep": list(keep), **more}
@@ -145,6 +165,11 @@ def equilibrium(
     moving: the drives keep the speed of that moment; the pose is then one of steady motion, as of a rotor.
     A drive that does not hold the mechanism leaves it free to settle: a ball falls onto its socket's floor.
     Raises FlexclearError: InputError, SolverError (also when nothing balances the loads) or ResourceError.
+
+    >>> import flexclear as fc
+    >>> rest = fc.equilibrium("scenes/checks/oscillator.toml")
+    >>> round(rest["position"].sel(body="mass", axis="z").item(), 9)  # where its spring is free [m]
+    0.25
     """
     return _linear(scene, time, drives, moving=moving, vibrations=False)
 
@@ -159,6 +184,11 @@ def frequencies(
     """Natural frequencies, damping and shapes of the assembled mechanism about `equilibrium` (schema LINEAR).
 
     Arguments and errors as there.
+
+    >>> import flexclear as fc
+    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
+    (1.5836, 0.1)
     """
     return _linear(scene, time, drives, moving=moving, vibrations=True)
 

@@ -12,18 +12,20 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.errors import InputError, InputErrors
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.load import compose, load_scene
+from flexclear.pipeline.core.scene.load import compose, load_scene, read_toml
 from flexclear.pipeline.core.scene.references import dangling
-from flexclear.stages import run, s1_mesh
+from flexclear.stages import run, s1_mesh, s3_rigid
 from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.pipeline.core.scene.schema import Scene
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene or sweep file, or a name below scenes/")
     parser.add_argument("--json", action="store_true", help="print the mistakes as JSON")
 
 
@@ -34,7 +36,7 @@ def command(options: argparse.Namespace) -> int:
         mistakes, scene = examined(name)
         found |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and scene is not None and not options.json:
-            print(f"{scene.path}: {scene.summary()}; no mistake found")
+            print(f"{run.find_scene(name)}: {scene.summary()}; no mistake found")
     if options.json:
         print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
     else:
@@ -50,6 +52,8 @@ def examined(name: str) -> tuple[list[InputError], Scene | None]:
     found: list[InputError] = []
     try:
         path = run.find_scene(name)
+        if _is_sweep(path):
+            return _of_sweep(path)
         found += dangling(compose(path), run.recipe_frames, str(path))
     except InputError as error:
         return _each(error), None
@@ -62,9 +66,29 @@ def examined(name: str) -> tuple[list[InputError], Scene | None]:
     if scene is not None:
         found += _collect([lambda: Graph(scene).up_to("post")], path)
         found += _collect(_laws(scene), path)
-        if not found and not scene.recipes():
+        if not found and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
             found += _collect([lambda: _assembled(scene)], path)
     return list({str(error): error for error in found}.values()), scene
+
+
+def _is_sweep(path: Path) -> bool:
+    """Whether a file is a sweep of a scene: it has no bodies and extends nothing, but says what is varied or kept."""
+    table = read_toml(path)
+    return not {"body", "extends"} & set(table) and bool({"vary", "keep", "scene"} & set(table))
+
+
+def _of_sweep(path: Path) -> tuple[list[InputError], Scene | None]:
+    """All mistakes of a sweep, its own and those of its scene, and that scene."""
+    from flexclear.stages import sweep, sweep_plan
+
+    try:
+        wanted, scene = sweep.read(path)
+    except InputError as error:
+        return _each(error), None
+    found, _ = examined(str(scene.path))
+    if not found:
+        found = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
+    return found, scene
 
 
 def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
@@ -102,11 +126,34 @@ def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
 
 
 def _assembled(scene: Scene) -> None:
-    """Build the mechanism of a scene of rigid bodies: poses, axes and loads are then checked against the joints."""
+    """Build the mechanism of a scene: poses, axes and loads are then checked against the joints.
+
+    Of bodies from recipes of beams, which are meshed in no time, mass and frames are known without their modes; of
+    flexible ones it is looked whether the joints fit where nothing is deformed.
+    """
+    from flexclear.pipeline.dynamics.model.assembly import assembled
     from flexclear.pipeline.dynamics.model.mechanism import build
     from flexclear.pipeline.dynamics.model.model import tabulate
 
-    tabulate(build(scene, {}))
+    bodies = {name: _undeformed(Path(mesh)) for name, mesh in scene.recipes().items()}
+    meshed = {f"{s3_rigid.PREFIX}{name}": bodies[name] for name in scene.meshed()}
+    if meshed:
+        table = scene.model_dump(mode="python", exclude_none=True)
+        table["body"] = s3_rigid.filled(table["body"], meshed)
+        scene = type(scene).model_validate(table)
+    if scene.flexible():
+        assembled(build(scene, {name: bodies[name] for name in scene.flexible()}))
+    else:
+        tabulate(build(scene, {}))
+
+
+def _undeformed(recipe: Path) -> xr.Dataset:
+    """Mass, inertia and frames of a beam (schema RIGID)."""
+    from flexclear.pipeline.structure.fe import mesh
+    from flexclear.pipeline.structure.fe.recipe import read_recipe
+    from flexclear.pipeline.structure.modes import rigid
+
+    return rigid.build(mesh.build(read_recipe(recipe), place=str(recipe)))
 
 
 def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[InputError]:

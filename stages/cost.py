@@ -36,6 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     run.scene_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
+    run.json_argument(parser)
     parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
     parser.add_argument(
         "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
@@ -50,7 +51,7 @@ def command(options: argparse.Namespace) -> None:
     place, studies = run.workplace(options), {}
     for graph in run.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
-        if not options.integrators:
+        if not options.integrators and not options.json:
             # the points of the scene's own method come first: a table within a minute, of which the whole study is more
             _, folder = bring(scene, place, others, [scene.solver.integrator])
             print(
@@ -59,8 +60,14 @@ def command(options: argparse.Namespace) -> None:
                 sep="\n",
             )
         studies[scene.name] = _, folder = bring(scene, place, others, options.integrators)
-        print(*((folder / name).read_text(encoding="utf-8") for name in PRINTED if (folder / name).is_file()), sep="\n")
-        print(f"figures and data: {folder}\n")
+        if not options.json:
+            print(
+                *((folder / name).read_text(encoding="utf-8") for name in PRINTED if (folder / name).is_file()),
+                sep="\n",
+            )
+            print(f"figures and data: {folder}\n")
+    if options.json:
+        print(run.as_json({name: found for name, (found, _) in studies.items()}))
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
         said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""

@@ -18,6 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
     parser.add_argument("--moving", action="store_true", help="the drives keep their speed: steady motion")
+    run.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -27,7 +28,8 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    print(text(run.linear(graph.scene, time, moving=options.moving)), end="")
+    found = run.linear(graph.scene, time, moving=options.moving)
+    print(run.as_json(found) if options.json else text(found).rstrip("\n"))
 
 
 def text(linear: xr.Dataset) -> str:

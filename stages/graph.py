@@ -159,10 +159,23 @@ class Graph:
         return self._scene_task("post", "flexclear.stages.s5_post:run", {}, inputs, names={"nc": "post.nc"})
 
     @cached_property
-    def render(self) -> Task:
-        """Pictures and film."""
-        inputs = {"run": self.simulate, **self.bodies()}
-        return self._scene_task("render", "flexclear.stages.s6_render:run", s6_render.params(self.scene), inputs)
+    def render(self) -> dict[str, Task]:
+        """Picture, film and page of the motion, and the page of the modes; by what is shown and how."""
+        pairs = [("motion", "png"), ("motion", "mp4"), ("motion", "html")]
+        pairs += [("modes", "html")] if self.scene.flexible() else []
+        return {f"{what} {kind}": self.picture(what, kind) for what, kind in pairs}
+
+    def picture(self, what: str, kind: str, time: float | None = None) -> Task:
+        """One of what `s6_render.FORMATS` lists; `time`: of vibrations, as of `linear`."""
+        params = s6_render.params(self.scene, what, kind)
+        bundles = {f"bundle/{body}": task for body, task in self.bundle.items()}
+        source = (
+            {} if what == "modes" else {"linear": self.linear(time)} if what == "vibrations" else {"run": self.simulate}
+        )
+        inputs: dict[str, Task] = {**source, **bundles}
+        task = self._scene_task("render", "flexclear.stages.s6_render:run", params, inputs)
+        folder = self._folder("paraview" if kind == "pvd" else "")
+        return replace(task, part=f"{what} {kind}", folder=folder)
 
     def linear(
         self,

@@ -1,4 +1,4 @@
-"""The report of one scene: film, figures, comparison with its ideal twin, assumptions, doubts."""
+"""The report of one scene: the answer, then film, figures, comparison with its ideal twin, assumptions, doubts."""
 
 from __future__ import annotations
 
@@ -17,36 +17,59 @@ from flexclear.stages.run import Workplace, check, in_file
 if TYPE_CHECKING:
     import xarray as xr
 
-#: general figures, in this order, and their captions
+#: general figures, in this order: caption, and what a reader who does not see them is told
 FIGURES = {
-    "motion.png": "Motion",
-    "reactions.png": "Reactions and drives",
-    "contacts.png": "Joints with clearance",
-    "energy.png": "Energy",
+    "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
+    "reactions.png": (
+        "Reactions and drives",
+        "Magnitude of the force in each joint, and what drives supply, over time",
+    ),
+    "contacts.png": (
+        "Joints with clearance",
+        "Path of the ball or pin in its socket, the gap, and the normal force over time",
+    ),
+    "wear.png": ("Wear of contacts", "Load times sliding way over time, and how deep the surfaces wear over the angle"),
+    "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
+    "energy.png": ("Energy", "Energies over time, and what their ledger misses"),
 }
 #: of a run's attributes, those that tell how it was made
-FACTS = ("method", "evaluations", "steps", "rejected_steps", "switched", "redundant_closure_rows", "versions")
+COST = ("method", "evaluations", "steps", "rejected_steps", "jacobians", "projections")
+STABILITY = ("switched", "stiff_share", "redundant_closure_rows", "accuracy_verdict")
+PROVENANCE = ("scene", "versions", "Conventions")
 
 
-def make(graph: Graph, place: Workplace) -> Path:
-    """Bring everything that the report of a scene shows up to date; returns the page, one file with all inside.
+def make(graph: Graph, place: Workplace, *, folder: bool = False) -> Path:
+    """Bring everything that the report of a scene shows up to date; returns the page.
 
-    Without GL libraries it has no film.  Raises FailedTasksError when the run itself cannot be made.
+    One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
+    it has no film.  Raises FailedTasksError when the run itself cannot be made.
     """
     scene = graph.scene
     compared = None
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], place, "both")
-    outcome = place.bring([graph.overview, graph.render])
-    if any(failure.task is not graph.render for failure in outcome.failures):
+    drawn = graph.render
+    outcome = place.bring([graph.overview, *drawn.values()])
+    if any(failure.task not in drawn.values() for failure in outcome.failures):
         check(outcome)
     for failure in outcome.failures:
-        place.monitor.say(f"no film: {failure.message}")
+        place.monitor.say(f"not in the report: {failure.message}")
     run = place.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
-    target = place.store.root / f"runs/{scene.name}" / "report.html"
-    publish(target, _page(graph, place, outcome.records, compared, run))
-    return target
+    text = _page(graph, place, outcome.records, compared, run)
+    return publish_page(place.store.root / f"runs/{scene.name}", "report", text, folder=folder)
+
+
+def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
+    """Write a page as ``<name>.html``, or as ``<name>/index.html`` with its files beside it."""
+    if not folder:
+        publish(where / f"{name}.html", page)
+        return where / f"{name}.html"
+    from flexclear.pipeline.post.overview.page import in_folder
+
+    for file, content in in_folder(page).items():
+        publish(where / name / file, content)
+    return where / name / "index.html"
 
 
 def _page(
@@ -56,40 +79,116 @@ def _page(
     compared: compare.Comparison | None,
     run: xr.Dataset | None,
 ) -> bytes:
-    from flexclear.pipeline.post.overview.page import Part, listed, page
+    from flexclear.pipeline.post.overview.answer import answer, by_weight, effects
+    from flexclear.pipeline.post.overview.page import Part, downloads, listed, page
+    from flexclear.pipeline.post.series import parameters
 
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
-    facts = {name.replace("_", " "): str(attributes[name]) for name in FACTS if attributes.get(name) not in (None, "")}
-    assumed = json.loads(attributes.get("assumptions", "{}"))
+    assumed = by_weight(json.loads(attributes.get("assumptions", "{}")), run)
     parts: list[Any] = [
-        Part("film", "The mechanism moving", _media(place, graph.render, records, _films(graph.render, records))),
+        Part("film", "The mechanism moving", _moving(graph, place, records)),
         Part("run", "The run", _media(place, graph.overview, records, FIGURES)),
-    ]
-    parts += compare.parts(compared) if compared is not None else []
-    parts += [
+        *(compare.parts(compared) if compared is not None else []),
         Part("doubts", "To be doubted", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("", "warning"))),
-        Part("assumptions", "Assumptions", listed(assumed, ("value", "assumption"))),
-        Part("facts", "How it was computed", listed(facts, ("", ""))),
+        Part("assumptions", "Assumptions, those on which most hangs first", listed(assumed, ("value", "assumption"))),
+        Part(
+            "effects",
+            "Effects present and absent",
+            listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
+        ),
+        Part("cost", "What it cost", listed(_told(attributes, COST), ("", ""))),
+        Part("stability", "How firmly it stands", listed(_stability(run), ("", ""))),
+        Part("provenance", "Where it comes from", listed(_provenance(graph, place, records), ("", ""))),
+        Part("downloads", "To take away", downloads(_files(graph, compared))),
     ]
-    return page(scene.title, " ".join(scene.description.split()) or scene.name, parts)
+    dataset = None if compared is None else compared.dataset()
+    lead = " ".join(scene.description.split()) or scene.name
+    return page(scene.title, lead, parts, answer(dataset, run, doubts))
 
 
-def _films(render: Task, records: Mapping[int, Record]) -> dict[str, str]:
-    files = records[id(render)].files if id(render) in records else {}
-    film = next((name for name in files if name.startswith("film.")), None)
-    return {film: "Film"} if film else {"mechanism.png": "The mechanism"} if "mechanism.png" in files else {}
+def _told(attributes: Mapping[Any, Any], names: tuple[str, ...]) -> dict[str, str]:
+    """Attributes in words; whole numbers in groups of three."""
+    found = {}
+    for name in names:
+        value = attributes.get(name)
+        if value not in (None, ""):
+            whole = isinstance(value, int) or (getattr(value, "dtype", None) is not None and value.dtype.kind in "iu")
+            found[name.replace("_", " ")] = (
+                f"{int(value):,}" if whole else f"{value:.4g}" if isinstance(value, float) else str(value)
+            )
+    return found
 
 
-def _media(place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, str]) -> str:
+def _stability(run: xr.Dataset | None) -> dict[str, str]:
+    if run is None:
+        return {}
+    found = _told(run.attrs, STABILITY)
+    end = float(run["time"].values[-1])
+    horizon = float(run["horizon"]) if "horizon" in run else end
+    found["neighbouring starts"] = (
+        "stay together to the end" if horizon >= end else f"part after {1e3 * horizon:.4g} ms of {1e3 * end:.4g} ms"
+    )
+    for name, label, unit in (
+        ("energy_error", "largest energy that the ledger misses", "J"),
+        ("constraint_error", "largest opening of a loop", "m"),
+    ):
+        if name in run:
+            found[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
+    return found
+
+
+def _provenance(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> dict[str, str]:
+    found = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
+    record = records.get(id(graph.simulate))
+    if record is not None:
+        found |= _told(place.store.load(record).attrs, PROVENANCE)
+        found["digest of the run"] = record.digest
+    found["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
+    return found
+
+
+def _files(graph: Graph, compared: compare.Comparison | None) -> dict[str, bytes]:
+    """The scene as it was written, with what it extends, its recipes, and the tables; small enough for any page."""
+    found = {}
+    if graph.scene.path is not None:
+        found[graph.scene.path.name] = graph.scene.path.read_bytes()
+    for recipe in graph.scene.recipes().values():
+        found[Path(recipe).name] = Path(recipe).read_bytes()
+    if compared is not None:
+        for name in ("differences.csv", "costs.csv"):
+            if name in compared.record.files:
+                found[name] = compared.file(name).read_bytes()
+    return found
+
+
+def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> str:
+    """The film, and the views that can be turned."""
+    from flexclear.pipeline.post.pages import figures_of
+
+    text = ""
+    for what, task in graph.render.items():
+        record = records.get(id(task))
+        if record is None:
+            continue
+        if what.endswith("html"):
+            for name in sorted(record.files):
+                text += figures_of(place.store.path(task.stage, record.key, name).read_text(encoding="utf-8"))
+        elif what == "motion mp4":
+            names = {name: ("The mechanism moving", f"Film of {graph.scene.title}") for name in record.files}
+            text = _media(place, task, records, names) + text
+    return text
+
+
+def _media(place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]) -> str:
     from flexclear.pipeline.post.overview.page import media
 
     record = records.get(id(task))
     if record is None:
         return ""
     return "".join(
-        media(name, place.store.path(task.stage, record.key, name).read_bytes(), text)
-        for name, text in captions.items()
+        media(name, place.store.path(task.stage, record.key, name).read_bytes(), text, alt)
+        for name, (text, alt) in captions.items()
         if name in record.files
     )

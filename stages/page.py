@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -22,5 +24,5 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     results = Path(params["results"])
     attributes = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})
-    content = report.collect(results, attributes, params["rendered"])
+    content = report.collect(results, attributes, params["rendered"], TREE)
     return {"index.html": report.page(content), "paper.md": report.paper_markdown(content).encode()}

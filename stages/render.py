@@ -1,28 +1,81 @@
-"""``flexclear render``: pictures, film and interactive page of scenes."""
+"""``flexclear render``: pictures, films and pages of scenes, their modes, joints and vibrations."""
 
 from __future__ import annotations
 
 import argparse
 
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.units import quantity
 from flexclear.stages import run
+from flexclear.stages.graph import Graph
+from flexclear.stages.s6_render import FORMATS
 
-#: what is told of the files that are made
-FILES = {
-    "film.mp4": "the film",
-    "film.gif": "the film",
-    "mechanism.png": "the mechanism",
-    "run.nc": "the run",
-}
+#: what is made where nothing is asked for
+USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     run.scene_arguments(parser)
+    parser.add_argument(
+        "--what",
+        choices=FORMATS,
+        help="the motion, the modes of flexible bodies, joints with clearance, or vibrations about equilibrium; "
+        "default: motion and modes",
+    )
+    known = list(dict.fromkeys(kind for kinds in FORMATS.values() for kind in kinds))
+    parser.add_argument(
+        "--format",
+        choices=known,
+        help="picture (png), film (gif, mp4), page to turn (html), or for other programs: gltf, pvd (ParaView); "
+        "default: what suits",
+    )
+    parser.add_argument("--at", metavar="TIME", help="of vibrations: time whose drive positions are held, e.g. '90 ms'")
 
 
 def command(options: argparse.Namespace) -> None:
-    """Bring them up to date."""
+    """Bring them up to date and say where they are."""
+    wanted = _wanted(options.what, options.format)
+    if options.at is not None and options.what != "vibrations":
+        raise InputError("--at", "belongs to --what vibrations")
+    try:
+        time = None if options.at is None else quantity(options.at, "time")
+    except ValueError as error:
+        raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
     graphs, place = run.graphs(options.scenes, options.set), run.workplace(options)
-    run.check(place.bring([graph.render for graph in graphs]))
-    for graph in graphs:
-        run.told(place.store.root / graph.render.folder, FILES)
+    tasks = {graph.scene.name: _tasks(graph, wanted, options.what is not None, time) for graph in graphs}
+    outcome = place.bring([task for found in tasks.values() for task in found])
+    for found in tasks.values():
+        for task in found:
+            record = outcome.records.get(id(task))
+            if record is not None:
+                _tell(place, task.folder, list(record.files))
+    run.check(outcome)
+
+
+def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
+    """What is to be made.  Raises InputError for what cannot be shown so."""
+    if what is None and kind is None:
+        return list(USUAL)
+    if what is None:
+        what = "motion"
+    if kind is None:
+        return [(what, next(k for k in ("mp4", "html", "png") if k in FORMATS[what]))]
+    if kind not in FORMATS[what]:
+        raise InputError(
+            f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}"
+        )
+    return [(what, kind)]
+
+
+def _tasks(graph: Graph, wanted: list[tuple[str, str]], asked: bool, time: float | None) -> list:
+    """One task for each; of what is usual, modes only where there are some."""
+    there = [pair for pair in wanted if asked or pair[0] != "modes" or graph.scene.flexible()]
+    with run.in_file(graph.scene.path):
+        return [graph.picture(what, kind, time) for what, kind in there]
+
+
+def _tell(place: run.Workplace, folder: str, files: list[str]) -> None:
+    shown = [name for name in sorted(files) if not name.endswith(".vtp")]
+    rest = len(files) - len(shown)
+    print(f"{run.near(place.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")

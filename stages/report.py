@@ -31,6 +31,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenes", nargs="*", metavar="SCENE", help="the report of these scenes; without any, that of the paper"
     )
+    parser.add_argument(
+        "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
+    )
     run.common_arguments(parser)
 
 
@@ -38,12 +41,12 @@ def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
     place = run.workplace(options)
     if not options.scenes:
-        print(make(place))
+        print(run.near(make(place, folder=options.folder)))
         return
     from flexclear.stages import own_report
 
     for graph in run.graphs(options.scenes, options.set):
-        print(run.near(own_report.make(graph, place)))
+        print(run.near(own_report.make(graph, place, folder=options.folder)))
 
 
 @dataclass(frozen=True)
@@ -92,8 +95,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 
-def make(place: Workplace) -> Path:
-    """Bring everything that the report shows up to date; returns the page.
+def make(place: Workplace, *, folder: bool = False) -> Path:
+    """Bring everything that the report shows up to date; returns the page; with `folder` one with files beside it.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
@@ -108,7 +111,12 @@ def make(place: Workplace) -> Path:
 
         place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(shown)
-    return place.store.root / "report" / "index.html"
+    target = place.store.root / "report" / "index.html"
+    if not folder:
+        return target
+    from flexclear.stages.own_report import publish_page
+
+    return publish_page(target.parent, "folder", target.read_bytes(), folder=True)
 
 
 def figure_tasks(place: Workplace, scenes: Scenes) -> list[Task]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import re
 import time
@@ -12,12 +13,13 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
 from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
+from flexclear.pipeline.core.log import set_level
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
@@ -113,6 +115,34 @@ def _deadline(options: argparse.Namespace | None) -> tuple[float, str]:
     return seconds, f"the time that --limit {text} gives is over"
 
 
+def json_argument(parser: argparse.ArgumentParser) -> None:
+    """For scripts: what else is printed, as JSON."""
+    parser.add_argument("--json", action="store_true", help="print the results as JSON")
+
+
+def as_json(found: object) -> str:
+    """A result as JSON; datasets as their variables with dimensions, units and values, and their attributes."""
+    return json.dumps(found, indent=2, default=_plain, allow_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    if hasattr(value, "data_vars"):
+        variables = {
+            str(name): {"dims": list(data.dims), "units": data.attrs.get("units", ""), "values": _finite(data.values)}
+            for name, data in value.variables.items()
+        }
+        return {"attributes": dict(value.attrs), "variables": variables}
+    return _finite(value) if hasattr(value, "tolist") else str(value)
+
+
+def _finite(values: Any) -> Any:
+    """Numbers of an array as lists; those that JSON does not have are null."""
+    plain = values.tolist() if hasattr(values, "tolist") else values
+    if isinstance(plain, list):
+        return [_finite(value) for value in plain]
+    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
+
+
 def told(folder: Path, files: Mapping[str, str]) -> None:
     """One line on what was written where, of those files that are there."""
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
@@ -162,11 +192,13 @@ class MissedAccuracyError(SolverError):
 
 
 def workplace(options: argparse.Namespace | None = None) -> Workplace:
-    """The usual one: results beside the project's sources, or where FLEXCLEAR_RESULTS says.
+    """The usual one, with results where `results_root` says.
 
     options: of a command, with `jobs`, its `limit` and how much is said.
     """
-    monitor = Monitor(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    if options is not None:
+        set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    monitor = Monitor()
     jobs = getattr(options, "jobs", None)
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
@@ -219,8 +251,8 @@ def rendered(scene: Scene, place: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
     place, wanted = place or workplace(), Graph(scene)
     require_names(scene)
-    check(place.bring([wanted.render], jobs=1))
-    return place.store.root / wanted.render.folder
+    check(place.bring(list(wanted.render.values()), jobs=1))
+    return place.store.root / wanted.simulate.folder
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.stages import s3_rigid
@@ -18,11 +19,12 @@ if TYPE_CHECKING:
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, views, limits, and places and names of files are not part of it,
+    """What the engine sees of a scene. Titles, views, shapes, limits, and places and names of files are not part of it,
     nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
     whether that may be missed."""
     unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
     left_out: dict[str, Any] = dict.fromkeys(unseen, True)
+    left_out["body"] = {"__all__": set(UNSEEN)}
     if not ensemble:
         left_out["accuracy"] = {"allow_missed"}
     if not sections:

@@ -1,10 +1,14 @@
-"""Stage 6: a run -> pictures, film and interactive page."""
+"""Stage 6: a run, its reduced bodies or its vibrations -> pictures, films, pages to turn, files for other programs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.appearance import UNSEEN
+from flexclear.pipeline.core.scene.load import is_file
 from flexclear.stages.s4_simulate import bundles
 
 if TYPE_CHECKING:
@@ -13,24 +17,74 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
+#: what can be shown, as what; kept here, too, because asking the modules that draw takes their import
+FORMATS: dict[str, tuple[str, ...]] = {
+    "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
+    "modes": ("png", "gif", "mp4", "html", "gltf", "pvd"),
+    "joint": ("png", "gif", "mp4"),
+    "vibrations": ("html",),
+}
+#: keys of `[view]` that pictures of solids heed
+SEEN = ("direction", "up", "zoom", "exaggeration", "duration", "impact_slowdown")
+
 
 def gl_state() -> str:
-    """Which GL libraries this machine has; part of the key of everything that is rendered."""
+    """Which GL libraries this machine has; part of the key of everything that is drawn with them."""
     from flexclear.pipeline.post.render import gl
 
     return gl.state()
 
 
-def params(scene: Scene) -> dict[str, Any]:
-    """GL libraries, what is watched, and from where, if the scene says so."""
-    asked = scene.view.direction if scene.view is not None else None
-    watched = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
-    return {"gl": gl_state(), "watched": watched} | ({} if asked is None else {"direction": list(asked)})
+def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
+    """What is shown and how: what the scene says of its pictures, what is watched, the GL libraries where they matter.
+
+    Raises InputError for files of shapes that are not there.
+    """
+    found: dict[str, Any] = {"what": what, "format": kind}
+    if what == "motion" and kind in ("png", "gif", "mp4"):
+        found["gl"] = gl_state()
+    if kind == "html":
+        found["title"] = scene.title
+    if what != "modes":
+        found["bodies"] = _looks(scene)
+    if scene.view is not None and what != "modes":
+        asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
+        found |= {"view": asked} if asked else {}
+    if what == "joint" or (what == "motion" and kind in ("gif", "mp4")):
+        found["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
+    return found
+
+
+def _looks(scene: Scene) -> dict[str, Any]:
+    """Shapes and colours of bodies, where the scene gives some; files by their names, since their content counts."""
+    found = {}
+    for name, body in scene.body.items():
+        told = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
+        for k, shape in enumerate(told.get("geometry", ())):
+            if shape["type"] == "file" and not is_file(Path(shape["file"])):
+                raise InputError(
+                    f"{scene.path or scene.name} [body.{name}.geometry.{k}]",
+                    f"there is no file {shape['file']}",
+                    "paths are relative to the scene",
+                )
+        if told:
+            found[name] = told
+    return found
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """Pictures by file name; inputs are ``run`` and ``bundle/<body>``."""
-    from flexclear.pipeline.post.render.pictures import pictures
+    """Files by name; inputs are ``run`` or ``linear``, and ``bundle/<body>``."""
+    from flexclear.pipeline.post.render.mechanism import Looks
+    from flexclear.pipeline.post.render.pictures import Shown, make
 
-    view = {"watched": params["watched"], "direction": params.get("direction")}
-    return dict(pictures(inputs["run"], bundles(inputs), progress=progress, **view))
+    shown = Shown(
+        run=inputs.get("run"),
+        linear=inputs.get("linear"),
+        bundles=bundles(inputs),
+        looks=Looks(bodies=params.get("bodies", {}), **params.get("view", {})),
+        watched=params.get("watched", ()),
+        title=str(params.get("title", "")),
+        progress=progress,
+    )
+    progress(None, f"{params['what']} as {params['format']}")
+    return dict(make(params["what"], params["format"], shown))

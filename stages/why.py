@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 
 from flexclear.pipeline.core.workflow.execute import states
 from flexclear.stages import run
@@ -13,13 +14,24 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     run.scene_arguments(parser)
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
+    run.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    place = run.workplace(options)
+    place, found = run.workplace(options), dict[str, dict[str, list[str]]]()
     for graph in run.graphs(options.scenes, options.set):
-        print(graph.scene.name)
-        for state in states(graph.up_to(options.to), place.store, place.sources):
-            lines = list(state.why) or ["fresh"]
-            print(f"  {state.task.label:<16} {lines[0]}", *(f"  {'':<16} {line}" for line in lines[1:]), sep="\n")
+        stages = states(graph.up_to(options.to), place.store, place.sources)
+        found[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
+    print(run.as_json(found) if options.json else text(found))
+
+
+def text(found: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
+    """For each scene its stages, and why each would run again."""
+    told = []
+    for scene, stages in found.items():
+        told.append(scene)
+        for label, why in stages.items():
+            first, *others = why or ["fresh"]
+            told += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
+    return "\n".join(told)

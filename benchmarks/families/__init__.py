@@ -13,4 +13,5 @@ NAMES = {
     "stability": "stability:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
+    "gallery": "gallery:FAMILY",
 }

@@ -5,12 +5,18 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable
+from functools import partial
 
 from benchmarks.page import DOCS
-from benchmarks.site import datasets
+from benchmarks.site import datasets, index, keys, python
 
 #: page below docs/ -> what makes its text
-PAGES: dict[str, Callable[[], str]] = {"datasets.md": datasets.text}
+PAGES: dict[str, Callable[[], str]] = {
+    "index.md": index.text,
+    "reference/python.md": python.text,
+    "datasets.md": datasets.text,
+    **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
+}
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from benchmarks.page import DOCS
+from benchmarks.site.text import table
 from flexclear.pipeline.core.artifacts import schema as artifacts
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.schema import Schema
 from flexclear.pipeline.core.variable import Variable
-from flexclear.pipeline.post.plotting.table import pipe_table
 from flexclear.pipeline.post.schema import POST
 from flexclear.pipeline.post.verdict import VERDICT
 
@@ -73,7 +73,7 @@ def _table(schema: Schema, *, marks: bool = True) -> str:
         (f"`{name}`{'*' if marks and v.optional else ''}", ", ".join(v.dims) or "-", _units(v), v.long_name)
         for name, v in schema.items()
     ]
-    return pipe_table(("name", "dimensions", "unit", "meaning"), rows)
+    return table(("name", "dimensions", "unit", "meaning"), rows)
 
 
 def _units(variable: Variable) -> str:

@@ -30,7 +30,8 @@ WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "pi
 class Parts:
     """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
 
-    surfaces, forms, frictions: of contacts.  stops: whether joint coordinates have ends.
+    surfaces, forms, frictions: of contacts.  joint_frictions: laws of ideal joints.
+    wear: whether that of contacts is counted.  stops: whether joint coordinates have ends.
     couplings: whether they follow each other.      harmonics: whether a law of time has some.
     """
 
@@ -45,6 +46,8 @@ class Parts:
     flexible: bool = False
     stiffening: bool = False
     harmonics: bool = False
+    joint_frictions: tuple[str, ...] = ()
+    wear: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,14 @@ def most_parts(scene: Scene) -> Parts:
         flexible=bool(scene.flexible()),
         stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
+        joint_frictions=joint_frictions(scene),
+        wear=bool(scene.worn()),
     )
+
+
+def joint_frictions(scene: Scene) -> tuple[str, ...]:
+    """Friction laws of ideal joints, sorted."""
+    return tuple(sorted({joint.friction.law for joint in scene.rubbing().values() if joint.friction is not None}))
 
 
 def _laws(scene: Scene) -> set[str]:
@@ -115,6 +125,9 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]")
         if contact.friction is not None:
             yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")
+    for name, joint in scene.rubbing().items():
+        if joint.friction is not None:
+            yield Named(FRICTION_LAWS, joint.friction.law, f"[joint.{name}.friction]")
     for name, stop in scene.stop.items():
         yield Named(NORMAL_LAWS, stop.normal.law, f"[stop.{name}.normal]")
     for law in sorted(_laws(scene)):

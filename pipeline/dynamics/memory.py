@@ -141,8 +141,9 @@ class Room:
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
-    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES,
-) = _places(27)
+    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
+    N_WORN, WEAR_SLOT,
+) = _places(32)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
@@ -181,6 +182,18 @@ LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: place of the angle with its full turns among the internal states or -1
 GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
+#: ideal joints with friction. site_a, site_b: of their frames; link: whose inboard joint it is, or -1; reversed:
+#: whether that link is on the side of the first frame; closure: that it is, or -1
+RUBBING = wiring(
+    "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 n_loops bearing0 "
+    "n_bearings"
+)
+#: where such a joint rubs. kind: see `equations.joint_friction`; side, axis: of its frame; bristle: as of CONTACTS
+BEARINGS = wiring("joint kind law side axis bristle")
+RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; prescribed coordinates after the free ones
+REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels
+REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
+WORN = wiring("contact")  # contacts whose wear is counted
 GROUPS = wiring("group")  # error group of each state variable
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
@@ -193,6 +206,9 @@ PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
 #: radius: of the inner surface; shape: what else its kind of surfaces has
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2")
+#: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
+#: along the axis and per moment about it; preload: normal force that is always there
+BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
 COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
@@ -231,6 +247,14 @@ LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
+#: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
+#: origin; loss: what it takes per normal force [m/s]
+BEARING = work("load slip loss unit_moment:3 unit_force:3")
+#: reactions of the joints with friction: without it, then per normal force of each bearing; moment about the second
+#: frame's origin, force
+REACTIONS = work("moment:3 force:3")
+#: of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
+BEARING_SLOPES, BEARING_RESIDUALS, SMOOTH_MULTIPLIER = _places(3)
 INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
 MAGNITUDE, CORRECTION, LATCHED = _places(3)
 #: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
@@ -247,8 +271,10 @@ HEADER = next(_place)
 DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
 #: a contact's slots there: losses of its damping and of friction, impulse of its normal force
 CONTACT_LEDGER = layout("damping friction impulse")
+#: of contacts that wear: sliding distance [m], and time integral of normal force times sliding speed [N m]
+WEAR_LEDGER = layout("sliding load_path")
 # what an evaluation reports in n[EVALUATION]
-OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE = range(5)
+OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 
 # Control floats, from w[h[CONTROL]] on -------------------------------------------------------------------------------
 # time, next step, end of the segment, relative tolerance, length of the run, size of the mechanism, largest violation

@@ -13,7 +13,7 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
 
     Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
     that of the next opening of the same contact.  Of one that the run's end cuts short, separation
-    speed and duration are NaN.
+    speed, duration, impulse and losses are NaN.
     """
     if "event_time" not in run or "contact" not in run.sizes:
         return {}
@@ -34,7 +34,31 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
             ("contact",),
             np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
         ),
+        **_books(run, contact[strong], begun, np.where(ended, run.event_time.values[opens], np.nan)),
     }
+
+
+#: what the run's ledger books of contacts, by the name that an impact's share of it has
+BOOKS = {
+    "impact_impulse": "contact_impulse",
+    "impact_damping_loss": "contact_damping_loss",
+    "impact_friction_loss": "contact_friction_loss",
+}
+
+
+def _books(
+    run: xr.Dataset, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
+) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
+    time, found = run.time.values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
+    for name, book in BOOKS.items():
+        if book in run:
+            values, shares = run[book].values, np.full(len(contact), np.nan)
+            names = list(run.contact.values)
+            for i, c in enumerate(names.index(name) for name in contact):
+                shares[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
+            found[name] = (("impact",), shares)
+    return found
 
 
 def of_kind(run: xr.Dataset, name: str) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,40 +12,65 @@ import xarray as xr
 from flexclear.pipeline.post import figures
 from flexclear.pipeline.post.discrepancies import DISCREPANCIES
 from flexclear.pipeline.post.page import Content, html_page
+from flexclear.pipeline.post.pages import figures_of
+from flexclear.pipeline.post.pages.documents import section
 from flexclear.pipeline.post.paper import CITATION
 from flexclear.pipeline.post.plotting.table import Table, from_markdown
 
+#: what the page shows of the project's own pages: file, sections, endings of the pictures
+DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+    "accuracy": ("accuracy.md", ("What to choose", "sps4/csj", "sps4/far_csj_cb"), ("work_precision.png",)),
+    "stability": ("stability.md", ("", "One parameter at a time"), ("sweeps.png",)),
+    "chaos": ("chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
+    "conditions": ("reference-conditions.md", ("In short", "What holds of the paper's statements"), ()),
+}
+#: of a run's attributes, those that the page tells
+FACTS = ("title", "method", "evaluations", "steps", "versions")
 
-def collect(results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str) -> Content:
-    """What lies in a results folder (figures/, tables/, runs/<scene>/).
 
-    attributes: scene -> attributes of its run.  rendered: the scene whose film and pictures are shown.
-    Whatever is not there is left out.
+def collect(
+    results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str, source: Path | None = None
+) -> Content:
+    """What lies in a results folder (figures/, tables/, runs/<scene>/), and in the sources.
+
+    attributes: scene -> attributes of its run.  rendered: the scene whose film and views are shown.  source: folder
+    with `docs` and `scenes`.  Whatever is not there is left out.
     """
     tables = {
         path.stem: from_markdown(path.read_text(encoding="utf-8"))
         for path in sorted((results / "tables").glob("table*.md"))
     }
-    drawn = tuple(name for name in figures.NAMES if (results / "figures" / f"{name}.png").is_file())
+    images = {name: results / "figures" / f"{name}.png" for name in figures.NAMES}
+    drawn = {name: path.read_bytes() for name, path in images.items() if path.is_file()}
     folder = results / "runs" / rendered
     films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]
     still = folder / "mechanism.png"
+    pages = [*folder.glob("motion.html"), *sorted(folder.glob("modes_*.html"))]
     return Content(
-        figures=drawn,
+        figures=tuple(drawn),
         tables=tables,
         assumptions=merged_assumptions(attributes),
-        film=_relative(films[0], results) if films else None,
-        still=_relative(still, results) if still.is_file() else None,
-        links={
-            _link_text(path): _relative(path, results)
-            for path in sorted(folder.glob("mode*_*"))
-            if path.suffix in (".html", ".vtu")
-        },
-        facts={
-            scene: {key: str(told[key]) for key in ("title", "evaluations") if key in told}
-            for scene, told in attributes.items()
-        },
+        images=drawn,
+        film=(films[0].name, films[0].read_bytes()) if films else None,
+        still=still.read_bytes() if still.is_file() else None,
+        views="".join(figures_of(path.read_text(encoding="utf-8")) for path in pages),
+        facts={scene: {key: str(told[key]) for key in FACTS if key in told} for scene, told in attributes.items()},
+        documents={} if source is None else _documents(source / "docs"),
+        variants=() if source is None else _variants(source / "scenes" / "sps4" / "variants"),
     )
+
+
+def _documents(docs: Path) -> dict[str, str]:
+    return {key: section(docs / file, heads, endings) for key, (file, heads, endings) in DOCUMENTS.items()}
+
+
+def _variants(folder: Path) -> list[tuple[str, str]]:
+    """Name and title of each scene in a folder."""
+    found = []
+    for path in sorted(folder.glob("*.toml")):
+        title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
+        found.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
+    return found
 
 
 def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
@@ -70,7 +96,7 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[s
 
 
 def page(content: Content) -> bytes:
-    """The report, results/report/index.html: one page, images and film by relative links."""
+    """The report, results/report/index.html: one page, images and film inside."""
     return html_page(
         content, [(name, figures.title(name)) for name in content.figures], assumption_rows(content)
     ).encode()
@@ -108,10 +134,20 @@ def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
     """
     total = len(content.facts)
     grouped: dict[tuple[str, str], list[str]] = {}
-    for place, (text, scenes) in content.assumptions.items():
+    for place, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
         where = "all" if len(scenes) == total else ", ".join(scene.partition("/")[2] or scene for scene in scenes)
         grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(place.partition(" (")[0])
     return [(", ".join(f"`{place}`" for place in places), text, where) for (text, where), places in grouped.items()]
+
+
+#: parts on whose values most hangs in these scenes: the joint with clearance, the flexible rod, the layout
+WEIGHTY = ("joint.A1", "body.rod1", "body.ground", "body.platform", "drive", "joint", "body")
+
+
+def weight(place: str) -> int:
+    """The rank of a value among the assumptions; small ones come first."""
+    known = [k for k, start in enumerate(WEIGHTY) if place == start or place.startswith(f"{start}.")]
+    return known[0] if known else len(WEIGHTY)
 
 
 def scenes_of(name: str) -> tuple[str, ...]:
@@ -143,16 +179,3 @@ def _table(name: str, table: Table) -> str:
 def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [" | ".join(heads), "|".join("---" for _ in heads), *(" | ".join(row) for row in rows)]
     return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines) + "\n"
-
-
-def _relative(path: Path, results: Path) -> str:
-    return "../" + path.relative_to(results).as_posix()
-
-
-def _link_text(path: Path) -> str:
-    body = path.stem.partition("_")[2]
-    return (
-        f"mode shape of {body}, to turn in the browser"
-        if path.suffix == ".html"
-        else f"mode shapes of {body} for ParaView (VTU)"
-    )

@@ -62,10 +62,28 @@ POST: Schema = {
     "impact_peak_force": _V(("impact",), "N", "largest normal force of the contact", optional=True, turning="N m"),
     "impact_duration": _V(("impact",), "s", "duration of the contact", optional=True),
     "impact_count": _V(("contact",), "1", "closings above the impact threshold, ended or not", optional=True),
+    "impact_impulse": _V(
+        ("impact",), "N s", "impulse of the normal force in the contact", optional=True, turning="N m s"
+    ),
+    "impact_damping_loss": _V(("impact",), "J", "energy lost to the contact's damping in it", optional=True),
+    "impact_friction_loss": _V(("impact",), "J", "energy lost to the contact's friction in it", optional=True),
     "peak_force": _V(("contact",), "N", "largest normal contact force of the run", optional=True, turning="N m"),
     "peak_force_time": _V(("contact",), "s", "time of that force", optional=True),
     "peak_penetration": _V(("contact",), "m", "largest penetration of the run", optional=True, turning="rad"),
     "peak_penetration_time": _V(("contact",), "s", "time of that penetration", optional=True),
+    "wear_volume": _V(("worn",), "m3", "volume that the contact has worn, of both surfaces together", optional=True),
+    "wear_distance": _V(("worn",), "m", "sliding distance of the contact", optional=True),
+    "wear_sectors": _V(("worn",), "1", "sectors in use, around z of the frames", optional=True),
+    **{
+        f"wear_{what}_{side}": _V(("worn", "band", "sector"), units, f"{words} {surface}, by sector", optional=True)
+        for side, surface in (("outer", "socket or journal"), ("inner", "ball or pin"))
+        for what, units, words in (
+            ("depth", "m", "depth if all wear were on the"),
+            ("impulse", "N s", "impulse on the"),
+        )
+    },
+    "wear_deepest_outer": _V(("worn",), "m", "largest of these depths on the socket or journal", optional=True),
+    "wear_deepest_inner": _V(("worn",), "m", "largest of these depths on the ball or pin", optional=True),
     "contact_time_share": _V(("contact",), "1", "share of the run spent in contact", optional=True),
     "horizon": replace(RUN["horizon"], optional=False),  # where the run says none, its end
     "ensemble_horizon": _V((), "s", "where the members of the ensemble part", optional=True),

@@ -14,6 +14,7 @@ from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_stati
 from flexclear.pipeline.post.impacts import impacts, of_kind
 from flexclear.pipeline.post.rotations import angle_about_y
 from flexclear.pipeline.post.schema import POST
+from flexclear.pipeline.post.wear import wear
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
@@ -25,7 +26,7 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     Raises InputError for what is left of a run that was stopped.
     """
     require_complete(run)
-    data: Variables = {**motion(run), **contacts(run), **impacts(run)}
+    data: Variables = {**motion(run), **contacts(run), **impacts(run), **wear(run, parameters(run).get("joint", {}))}
     data["reaction"] = (("time", "joint"), reactions(run))
     data |= extremes(run, data["reaction"][1])
     end = float(run["horizon"] if "horizon" in run else run.time.values[-1])

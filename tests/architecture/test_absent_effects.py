@@ -109,6 +109,8 @@ EFFECTS = {
     "stiffening": ("import shortening", "flexclear.pipeline.dynamics.bodies.shortening"),
     "loads": ("make_loads", "flexclear.pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "flexclear.pipeline.dynamics.drives.oscillation"),
+    "joint friction": ("make_joint_friction", "flexclear.pipeline.dynamics.equations.joint_friction"),
+    "wear": ("import wearing", "flexclear.pipeline.dynamics.contact.wear"),
 }
 SPRING = ("spring-damper",)
 SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
@@ -127,6 +129,11 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
     "waves": (Parts(("prismatic",), harmonics=True), {"harmonics"}),
     "geared": (Parts(("revolute",), closures=True, couplings=True), {"closures", "couplings"}),
     "stopped": (Parts(("revolute",), forms=("hysteretic",), stops=True), {"stops", "normal law"}),
+    "rubbing hinges": (
+        Parts(("revolute",), closures=True, joint_frictions=("modified-coulomb",)),
+        {"closures", "joint friction", "friction"},
+    ),
+    "worn": (Parts(("free",), **SMOOTH, wear=True), {"contact", "normal law", "wear"}),
     "everything": (
         Parts(
             ("fixed", "spherical"),
@@ -138,6 +145,8 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
             flexible=True,
             stiffening=True,
             harmonics=True,
+            joint_frictions=("ambrosio",),
+            wear=True,
         ),
         set(EFFECTS),
     ),
@@ -163,8 +172,10 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     wanted.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
         wanted.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
+    if "joint friction" in present:
+        wanted.add("flexclear.pipeline.dynamics.joints.bearings")
     assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == wanted
-    if not {"contact", "stops"} & present:
+    if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:
         assert below(modules, FLEXIBLE) == set()

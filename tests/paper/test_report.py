@@ -11,6 +11,7 @@ import pytest
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.post import figures, report
 from flexclear.pipeline.post.discrepancies import DISCREPANCIES
+from flexclear.pipeline.post.overview.page import in_folder
 from tests.paper.material import everything
 
 RENDERED = "sps4/far_csj_cb"
@@ -41,17 +42,22 @@ def content(results):
     return report.collect(results, attributes, RENDERED)
 
 
-def test_every_link_of_the_page_leads_somewhere(results, content):
+def test_everything_that_the_page_shows_is_in_it(content):
+    """Its scripts are its own, and its images and films are written out."""
     page = report.page(content).decode()
-    links = re.findall(r"(?:src|href)='([^'#]+)'", page)
+    links = [link[:40] for link in re.findall(r"(?:src|href)='([^'#][^']*)'", page)]
     assert links
-    assert [link for link in links if not (results / "report" / link).is_file()] == []
-
-
-def test_page_needs_nothing_from_outside(content):
-    page = report.page(content).decode()
+    assert [link for link in links if not link.startswith("data:")] == []
     assert "http" not in page
-    assert "<script" not in page
+    inside = re.findall(r"href='#([^']+)'", page)
+    assert [key for key in inside if f"id='{key}'" not in page] == []
+
+
+def test_the_same_page_as_a_folder_has_its_pictures_as_files(content):
+    found = in_folder(report.page(content))
+    named = re.findall(rb"src='(files/[^']+)'", found["index.html"])
+    assert {name.decode() for name in named} == set(found) - {"index.html"}
+    assert b"data:image/png" not in found["index.html"]
 
 
 def test_page_shows_figures_tables_film_assumptions_and_discrepancies(content):

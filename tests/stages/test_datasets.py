@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from benchmarks.site import datasets
+from benchmarks.site import datasets, keys
 from benchmarks.site.__main__ import stale
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.progress import silent
@@ -48,6 +48,15 @@ def test_what_udunits_does_not_read_is_told_apart() -> None:
 
 def test_pages_are_what_the_sources_say() -> None:
     assert list(stale()) == []
+
+
+@pytest.mark.parametrize("kind", keys.HEADS)
+def test_every_key_has_a_meaning(kind: str) -> None:
+    """In words of its own, beside the name of its unit."""
+    found = re.findall(r"^## (.+)$|^\| `(\w+)` \| .*? \| (?:needed|-|`.*?`) \| (.*) \|$", keys.page(kind), re.MULTILINE)
+    rows = [(key, meaning) for _, key, meaning in found if key]
+    assert len(rows) > 15
+    assert [key for key, meaning in rows if not meaning.strip()] == []
 
 
 @pytest.fixture(scope="module")

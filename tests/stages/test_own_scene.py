@@ -7,8 +7,11 @@ import re
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
+from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
@@ -181,3 +184,63 @@ def test_a_scene_from_a_table_is_that_of_the_file(tmp_path: Path, monkeypatch: p
 
 def test_every_template_is_a_kind_that_new_knows():
     assert {path.name.replace("_", "-") for path in TEMPLATES.iterdir()} == set(KINDS)
+
+
+def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """Without a mode: where nothing is deformed."""
+    scene, _ = write("leg", tmp_path)
+    text = scene.read_text()
+    assert 'position = [0, 0, "260 mm"]' in text
+    scene.write_text(text.replace('position = [0, 0, "260 mm"]', 'position = ["20 mm", 0, "260 mm"]'))
+    assert main(["check", str(scene)]) == 2
+    assert re.search(r"\[joint\.\w+", capsys.readouterr().err)
+
+
+def test_check_looks_at_sweeps_and_at_their_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene, _ = write("slider-crank", tmp_path)
+    sweep = tmp_path / "many.toml"
+    sweep.write_text(
+        'scene = "slider_crank.toml"\nkeep = ["wrist.peak_force"]\nvary."joint.wrisst.clearance" = [1e-4]\n'
+    )
+    assert main(["check", str(sweep)]) == 2
+    said = capsys.readouterr().err
+    assert "there is no 'joint.wrisst'" in said
+    assert "did you mean" in said
+    scene.write_text(scene.read_text().replace('mass = "0.8 kg"', "mass = -1"))
+    assert main(["check", str(sweep)]) == 2
+    assert "body.crank.mass" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["clearance", "speed"])
+def test_the_sweeps_of_the_project_have_no_mistake(name: str, capsys: pytest.CaptureFixture[str]):
+    assert main(["check", f"sweeps/{name}"]) == 0
+    assert "no mistake found" in capsys.readouterr().out
+
+
+def test_results_are_printed_as_json_for_scripts(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    assert main(["why", "checks/pendulum", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {
+        "checks/pendulum": {"simulate": ["never run"], "post": ["never run"]}
+    }
+
+
+def test_datasets_are_told_as_json_with_units_and_without_what_json_lacks():
+    data = xr.Dataset({"f": ("k", [1.0, np.nan], {"units": "Hz"})}, coords={"k": ["a", "b"]}, attrs={"n": np.int64(3)})
+    found = json.loads(run.as_json({"scene": data}))["scene"]
+    assert found["attributes"] == {"n": 3}
+    assert found["variables"]["f"] == {"dims": ["k"], "units": "Hz", "values": [1.0, None]}
+    assert found["variables"]["k"]["values"] == ["a", "b"]
+
+
+def test_results_lie_below_the_folder_from_which_a_command_is_called(
+    tmp_path: Path, root: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Within the checkout they are the project's own."""
+    monkeypatch.delenv("FLEXCLEAR_RESULTS")
+    monkeypatch.chdir(tmp_path)
+    assert results_root() == tmp_path / "results"
+    monkeypatch.chdir(root / "docs")
+    assert results_root().resolve() == (root / "results").resolve()

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+import logging
+from collections.abc import Iterator
 
 import pytest
 
+from flexclear.pipeline.core.log import LOG, set_level, write_to
 from flexclear.pipeline.core.workflow.progress import Monitor, duration
 
 
@@ -91,3 +94,66 @@ def test_tasks_of_one_label_are_told_apart():
     monitor.finish(first, failed=False)
     monitor.finish(second, failed=False)
     assert monitor.done == 2
+
+
+@pytest.fixture(autouse=True)
+def _usual_log() -> Iterator[None]:
+    set_level()
+    yield
+    set_level()
+    write_to(None)
+
+
+def test_the_loggers_level_says_how_much_is_told():
+    told = {}
+    for level in (logging.WARNING, logging.INFO, logging.DEBUG):
+        LOG.setLevel(level)
+        monitor, screen, clock = watched(terminal=True)
+        name = monitor.begin("a", "simulate")
+        for share in (0.1, 0.2):
+            clock.now += 1.0
+            monitor.update(name, share, "")
+        monitor.say("a: warning: something")
+        told[level] = screen.getvalue()
+    assert told[logging.WARNING] == "flexclear: a: warning: something\n"
+    assert "\r" in told[logging.INFO]
+    assert told[logging.INFO].endswith("flexclear: a: warning: something\n")
+    assert "\r" not in told[logging.DEBUG]
+    assert told[logging.DEBUG].count("a: simulate") == 3
+
+
+def test_a_notebook_rewrites_its_line_without_codes_of_terminals():
+    class Cell(io.StringIO):
+        """As the stream of a cell is."""
+
+    Cell.__module__ = "ipykernel.iostream"
+    screen, clock = Cell(), Clock()
+    monitor = Monitor(screen, clock)
+    monitor.start(1)
+    name = monitor.begin("a", "simulate")
+    clock.now = 1.0
+    monitor.update(name, 0.5, "")
+    monitor.finish(name, failed=False)
+    monitor.end()
+    text = screen.getvalue()
+    assert "\033" not in text
+    assert "\n" not in text
+    assert text.rpartition("\r")[2] == ""
+
+
+def test_other_handlers_get_the_records():
+    records: list[logging.LogRecord] = []
+
+    class Keeping(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            records.append(record)
+
+    handler = Keeping()
+    LOG.addHandler(handler)
+    try:
+        monitor, _, _ = watched(terminal=False)
+        monitor.begin("a", "simulate")
+        monitor.say("beware")
+    finally:
+        LOG.removeHandler(handler)
+    assert [(r.levelname, r.getMessage()) for r in records] == [("INFO", "[0/2] a: simulate"), ("WARNING", "beware")]

@@ -59,6 +59,10 @@ COORDINATES: Schema = {
     "contact": _words("contact", "name of the joint with clearance, or of the stop's end"),
     "contact_type": _words("contact", "type of that joint, or stop"),
     "contact_motion": _words("contact", "rotation where it ends an angle, else translation"),
+    "rubbing": _words("rubbing", "name of the ideal joint with friction"),
+    "worn": _words("worn", "name of the contact that wears"),
+    "band": _number("band", "number of the band of equal height on a sphere, from its lower pole on"),
+    "sector": _number("sector", "number of the sector about z of the surface's frame, from x on"),
     "pass_joint": _words("singular_pass", "joint on whose coordinate the branches differ most"),
     "mode": _words("mode", "body.number, or in the files of one body its number"),
     "mode2": _number("mode2", "number of the mode"),
@@ -96,7 +100,7 @@ COORDINATES: Schema = {
 #: dimensions whose entries have no other name than their number, and the number of the first
 NUMBERED = {
     **dict.fromkeys(("node", "cell", "corner", "point", "lump", "section", "slice", "fibre"), 0),
-    **dict.fromkeys(("followed", "lag", "component"), 0),
+    **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
     **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
 }
 #: dimensions whose entries are always the same

@@ -16,12 +16,14 @@ DATA = PACKAGES
 
 
 def results_root() -> Path:
-    """Folder of all results: FLEXCLEAR_RESULTS; else ``results`` of the source checkout, wherever the
-    command is called from; else, where the package was installed without one, of the current folder."""
+    """Folder of all results: FLEXCLEAR_RESULTS; else ``results`` of the source checkout, where the command is called
+    from inside of one's own, else of the current folder."""
     named = os.environ.get("FLEXCLEAR_RESULTS")
     if named:
         return Path(named).resolve()
-    return (TREE if (TREE / "pyproject.toml").is_file() else Path.cwd()) / "results"
+    here = Path.cwd()
+    inside = (TREE / "pyproject.toml").is_file() and here.resolve().is_relative_to(TREE.resolve())
+    return (TREE if inside else here) / "results"
 
 
 def kernel_root() -> Path:

@@ -57,6 +57,20 @@ RUN: Schema = {
     "joint_moment": _V(
         ("time", "joint", "axis"), "N m", "moment on the joint's second body at its frame's origin, world axes"
     ),
+    "joint_bearing_load": _V(
+        ("time", "rubbing"), "N", "normal force in the bearings of a joint with friction", optional=True
+    ),
+    "joint_sliding_speed": _V(("time", "rubbing"), "m s-1", "sliding speed there, the largest", optional=True),
+    "joint_friction_power": _V(("time", "rubbing"), "W", "power of the joint's friction, <= 0", optional=True),
+    "joint_friction_loss": _V(
+        ("time", "rubbing"), "J", "energy lost to the friction of the joint since the start", optional=True
+    ),
+    "joint_friction_force": _V(
+        ("time", "rubbing", "axis"), "N", "friction's part of joint_force, world axes", optional=True
+    ),
+    "joint_friction_moment": _V(
+        ("time", "rubbing", "axis"), "N m", "friction's part of joint_moment, world axes", optional=True
+    ),
     "modal_coordinate": _V(("time", "mode"), "m", "modal coordinate, for a modal mass of 1 kg", optional=True),
     "modal_velocity": _V(("time", "mode"), "m s-1", "rate of the modal coordinate", optional=True),
     "drive_force": _V(
@@ -141,6 +155,21 @@ RUN: Schema = {
     ),
     "contact_delivered_restitution": _V(
         ("contact",), "1", "rebound over approach speed that the contact's law gives a free impact", optional=True
+    ),
+    "wear_sliding_distance": _V(
+        ("time", "worn"), "m", "distance that the surfaces in contact have slid on each other", optional=True
+    ),
+    "wear_load_path": _V(
+        ("time", "worn"), "N m", "time integral of normal force times sliding speed since the start", optional=True
+    ),
+    "wear_direction_outer": _V(
+        ("time", "worn", "axis"), "1", "direction from the socket's centre to the contact, socket axes", optional=True
+    ),
+    "wear_direction_inner": _V(
+        ("time", "worn", "axis"),
+        "1",
+        "direction from the centre of ball or pin to the contact, its axes",
+        optional=True,
     ),
     "load_loss": _V(("time",), "J", "energy lost to the loads since the start", optional=True),
     "modal_damping_loss": _V(("time",), "J", "energy lost to modal damping since the start", optional=True),

@@ -16,7 +16,10 @@ Share = Field(ge=0.0, le=1.0)
 
 
 class Material(Part):
-    """Elastic constants of a contacting surface."""
+    """Elastic constants of a contacting surface.
+
+    youngs_modulus: Young's modulus.  poisson: Poisson's ratio.
+    """
 
     youngs_modulus: Annotated[Pressure, Positive]
     poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
@@ -27,8 +30,10 @@ class NormalLaw(Part):
 
     restitution: the law's own parameter c_r; a free impact rebounds with it only as well as the law
     achieves.  delivered_restitution: the rebound that a free impact is to have; the parameter
-    follows from it.  exponent: default 1.5, for linear laws 1.  damping [N s/m] and effective_mass
-    (default: the reduced mass of the two links): for linear laws only.
+    follows from it.  exponent: default 1.5, for linear laws 1.
+    law: name of the law, as docs/contact.md lists them.  stiffness: K in force = K depth^exponent; without it, from
+    materials and radii.  damping: of linear laws [N s/m].  effective_mass: of linear laws: mass that rebounds; default:
+    the reduced mass of the two links.
     """
 
     law: str
@@ -49,7 +54,11 @@ class NormalLaw(Part):
 
 
 class ModifiedCoulomb(Part):
-    """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6)."""
+    """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6).
+
+    static, dynamic: coefficients of friction.  v_static, v_dynamic: sliding speeds at which friction has the one and
+    the other.
+    """
 
     law: Literal["modified-coulomb"]
     static: Annotated[Number, Field(ge=0.0)]
@@ -69,7 +78,10 @@ class ModifiedCoulomb(Part):
 
 
 class Ambrosio(Part):
-    """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1."""
+    """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1.
+
+    dynamic: coefficient of friction.  v0, v1: sliding speeds between which it rises from nothing to its full value.
+    """
 
     law: Literal["ambrosio"]
     dynamic: Annotated[Number, Field(ge=0.0)]
@@ -89,8 +101,9 @@ class Ambrosio(Part):
 class LuGre(Part):
     """LuGre friction per unit of normal force.
 
-    bristle_stiffness [1/m], bristle_damping [s/m] and viscous [s/m]: sigma_0, sigma_1, sigma_2 over
-    the normal force; v_stribeck: speed over which friction falls from static to dynamic.
+    v_stribeck: speed over which friction falls from static to dynamic.
+    static, dynamic: coefficients of friction.  bristle_stiffness, bristle_damping, viscous: sigma_0 [1/m], sigma_1
+    [s/m] and sigma_2 [s/m], each over the normal force.
     """
 
     law: Literal["lugre"]
@@ -128,12 +141,26 @@ def _not_above(dynamic: float, static: float) -> None:
         )
 
 
+class Wear(Part):
+    """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area).
+
+    coefficient: k [-], for the pair of surfaces.  hardness: of the softer one.  sectors: into which both surfaces are
+    divided around their axis for the map of depths; a ball and its socket also into bands of equal area.
+    """
+
+    coefficient: Annotated[Number, Positive]
+    hardness: Annotated[Pressure, Positive]
+    sectors: Annotated[int, Field(ge=4, le=720)] = 36
+
+
 class _Contact(Part):
     """What all contacts between surfaces have.
 
     floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
     for grazing and resting contact.  initial_approach_speed: impact rate of a contact that the
     scene's start already has, 0 of one that rests there; without it, a start in contact is refused.
+    between: frames of the outer and the inner surface, each as body.FRAME.  normal: law of the normal force.  friction:
+    law of friction; without it there is none.
     """
 
     between: tuple[FrameName, FrameName]
@@ -149,18 +176,23 @@ class _Contact(Part):
 
 
 class _Clearance(_Contact):
-    """What all clearance joints have; clearance: radial."""
+    """What all clearance joints have; clearance: half the difference of the diameters."""
 
     clearance: Annotated[Length, Positive]
 
 
 class ClearanceSpherical(_Clearance):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
+    """Ball in socket with radial clearance; between = [socket frame, ball frame].
+
+    ball_radius: radius of the ball.  socket_material, ball_material: elastic constants, for the stiffness.
+    wear: of both surfaces; absent means none.
+    """
 
     type: Literal["clearance-spherical"]
     ball_radius: Annotated[Length, Positive]
     socket_material: Material | None = None
     ball_material: Material | None = None
+    wear: Wear | None = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceSpherical:
@@ -182,6 +214,8 @@ class ClearanceRevolute(_Clearance):
     """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame.
 
     length: of the bearing, along the axis.
+    pin_radius: radius of the pin.  journal_material, pin_material: elastic constants, for the stiffness.
+    wear: of both surfaces; absent means none.
     """
 
     type: Literal["clearance-revolute"]
@@ -189,6 +223,7 @@ class ClearanceRevolute(_Clearance):
     length: Annotated[Length, Positive]
     journal_material: Material | None = None
     pin_material: Material | None = None
+    wear: Wear | None = None
 
     @model_validator(mode="after")
     def _stiffness_known(self) -> ClearanceRevolute:
@@ -212,6 +247,7 @@ class ClearanceSlot(_Clearance):
     The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
     clearance: half the slot's width less the pin's radius.  travel: of the pin's centre in the middle of the slot, from
     where the one end's half circle has its centre to the other's.  length: of the bearing, along the axis.
+    pin_radius: radius of the pin.  slot_material, pin_material: elastic constants, for the stiffness.
     """
 
     type: Literal["clearance-slot"]
@@ -246,6 +282,8 @@ class BallOnPlane(_Contact):
     """Ball above a plane without end; between = [plane frame, ball frame].
 
     The plane is that of x and y of its frame; the ball is on the side of z.
+
+    ball_radius: radius of the ball.  plane_material, ball_material: elastic constants, for the stiffness.
     """
 
     type: Literal["ball-on-plane"]

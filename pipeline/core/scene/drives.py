@@ -12,7 +12,10 @@ from flexclear.pipeline.core.scene.laws import Bare
 
 
 class JointDrive(Part):
-    """Prescribes one coordinate of a joint; joints with several freedoms need its name."""
+    """Prescribes one coordinate of a joint; joints with several freedoms need its name.
+
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  law: position over time.
+    """
 
     joint: str
     coordinate: str | None = None
@@ -20,7 +23,10 @@ class JointDrive(Part):
 
 
 class Components(Part):
-    """Laws along, or about, the axes; a component without a law stays free."""
+    """Laws along, or about, the axes; a component without a law stays free.
+
+    x, y, z: law of this component.
+    """
 
     x: Bare | None = None
     y: Bare | None = None
@@ -41,6 +47,7 @@ class PathDrive(Part):
     produce this motion; without them the drive itself acts on the frame.
     allocation: what to do with more actuators than freedoms: refuse, or give the forces whose sum of
     squares (in N and N m) is least.
+    angles: what the components of rotation are, cardan angles or a rotation vector.
     """
 
     frame: FrameName

@@ -7,7 +7,16 @@ import re
 from itertools import chain
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    WithJsonSchema,
+    model_validator,
+)
 
 from flexclear.pipeline.core.axes import check_axes, check_axis
 from flexclear.pipeline.core.units import a, components, quantity
@@ -44,6 +53,7 @@ if TYPE_CHECKING:
     Length: TypeAlias = float
     Time: TypeAlias = float
     Mass: TypeAlias = float
+    Force: TypeAlias = float
     Angle: TypeAlias = float
     Speed: TypeAlias = float
     Rate: TypeAlias = float
@@ -64,6 +74,7 @@ else:
     Length = _scalar("length")
     Time = _scalar("time")
     Mass = _scalar("mass")
+    Force = _scalar("force")
     Angle = _scalar("angle")
     Speed = _scalar("velocity")
     Rate = _scalar("angular velocity")
@@ -169,6 +180,18 @@ class Part(BaseModel):
         default=None, description="where the values come from; 'assumed: why' for an assumption"
     )
 
+    @classmethod
+    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """The schema, with the meanings of keys that the docstring tells."""
+        from flexclear.pipeline.core.scene.meanings import meanings  # reads docstrings, which only schemas need
+
+        found = handler(core)
+        properties = handler.resolve_ref_schema(found).get("properties", {})
+        for key, meaning in meanings(cls, properties.keys()).items():
+            old = properties[key].get("description")
+            properties[key]["description"] = f"{meaning}; {old}" if old else meaning
+        return found
+
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
     """ValueError when an orientation is given in more than one of these ways."""
@@ -184,6 +207,8 @@ class Pose(Part):
     the first is exact, the second is made perpendicular to it. Or all three, as a list [x, y, z].
     axis: direction of z alone, where x and y do not matter; the frame is turned from its parent by the least
     rotation that brings z there (for the parent's -z, by half a turn about x).
+    position: origin of the frame in its parent.  quaternion: w, x, y, z, of the frame in its parent.  rotation_vector:
+    axis times angle, of the frame in its parent.
     """
 
     position: Position = (0.0, 0.0, 0.0)

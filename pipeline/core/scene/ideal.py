@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
@@ -15,7 +16,7 @@ EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}
 #: joint with clearance -> the joint that holds the same places together without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
-KEPT = ("mesh", "pose", "velocity", "angular_velocity")
+KEPT = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
 
 
 def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:

@@ -38,14 +38,20 @@ Ends = Literal["not-a-knot", "natural", "clamped", "periodic"]
 
 
 class Constant(Part):
-    """It keeps a value."""
+    """It keeps a value.
+
+    value: the value.
+    """
 
     type: Literal["constant"]
     value: Value = 0.0
 
 
 class Step(Part):
-    """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35)."""
+    """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35).
+
+    start, end: times at which each step begins and ends.  change: by how much each step changes the value.
+    """
 
     type: Literal["step"]
     start: Times
@@ -80,7 +86,10 @@ def _coefficient(value: Any) -> Any:
 
 
 class Polynomial(Part):
-    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; in SI units, or as ``["30 deg", "10 deg/s"]``."""
+    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; in SI units, or as ``["30 deg", "10 deg/s"]``.
+
+    coefficients: c0, c1, c2 and so on.  origin: time from which t is counted.
+    """
 
     type: Literal["polynomial"]
     coefficients: Annotated[
@@ -91,7 +100,11 @@ class Polynomial(Part):
 
 
 class Harmonic(Part):
-    """Offset plus the sum of amplitude sin(frequency t + phase); phase 90 deg is a cosine."""
+    """Offset plus the sum of amplitude sin(frequency t + phase); phase 90 deg is a cosine.
+
+    amplitude: of each sine.  frequency: of each sine, as angular velocity or in Hz.  phase: of each sine at t = 0;
+    default: 0.  offset: mean value.
+    """
 
     type: Literal["harmonic"]
     amplitude: Annotated[Values, Field(min_length=1)]
@@ -115,6 +128,7 @@ class Spline(Part):
 
     ends: 'not-a-knot'; 'natural' (second derivative zero; of degree 5 third and fourth); 'clamped'
     (first derivative zero; of degree 5 second too); 'periodic'. It must cover the run.
+    time: times of the points, ascending.  value: values at these times.  degree: 3 or 5.
     """
 
     type: Literal["spline"]
@@ -134,7 +148,10 @@ class Spline(Part):
 
 
 class Column(Part):
-    """A column of a table: its header, or its number from 1, and the unit of what stands there."""
+    """A column of a table: its header, or its number from 1, and the unit of what stands there.
+
+    column: header, or number from 1.  unit: of the numbers in the column.
+    """
 
     column: str | Annotated[int, Field(ge=1)]
     unit: str
@@ -151,6 +168,8 @@ class Table(Part):
     """A spline through the rows of a CSV file, looked for beside the scene and in the folders above it.
 
     The file is read with the scene: `points` are its numbers, time in seconds, values in their column's unit.
+    file: name of the CSV file.  time, value: columns of the times and of the values.  degree: of the spline, 3 or 5.
+    ends: as of a spline.  points: what was read; not written in a scene.
     """
 
     type: Literal["table"]
@@ -184,21 +203,30 @@ class Table(Part):
 
 
 class Sum(Part):
-    """Sum of laws."""
+    """Sum of laws.
+
+    laws: those that are added.
+    """
 
     type: Literal["sum"]
     laws: Annotated[tuple[Bare, ...], Field(min_length=1)]
 
 
 class Section(Part):
-    """From this time on the law holds, until the next section starts."""
+    """From this time on the law holds, until the next section starts.
+
+    start: time from which it holds.  law: what holds then.
+    """
 
     start: Time
     law: Bare
 
 
 class Piecewise(Part):
-    """Laws one after the other; the first also holds before it starts."""
+    """Laws one after the other; the first also holds before it starts.
+
+    sections: laws and their starts, in order.
+    """
 
     type: Literal["piecewise"]
     sections: Annotated[tuple[Section, ...], Field(min_length=1)]
@@ -212,7 +240,10 @@ class Piecewise(Part):
 
 
 class Repeated(Part):
-    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one goes on."""
+    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one goes on.
+
+    period: length of one course.  times: how often.  start: where the first course begins.  law: what is repeated.
+    """
 
     type: Literal["repeated"]
     period: Annotated[Time, Field(gt=0)]

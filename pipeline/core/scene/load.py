@@ -338,7 +338,7 @@ def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
 
 
 def _absolute_files(table: dict[str, Any], path: Path) -> None:
-    """Recipes and tables are looked for beside the scene, then in each folder above it."""
+    """Recipes, tables and shapes are looked for beside the scene, then in each folder above it."""
 
     def found(name: str) -> str:
         return str(next((p for p in (folder / name for folder in path.parents) if is_file(p)), path.parent / name))
@@ -347,6 +347,10 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
         mesh = body.get("mesh") if isinstance(body, dict) else None
         if isinstance(mesh, str) and not Path(mesh).is_absolute():
             body["mesh"] = found(mesh)
+        for shape in body.get("geometry") or () if isinstance(body, dict) else ():
+            file = shape.get("file") if isinstance(shape, dict) else None
+            if isinstance(file, str) and not Path(file).is_absolute():
+                shape["file"] = found(file)
     for law in _tables([table.get("drive"), table.get("load")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = found(law["file"])

@@ -17,7 +17,10 @@ Components = tuple[Bare, Bare, Bare]
 
 
 class Gravity(Part):
-    """Uniform acceleration field, world axes."""
+    """Uniform acceleration field, world axes.
+
+    acceleration: of a falling body, world axes.
+    """
 
     type: Literal["gravity"]
     acceleration: Acceleration
@@ -27,6 +30,7 @@ class PointForce(Part):
     """Force [N] at the origin of a frame; each component a value or a law of time.
 
     axes: those of the world, or those of the frame, with which the force then turns.
+    force: components x, y, z [N].
     """
 
     type: Literal["point-force"]
@@ -36,7 +40,10 @@ class PointForce(Part):
 
 
 class PointTorque(Part):
-    """Torque [N m] on the body of a frame; as `PointForce`."""
+    """Torque [N m] on the body of a frame; as `PointForce`.
+
+    torque: components x, y, z [N m].  axes: those of the world, or of the frame.
+    """
 
     type: Literal["point-torque"]
     frame: FrameName
@@ -48,6 +55,8 @@ class SpringDamper(Part):
     """Acts between the origins of two frames, along the line between them.
 
     Tension: stiffness (length - free_length) + damping (rate of the length).
+    between: the two frames.  stiffness: force per length.  damping: force per speed.  free_length: length at which the
+    spring neither pulls nor pushes.
     """
 
     type: Literal["spring-damper"]
@@ -66,7 +75,11 @@ class SpringDamper(Part):
 
 
 class JointForce(Part):
-    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body: a motor of given strength."""
+    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body: a motor of given strength.
+
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  force: force or torque over
+    time.
+    """
 
     type: Literal["joint-force"]
     joint: str
@@ -78,6 +91,8 @@ class JointSpring(Part):
     """Spring and damper along a joint coordinate: -stiffness (coordinate - rest) - damping (its rate).
 
     Turns are counted: an angle may grow beyond 180 deg.
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  stiffness: per unit of the
+    coordinate.  damping: per unit of its rate.  rest: coordinate at which the spring does nothing.
     """
 
     type: Literal["joint-spring"]
@@ -89,7 +104,11 @@ class JointSpring(Part):
 
 
 class Coulomb(Part):
-    """Friction force [N] or torque [N m] over the speed: rises to `static` at v_static, falls to `dynamic`."""
+    """Friction force [N] or torque [N m] over the speed: rises to `static` at v_static, falls to `dynamic`.
+
+    static, dynamic: friction at the speeds v_static and v_dynamic.  v_static, v_dynamic: speeds along the coordinate,
+    the first below the second.
+    """
 
     static: Value
     dynamic: Value
@@ -98,7 +117,11 @@ class Coulomb(Part):
 
 
 class JointFriction(Part):
-    """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength."""
+    """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength.
+
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  viscous: friction per unit of
+    the rate.  coulomb: friction of given strength.
+    """
 
     type: Literal["joint-friction"]
     joint: str
@@ -112,6 +135,8 @@ class Bushing(Part):
 
     The displacements are those of the second frame in the first one's axes: x, y, z of its origin and the rotation
     vector.  stiffness, damping: six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy.
+
+    between: the frame it is mounted in, and the frame it carries.
     """
 
     type: Literal["bushing"]
@@ -135,6 +160,7 @@ class _Controller(Part):
     1/s of it; s of it].
     limits: least and largest force.  tracking_time: how fast the integral follows a limited output [s]; default
     proportional/integral.
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.
     """
 
     joint: str
@@ -159,6 +185,7 @@ class SampledPid(_Controller):
 
     At sample k: proportional e_k + I_k + derivative (e_k - e_(k-1))/period, no derivative at the first;
     I_(k+1) = I_k + period (integral e_k + (force - asked)/tracking_time).
+    period: time between two samples.
     """
 
     type: Literal["sampled-pid"]

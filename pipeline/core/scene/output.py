@@ -18,6 +18,7 @@ class Output(Part):
     """Regular output interval; drive breaks and events are always added.
 
     stress: flexible bodies whose section forces and peak stresses are recorded.
+    interval: time between two regular outputs.
     """
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
+from flexclear.pipeline.core.scene.appearance import Seen
 from flexclear.pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
@@ -21,20 +22,28 @@ from flexclear.pipeline.core.scene.fields import (
     Time,
     Velocity,
 )
+from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
 
 
-class Ground(Part):
-    """The fixed world; listed only to give it frames."""
+class Ground(Seen):
+    """The fixed world; listed only to give it frames.
+
+    frames: named places in the world.
+    """
 
     type: Literal["ground"]
     frames: dict[PartName, Pose] = Field(default_factory=dict)
 
 
-class RigidBody(Part):
-    """Mass, centre of mass and inertia about it, all in the body frame."""
+class RigidBody(Seen):
+    """Mass, centre of mass and inertia about it, all in the body frame.
+
+    mass: mass of the body.  com: centre of mass in the body frame.  frames: named places on the body, in the body
+    frame.
+    """
 
     type: Literal["rigid"]
     mass: Annotated[Mass, Positive]
@@ -70,6 +79,7 @@ class Modes(Part):
     interfaces: the recipe's frames that a basis is built for; default: the recipe's own list.
     held: motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes.
     of: the reference whose shapes "mean-axis" is based on.
+    reference: name of the reference condition, as docs/structure.md lists them.
     """
 
     reference: str
@@ -92,7 +102,10 @@ class Modes(Part):
 
 
 class RatioPerMode(Part):
-    """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
+    """Damping ratio of each elastic coordinate, in the order of the bundle's modes.
+
+    ratios: of each mode, of critical damping.
+    """
 
     ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
 
@@ -101,6 +114,8 @@ class Rayleigh(Part):
     """Damping matrix alpha M + beta K of the deformation; rigid motion of the body is not damped.
 
     alpha [1/s], beta [s]: the ratio of a mode with frequency omega is (alpha/omega + beta omega)/2.
+
+    alpha: of the mass [1/s].  beta: of the stiffness [s].
     """
 
     alpha: Annotated[Number, Field(ge=0.0)] = 0.0
@@ -111,12 +126,14 @@ class Stiffening(Part):
     """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
 
 
-class FlexibleBody(Part):
+class FlexibleBody(Seen):
     """A body reduced from a mesh; its frames are those of the recipe.
 
     pose: start pose of the undeformed mesh frame.
     damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
     stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
+    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are kept.  velocity: start
+    velocity of the centre of mass, world axes.  angular_velocity: start angular velocity of the body frame, world axes.
     """
 
     type: Literal["flexible"]
@@ -129,10 +146,14 @@ class FlexibleBody(Part):
     angular_velocity: AngularVelocity | None = None
 
 
-class MeshedRigidBody(Part):
+class MeshedRigidBody(Seen):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
     ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
+
+    mesh: file of the mesh recipe, relative to the scene.  pose: start pose of the mesh frame; without it, it follows
+    from a joint.  velocity: start velocity of the centre of mass, world axes.  angular_velocity: start angular
+    velocity, world axes.
     """
 
     type: Literal["rigid"]
@@ -179,10 +200,19 @@ class IdealJoint(Part):
 
     A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
     `pipeline.dynamics.joints.planar`.
+    type: which motion it leaves free.  between: first frame, whose axes are those of motion, and second frame, each as
+    body.FRAME.  friction: follows the force that the joint carries; absent means none.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
     between: tuple[FrameName, FrameName]
+    friction: JointFriction | None = None
+
+    @model_validator(mode="after")
+    def _rubs(self) -> IdealJoint:
+        if self.friction is not None:
+            require_fitting(self.type, self.friction)
+        return self
 
 
 #: types of ideal joints

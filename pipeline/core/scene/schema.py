@@ -7,7 +7,13 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from flexclear.pipeline.core.scene.clearance import CONTACTS, BallOnPlane, Clearance
+from flexclear.pipeline.core.scene.clearance import (
+    CONTACTS,
+    BallOnPlane,
+    Clearance,
+    ClearanceRevolute,
+    ClearanceSpherical,
+)
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from flexclear.pipeline.core.scene.gears import Gear
@@ -18,6 +24,7 @@ from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
     Ground,
+    IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
@@ -28,6 +35,7 @@ from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from flexclear.pipeline.core.units import quantity
 
+Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it tells the whole relative motion
 SINGLE = ("revolute", "prismatic")
 #: rows of a run that a machine can be asked to hold
@@ -37,7 +45,10 @@ MOST_SAMPLES = 1e6
 
 
 class TimeSpan(Part):
-    """Start and end of the run."""
+    """Start and end of the run.
+
+    start, end: times at which the run begins and ends.
+    """
 
     start: Time = 0.0
     end: Time
@@ -53,6 +64,7 @@ class Ensemble(Part):
     """Members that start with the ball of every clearance joint offset in a random direction.
 
     bodies: whose motion is kept; default: the bodies that carry the clearance joints.
+    members: how many runs.  perturbation: by which length the balls are offset.  seed: of the random directions.
     """
 
     members: Annotated[int, Field(ge=2, le=100_000)] = 16
@@ -68,6 +80,7 @@ class Sections(Part):
     phase: when in the period the motion is looked at [s].  transient: periods that are not kept, before the `periods`
     that are.  exponent_periods: how many of these are followed by a neighbour too, which tells the rate at which
     motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
+    periods: that are kept.
     """
 
     period: Annotated[Time, Field(gt=0.0)] | None = None
@@ -79,7 +92,10 @@ class Sections(Part):
 
 
 class Wanted(Part):
-    """A wanted accuracy: absolute in SI, or relative to the quantity's own size."""
+    """A wanted accuracy: absolute in SI, or relative to the quantity's own size.
+
+    absolute: in the SI unit of the quantity.  relative: share of the largest change of the quantity.
+    """
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
     relative: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
@@ -90,6 +106,7 @@ class Accuracy(Part):
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
+    quantities: a file writes them without this key.
     allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
     """
 
@@ -116,13 +133,30 @@ class View(Part):
     mechanism its normal, else from above and in front.
     """
 
-    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
-    direction: Direction | None = None
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
+        default=None, description="quantities that comparisons, tables and films show, as 'platform.position'"
+    )
+    direction: Direction | None = Field(default=None, description="vector from the mechanism to the eye, world axes")
+    up: Direction | None = Field(
+        default=None, description="what is up in pictures, world axes; default: against gravity, else z"
+    )
+    zoom: Annotated[Number, Positive] | None = Field(
+        default=None, description="how many times larger than usual the mechanism is drawn"
+    )
+    exaggeration: Annotated[Number, Positive] | None = Field(
+        default=None, description="how many times larger than computed deformations are drawn; default: to be seen"
+    )
+    duration: Annotated[Time, Positive] | None = Field(default=None, description="of films; default: some 4 s")
+    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = Field(
+        default=None,
+        description="how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly",
+    )
 
     @model_validator(mode="after")
     def _points(self) -> View:
-        if self.direction is not None and not any(self.direction):
-            raise ValueError("a direction of length zero points nowhere")
+        for asked in (self.direction, self.up):
+            if asked is not None and not any(asked):
+                raise ValueError("a direction of length zero points nowhere")
         return self
 
 
@@ -156,7 +190,16 @@ def _wanted(name: str, value: Any) -> Any:
 
 
 class Scene(Part):
-    """Everything a scene file says, after composition. Names of parts are keys."""
+    """Everything a scene file says, after composition. Names of parts are keys.
+
+    title: what it is, in a line.  description: more words.  body: bodies by name.  joint: joints by name, ideal ones
+    and ones with clearance.  drive: prescribed motions by name.  load: forces, springs, controllers and gravity by
+    name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  time: begin and end of
+    the run.  start: how the run begins, beyond poses and velocities of bodies.  solver: integrator and tolerance.
+    output: what is recorded.  ensemble: runs from nearby starts.  sections: repeated motion, looked at once in each
+    period.  accuracy: wanted accuracy by quantity.  limits: what the work may take of the machine.  view: what pictures
+    and comparisons look at.
+    """
 
     title: str
     description: str = ""
@@ -334,9 +377,18 @@ class Scene(Part):
         """Joints of surfaces in contact by name: with clearance, in a slot, on a plane."""
         return {n: j for n, j in self.joint.items() if isinstance(j, CONTACTS)}
 
+    def worn(self) -> dict[str, ClearanceRevolute | ClearanceSpherical]:
+        """Joints with clearance whose wear is asked for, by name."""
+        wearing = (ClearanceRevolute, ClearanceSpherical)
+        return {n: j for n, j in self.joint.items() if isinstance(j, wearing) and j.wear is not None}
+
     def stop_ends(self) -> list[str]:
         """Names of all ends of stops, as records have them."""
         return [f"{name}.{end}" for name, stop in self.stop.items() for end in stop.ends]
+
+    def rubbing(self) -> dict[str, IdealJoint]:
+        """Ideal joints with friction, by name."""
+        return {n: j for n, j in self.joint.items() if isinstance(j, IdealJoint) and j.friction is not None}
 
     def forces(self) -> dict[str, Any]:
         """Loads other than gravity, which is a field, by name."""

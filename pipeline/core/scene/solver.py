@@ -21,6 +21,7 @@ class Stepping(Part):
         generalized-alpha is 2), and 1 for fixed steps.
     evaluations: most right-hand sides of one run.  step: present means steps of this length.
     events: where contacts begin and end, ``at step ends`` only with fixed steps.
+    integrator: name, as docs/integrators.md lists them.
     """
 
     integrator: str

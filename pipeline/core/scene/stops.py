@@ -16,6 +16,7 @@ class Stop(Part):
     normal: a normal law of contacts with its stiffness, of angles in N m and rad.  floor: least approach speed used as
     impact rate.  initial_approach_speed: of an end that the scene's start has passed; without it, such a start is
     refused.
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.
     """
 
     joint: str

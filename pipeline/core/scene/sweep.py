@@ -30,6 +30,7 @@ class Parameter(Part):
     values: one by one.  from, to: a range, of `count` points in a grid; in samples a uniform distribution.
     spacing: of a range; `log` needs ends of one sign.  mean, deviation: of a normal distribution, in samples.
     places: the places of the scene that all take the value; default: the parameter's name.
+    count: points of a range in a grid.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
@@ -104,6 +105,7 @@ class Sample(Part):
     """Points spread over all parameters together, instead of a grid.
 
     method: scrambled Sobol sequence (best with a power of two), Latin hypercube, or independent random numbers.
+    points: how many.  seed: of the random numbers.
     """
 
     method: Literal["sobol", "latin-hypercube", "random"]
@@ -120,6 +122,8 @@ class Sweep(Part):
     keep: what is kept of each point, see `pipeline.core.scene.kept`.
     members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are kept.
     error: run each point at a hundredth of its tolerance as well, and keep the differences.
+    title: what it is, in a line.  description: more words.  sample: points spread over all parameters, instead of a
+    grid.
     """
 
     title: str = ""

@@ -1,12 +1,18 @@
-"""Progress on stderr: which scene and stage is running and how long it still takes."""
+"""Progress on stderr: which scene and stage is running and how long it still takes.
+
+Lines that stay are records of the logger (`core.log`); the line that a terminal or a notebook rewrites is none.
+"""
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TextIO
+
+from flexclear.pipeline.core.log import LOG, write_to
 
 #: least time between two lines of one task where lines stay on the screen [s]
 SPARSE = 10.0
@@ -32,9 +38,9 @@ class Job:
 
 @dataclass
 class Monitor:
-    """Shows running tasks: on a terminal as one line that is rewritten, else as sparse lines.
+    """Shows running tasks: on a terminal and in a notebook as one line that is rewritten, else as sparse lines.
 
-    quiet: nothing but warnings.  verbose: a line for everything that tasks say, on a terminal, too.
+    The logger's level says how much: from WARNING on no progress; at DEBUG a line for everything that tasks say.
     """
 
     out: TextIO = field(default_factory=lambda: sys.stderr)
@@ -43,13 +49,24 @@ class Monitor:
     total: int = 0
     done: int = 0
     drawn: float = 0.0
-    quiet: bool = False
-    verbose: bool = False
+
+    def __post_init__(self) -> None:
+        write_to(self.out)
+
+    @property
+    def quiet(self) -> bool:
+        """Whether there are warnings only."""
+        return not LOG.isEnabledFor(logging.INFO)
+
+    @property
+    def verbose(self) -> bool:
+        """Whether everything stays that tasks say."""
+        return LOG.isEnabledFor(logging.DEBUG)
 
     @property
     def rewrites(self) -> bool:
         """Whether one line is rewritten, as on a terminal."""
-        return self.out.isatty() and not self.verbose
+        return (self.out.isatty() or _in_notebook(self.out)) and not self.verbose
 
     def start(self, total: int) -> None:
         """`total` tasks are to be run."""
@@ -95,11 +112,13 @@ class Monitor:
     def end(self) -> None:
         """All tasks have ended; clears the line."""
         if self.rewrites and not self.quiet:
-            self._write("\r\033[K")
+            self._write(_clear(self.out))
 
     def say(self, text: str) -> None:
-        """One line that stays."""
-        self._write(("\r\033[K" if self.rewrites and not self.quiet else "") + f"flexclear: {text}\n")
+        """One line that stays, of a warning."""
+        if self.rewrites and not self.quiet:
+            self._write(_clear(self.out))
+        LOG.warning("%s", text)
 
     def _count(self) -> str:
         return f"[{self.done}/{self.total}]"
@@ -118,11 +137,11 @@ class Monitor:
         if self.quiet:
             return
         if not self.rewrites:
-            self._write(f"flexclear: {text}\n")
+            LOG.info("%s", text)
         elif self.clock() - self.drawn >= REDRAW or not text:
             self.drawn = self.clock()
             line = f"{self._count()} " + " | ".join(self._line(job) for job in self.jobs.values())
-            self._write("\r\033[K" + line[: _columns(self.out)])
+            self._write(_clear(self.out) + line[: _columns(self.out)])
 
     def _write(self, text: str) -> None:
         self.out.write(text)
@@ -135,6 +154,16 @@ def duration(seconds: float) -> str:
         return f"{seconds:.1f} s"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s"
+
+
+def _in_notebook(out: TextIO) -> bool:
+    """Whether a stream is a cell's output, which knows carriage returns but no other control."""
+    return type(out).__module__.partition(".")[0] == "ipykernel"
+
+
+def _clear(out: TextIO) -> str:
+    """What empties the present line."""
+    return f"\r{' ' * _columns(out)}\r" if _in_notebook(out) else "\r\033[K"
 
 
 def _columns(out: TextIO) -> int:

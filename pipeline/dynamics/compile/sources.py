@@ -86,6 +86,8 @@ def _evaluate(parts: Parts) -> str:
         given["closures"] = _closures(imports, parts)
     if parts.harmonics:
         given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
+    if parts.joint_frictions:
+        given["friction"] = _joint_friction(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
     return _file(f"right-hand side of {', '.join(parts.joints)}", imports, "right_hand_side", maker, given, EVALUATE)
 
@@ -109,6 +111,8 @@ def _observe(parts: Parts) -> str:
     given = {"evaluate": "calls.evaluate", "project": _projection(imports, parts), **given}
     if parts.couplings:
         given["couplings"] = _closures(imports, parts)
+    if parts.joint_frictions and parts.closures:
+        given["friction"] = _import(imports, f"{DYNAMICS}.equations.joint_friction", "take_off_closures")
     maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
     return _file(f"what is recorded of {', '.join(parts.joints)}", imports, "observation", maker, given, OBSERVE)
 
@@ -154,6 +158,8 @@ def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
         forms, frictions = _family(imports, FORMS, parts.forms), _family(imports, FRICTION_LAWS, parts.frictions)
         maker = _import(imports, f"{DYNAMICS}.contact.forces", "make_contacts")
         given["contacts"] = f"{maker}(surfaces={surfaces}, forms={forms}, frictions={frictions})"
+        if parts.wear:
+            given["contacts"] = f"{_import(imports, f'{DYNAMICS}.contact.wear', 'wearing')}({given['contacts']})"
     if parts.stops:
         forms = _family(imports, FORMS, parts.forms)
         given["stops"] = f"{_import(imports, f'{DYNAMICS}.contact.stops', 'make_stops')}({forms})"
@@ -161,6 +167,15 @@ def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
         kinds = _family(imports, LOADS, parts.loads)
         given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}({kinds})"
     return given, imports
+
+
+def _joint_friction(imports: Imports, parts: Parts) -> str:
+    """Friction of ideal joints: on accelerations, and on drives."""
+    module = f"{DYNAMICS}.equations.joint_friction"
+    laws = [listed(FRICTION_LAWS, law, where="parts")[0] for law in parts.joint_frictions]
+    tractions = "".join(f"{_import(imports, FRICTION_LAWS, law)}.traction, " for law in laws)
+    maker, drives = (_import(imports, module, name) for name in ("make_joint_friction", "load_drives"))
+    return f"({maker}(({tractions}), {parts.closures}), {drives})"
 
 
 def _closures(imports: Imports, parts: Parts) -> str:

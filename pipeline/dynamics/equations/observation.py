@@ -27,7 +27,8 @@ class Observed:
     state: with its loops closed, (rows, NY).  positions, speeds, accelerations: of all coordinates, free ones first.
     links, sites: their frames (LINK_FRAMES), of which accelerations are true ones less gravity; (rows, links or sites).
     link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
-    about the kernels' origin (WRENCH).  touch, loads: what contacts and loads do (TOUCH, LOAD).
+    about the kernels' origin (WRENCH).  touch, loads, bearings: what contacts, loads and bearings with friction do
+    (TOUCH, LOAD, BEARING).
     drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY.
     jacobian: of the closure rows solved for, as the kernels store it.
     residual: largest violation of a closure, shape (rows,).  status: what an evaluation reports there, shape (rows,).
@@ -43,6 +44,7 @@ class Observed:
     closure_wrenches: np.ndarray
     touch: np.ndarray
     loads: np.ndarray
+    bearings: np.ndarray
     drive_force: np.ndarray
     energy: np.ndarray
     jacobian: np.ndarray
@@ -64,6 +66,7 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
         "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
         "touch": (m.TOUCH, size(m.N_CONTACTS)),
         "loads": (m.LOAD, size(m.N_LOADS)),
+        "bearings": (m.BEARING, size(m.N_BEARINGS)),
         "drive_force": (None, drives),
         "energy": (ENERGY, 1),
         "jacobian": (None, size(m.JACOBIAN_SIZE)),
@@ -99,6 +102,11 @@ def no_couplings(h, w):
 
 
 @kernel
+def no_friction(h, w, out, column):
+    """No joint rubs."""
+
+
+@kernel
 def _copy(w, first, count, out, column):
     for k in range(count):
         out[column + k] = w[first + k]
@@ -114,16 +122,18 @@ def make_observation(
     loads: Callable | None = None,
     stops: Callable | None = None,
     couplings: Any = None,
+    friction: Callable | None = None,
 ) -> Callable:
     """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
 
-    evaluate, project: as the stepper calls them; couplings: the module of that name; the other arguments are those of
-    `make_right_hand_side`.
+    evaluate, project: as the stepper calls them; couplings: the module of that name; friction: of ideal joints, in
+    closures (`equations.joint_friction`); the other arguments are those of `make_right_hand_side`.
     """
     kinematics = make_kinematics(joints, flexible)
     forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
     couple = no_couplings if couplings is None else couplings.take_off_first_joints
+    rub = no_friction if friction is None else friction
     flexible_energy = no_energy if flexible is None else flexible.energies
 
     @kernel
@@ -139,6 +149,7 @@ def make_observation(
                 w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_b(h, c))) + e] -= total
                 w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_a(h, c))) + e] += total
         couple(h, w)
+        rub(h, w, out, column)
         return column + 6 * h[m.N_CLOSURES]
 
     @kernel
@@ -206,6 +217,7 @@ def make_observation(
             _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], line, frames)
             o = _copy(w, h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS], line, o)
             o = _copy(w, h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS], line, o)
+            o = _copy(w, h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS], line, o)
             o = _copy(w, h[m.DRIVE_FORCE], h[m.N_DRIVES], line, o)
             o = energies(h, f, w, line, o)
             o = _copy(w, h[m.JACOBIAN], h[m.JACOBIAN_SIZE], line, o)

@@ -137,11 +137,13 @@ def make_rates(
     loads: Callable | None = None,
     stops: Callable | None = None,
     closures: Any = None,
+    friction: tuple[Callable, Callable] | None = None,
 ) -> Callable:
     """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
     joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels
-    that apply them.  closures: the module of that name.
+    that apply them.  closures: the module of that name.  friction: of ideal joints, on accelerations and on drives
+    (`equations.joint_friction`).
     """
     kinematics = make_kinematics(joints, flexible)
     forces = make_forces(flexible, contacts, loads, stops)
@@ -150,6 +152,7 @@ def make_rates(
     modal = no_modal_forces if flexible is None else flexible.modal_forces
     close = no_closures if closures is None else closures.close
     known_forces = no_known_forces if closures is None else closures.known_forces
+    rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
 
     @kernel
     def spread_state(h, w, y):
@@ -210,8 +213,10 @@ def make_rates(
         backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
         for k in range(h[m.NV]):
             w[h[m.DU] + k] = w[h[m.FORCE] + k]
+        rub(h, f, w, n)
         drive_forces(h, w)
         known_forces(h, w)
+        rub_drives(h, w)
         store_rates(h, w, dy)
 
     return rates

@@ -112,6 +112,9 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
         m.N_KNOWN_ENTRIES: count[m.KNOWN_ENTRIES],
         m.N_CLOSURE_PAIRS: count[m.CLOSURE_PAIRS],
         m.N_GROUPS: count[m.FLOORS],
+        m.N_RUBBING: count[m.RUBBING],
+        m.N_BEARINGS: count[m.BEARINGS],
+        m.N_WORN: count[m.WORN],
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(closures["n_rows"] * closures["n_support"])),
@@ -130,7 +133,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
     known, contacts, ny, nv = (int(h[place]) for place in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
     closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
     coordinates, positions = nv + known, nq + known
-    wanted = room(nq, nv, ny)
+    wanted, bearings = room(nq, nv, ny), int(h[m.N_BEARINGS])
     tables = {
         m.LINK_FRAMES: links,
         m.SITE_FRAMES: int(h[m.N_SITES]),
@@ -146,6 +149,8 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
         m.LAW: int(h[m.N_LAWS]),
         m.LOAD: int(h[m.N_LOADS]),
         m.WATCH: contacts,
+        m.BEARING: bearings,
+        m.REACTIONS: int(h[m.N_RUBBING]) * (1 + bearings),
     }
     lengths = {table.place: table.size * count for table, count in tables.items()} | {
         m.X: positions,
@@ -166,6 +171,9 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
         m.ROW_SCALE: 2 * closure_rows,
         m.PIVOT: m.PIVOT_SIZE,
         m.MULTIPLIER: closure_rows,
+        m.BEARING_SLOPES: bearings * bearings,
+        m.BEARING_RESIDUALS: bearings,
+        m.SMOOTH_MULTIPLIER: closure_rows if bearings else 0,
         m.INDEPENDENCE: 3 * closure_rows,
         m.COLLOCATION: m.COLLOCATION_ROWS * ny if closure_rows else 0,
         m.INTERNAL: int(h[m.N_INTERNAL]),

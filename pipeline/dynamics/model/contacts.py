@@ -52,6 +52,13 @@ def fill(
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 
+def worn(mechanism: Mechanism) -> list[tuple[int]]:
+    """Rows of the table WORN."""
+    wearing = mechanism.scene.worn()
+    names = [contact.name for contact in mechanism.contacts]
+    return [(names.index(name),) for name in wearing]
+
+
 def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
     """(floor, number of variables) of every error group after positions and speeds: ledger, then bristles."""
     contact = [(energy, 1), (energy, 1), (energy / mechanism.length, 1)]  # losses [J], impulse [N s]

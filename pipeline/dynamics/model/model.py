@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import Parts
+from flexclear.pipeline.dynamics.effects import Parts, joint_frictions
 from flexclear.pipeline.dynamics.model import contacts as contacting
 from flexclear.pipeline.dynamics.model import flexible_bodies, laws, wiring
 from flexclear.pipeline.dynamics.model import loads as loading
@@ -100,16 +100,21 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
     parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
+    wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
+    ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
+    rubbing = _rubbing(numbering, parts, ordered, contact_ledger + ledger)
     groups, floors = _error_groups(numbering, ledger, gauges.internal)
     arrays = pack(
         {
             m.NQ: numbering.nq,
-            m.N_LEDGER: contact_ledger + ledger + gauges.internal,
+            m.N_LEDGER: len(groups) - numbering.nq - numbering.nv,
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
             m.N_COUPLINGS: len(coupled),
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
+            m.RUBBING_SLOT: contact_ledger + ledger,
+            m.WEAR_SLOT: len(groups) - numbering.nq - numbering.nv - gauges.internal - wear_ledger,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
@@ -124,6 +129,8 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
             **coupling_tables,
+            **rubbing,
+            m.WORN: contacting.worn(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
             m.GROUPS: groups,
@@ -138,7 +145,7 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
         arrays,
         mechanism.scene,
         mechanism.links,
-        tuple([*mechanism.closures, *coupled][k] for k in order),
+        ordered,
         mechanism.contacts,
         normals,
         loaded.loads,
@@ -167,7 +174,24 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         flexible=not mechanism.all_rigid,
         stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,
+        joint_frictions=joint_frictions(mechanism.scene),
+        wear=bool(mechanism.scene.worn()),
     )
+
+
+#: tables of joints with friction, where there are none
+NO_FRICTION: dict[Any, Any] = dict.fromkeys(
+    (m.RUBBING, m.BEARINGS, m.RUBBING_ENTRIES, m.REACTION_TERMS, m.REACTION_LOOPS, m.BEARING_NUMBERS), ()
+)
+
+
+def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupling, ...], slot: int) -> dict[Any, Any]:
+    """Tables of the ideal joints with friction; slot: of their first loss in the ledger."""
+    if not parts.joint_frictions:
+        return NO_FRICTION
+    from flexclear.pipeline.dynamics.model import joint_friction
+
+    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
 
 
 def _pose_row(place: Placement) -> np.ndarray:
@@ -223,7 +247,13 @@ def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.n
                 target[mine] = len(floors) - 1
     groups = [*q_group, *v_group]
     energy = sum(link.mass for link in mechanism.links) * L**2
-    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads, *[(1.0, 1)] * internal]
+    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads]
+    if mechanism.scene.rubbing():
+        from flexclear.pipeline.dynamics.model import joint_friction
+
+        tail += joint_friction.ledger_groups(mechanism, energy)
+    tail += [(L, 1), (energy, 1)] * len(mechanism.scene.worn())  # sliding distance, load path
+    tail += [(1.0, 1)] * internal
     for floor, count in tail:
         floors.append(floor)
         groups += [len(floors) - 1] * count

@@ -52,8 +52,16 @@ def dataset(run: Run) -> xr.Dataset:
         from flexclear.pipeline.dynamics.record.gears import gear_series
 
         parts.append(gear_series(model, seen))
+    if model.parts.joint_frictions:
+        from flexclear.pipeline.dynamics.record.joint_friction import friction_series
+
+        parts.append(friction_series(model, seen))
     if model.contacts:
         parts += [_contacts(model, seen), (_events(model, trajectory), {})]
+    if model.parts.wear:
+        from flexclear.pipeline.dynamics.record.wear import wear_series
+
+        parts.append(wear_series(model, seen))
     if run.twin is not None:
         horizon: Variables = {"horizon": ((), np.array(run.twin.horizon))}
         separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}
@@ -113,6 +121,7 @@ def warnings(run: Run) -> list[str]:
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),
+        *_friction_warnings(run),
         *_step_warnings(run.model, run.trajectory),
     ]
 
@@ -149,6 +158,15 @@ def _flexible_warnings(run: Run) -> list[str]:
     from flexclear.pipeline.dynamics.run import validity
 
     return validity.warnings(run.model, run.trajectory.time, run.observed)
+
+
+def _friction_warnings(run: Run) -> list[str]:
+    """Sentences about friction of ideal joints."""
+    if not run.model.parts.joint_frictions:
+        return []
+    from flexclear.pipeline.dynamics.record import joint_friction
+
+    return joint_friction.warnings(run.model, run.engine.mobility.redundant_joints)
 
 
 def _report(run: Run) -> dict[str, float | int | str]:

@@ -38,6 +38,11 @@ def series(model: Model, seen: Observed) -> Variables:
         load_work, load_loss = ledger[:, model.arrays.size(m.LOAD_SLOT) :].T[:2]
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
+    if model.parts.joint_frictions:
+        first = model.arrays.size(m.RUBBING_SLOT)
+        rubbed = ledger[:, first : first + model.arrays.size(m.N_RUBBING)]
+        dissipated, balance = dissipated + rubbed.sum(axis=1), balance + rubbed.sum(axis=1)
+        loaded["joint_friction_loss"] = (("time", "rubbing"), rubbed)
     variables: Variables = {
         "kinetic": (("time",), kinetic),
         "potential": (("time",), potential),
@@ -89,13 +94,15 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None
     )
 
 
-def _losses(model: Model, totals: dict[str, np.ndarray], k: int) -> str:
+def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:
     parts = []
     for c, contact in enumerate(model.contacts):
         for cause in ("damping", "friction"):
-            parts.append(f"{totals[f'contact_{cause}_loss'][k, c]:.3g} J to the {cause} of {contact.words}")
+            parts.append(f"{totals[f'contact_{cause}_loss'][t, c]:.3g} J to the {cause} of {contact.words}")
     if "modal_damping_loss" in totals:
-        parts.append(f"{totals['modal_damping_loss'][k]:.3g} J to modal damping")
+        parts.append(f"{totals['modal_damping_loss'][t]:.3g} J to modal damping")
+    for k, name in enumerate(model.scene.rubbing()):
+        parts.append(f"{totals['joint_friction_loss'][t, k]:.3g} J to the friction of joint {name}")
     if "load_loss" in totals:
-        parts.append(f"{totals['load_loss'][k]:.3g} J to the loads")
+        parts.append(f"{totals['load_loss'][t]:.3g} J to the loads")
     return ", ".join(parts) or "nothing"

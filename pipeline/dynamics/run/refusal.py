@@ -7,6 +7,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 from flexclear.pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
 #: above this share of steps that stability limits, stiffness is named as the cause of a long run
@@ -21,6 +22,8 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
     engine.complete()
     control, n, contacts = engine.control, engine.n, engine.model.contacts
+    if n[m.STATUS] in LOOPS and jammed(engine):
+        return f"at t = {control[m.TIME]:.6g} s: {explanation(engine)}"
     if n[m.STATUS] in LOOPS:
         told = beyond_reach(engine) or end_in_pose(engine, rows)
         if told:

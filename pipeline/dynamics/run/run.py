@@ -180,6 +180,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
+        if seen.status[bad[0]] == m.JAMMED:
+            raise SolverError(at + "friction of ideal joints jams the mechanism in the recorded state")
         if seen.status[bad[0]] == m.SINGULAR:
             lost = (
                 "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "

@@ -3,7 +3,8 @@
 It takes some seconds to make, once for all scenes of this wiring, and half the time to run. It is made for ensembles,
 sections and sweeps at once, and for a run that has taken `MANY` evaluations: what the scene says and what its run has
 met decide, no clock and no cache, so that equal scenes give equal bytes. Values differ from those of the other code by
-rounding.
+rounding. Friction in ideal joints is solved for by iteration, from what the last evaluation found: that stays with the
+kernels.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
 def _make(engine: Engine, progress: Progress) -> None:
     """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster."""
     known, kept = engine.straight.addresses, engine.kept.tobytes()
-    if config.DISABLE_JIT or kept in known or len(known) >= SELECTIONS:
+    if config.DISABLE_JIT or engine.model.parts.joint_frictions or kept in known or len(known) >= SELECTIONS:
         return
     wired = wiring(engine.model.arrays, engine.h)
     try:

@@ -13,7 +13,7 @@ from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import by_unit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.series import derive
+from flexclear.pipeline.post.series import derive, parameters
 
 #: most bodies, joints and contacts that are drawn; those that are watched come first, then those with most of it
 BODIES, JOINTS, CONTACTS = 6, 8, 4
@@ -47,7 +47,11 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
         if post.sizes["joint"]:
             found |= _reactions(run, post, first)
         if "contact" in run.sizes:
-            found |= _contacts(run, post, first)
+            found |= contacts(run, post, first)
+        if "wear_volume" in post:
+            found |= _wear(run, post)
+        if "joint_bearing_load" in run:
+            found |= _friction(run, first)
     return found
 
 
@@ -110,7 +114,8 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     return style.files("reactions", figure)
 
 
-def _contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
+def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
+    """Orbit, gap and force of each joint with clearance, the first named ones first; call it below `style.style`."""
     names = [str(name) for name in run["contact"].values]
     chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
@@ -138,10 +143,11 @@ def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str) -> N
 def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:
     """Draw the ball's (or pin's) centre in its socket, and return its two coordinates [mm].
 
-    The plane is that of the two axes of the socket along which the centre moves most; of a pin, x and y.
+    The plane is the joint's own: of a pin x and y of its journal, of a slot the same, of a plane x and z; of a
+    ball the two axes of the socket along which the centre moves most.
     """
     offset = 1e3 * run["contact_offset"].values[:, contact]
-    i, j = sorted(np.argsort(np.ptp(offset, axis=0))[-2:])
+    i, j = _plane(run, offset, contact)
     radius = 1e3 * clearance
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
@@ -150,6 +156,57 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     axes.set(xlabel="xyz"[i], ylabel="xyz"[j], aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
     axes.set_title(CENTRE)
     return offset[:, i], offset[:, j]
+
+
+#: axes of the joint's frame in which the centre is drawn, by type of joint; of others those of the largest motion
+PLANES = {"clearance-revolute": (0, 1), "clearance-slot": (0, 1), "ball-on-plane": (0, 2)}
+
+
+def _plane(run: xr.Dataset, offset: np.ndarray, contact: int) -> tuple[int, int]:
+    joint = parameters(run).get("joint", {}).get(str(run["contact"].values[contact]), {})
+    i, j = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
+    return PLANES.get(joint.get("type", ""), (i, j))
+
+
+def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
+    names = [str(name) for name in run["rubbing"].values]
+    lost, load = run["joint_friction_loss"].values, run["joint_bearing_load"].values
+    chosen = _chosen(names, first, lost[-1], JOINTS)
+    time = 1e3 * run["time"].values
+    factor, unit = by_unit({"": lost[:, chosen]}, "J")
+    figure, axes = style.grid(1, 2, (11.0, 3.3))
+    for color, k in zip(COLORS, chosen, strict=False):
+        axes[0, 0].plot(time, load[:, k], color=color, lw=0.9, label=names[k])
+        axes[0, 1].plot(time, factor * lost[:, k], color=color)
+    axes[0, 0].set_title("normal force in the bearings (N)")
+    axes[0, 1].set_title(f"energy lost ({unit})")
+    for panel in axes.flat:
+        panel.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
+    style.shared_legend(figure, axes[0, 0], 8)
+    style.heading(figure, f"Friction of ideal joints{_rest(len(names), JOINTS)}")
+    return style.files("joint_friction", figure)
+
+
+def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
+    """Load path over time, and depths over the angle about the axis; of spheres the deepest band."""
+    names = [str(name) for name in post["worn"].values][:CONTACTS]
+    figure, axes = style.grid(len(names), 3, (11.0, 0.9 + 2.4 * len(names)))
+    time = 1e3 * run["time"].values
+    for k, (row, name) in enumerate(zip(axes, names, strict=True)):
+        row[0].plot(time, run["wear_load_path"].values[:, k], color=style.INK)
+        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)")
+        row[0].set_title(f"{name}: normal force times way (N m)")
+        for panel, side, what in zip(row[1:], ("outer", "inner"), ("socket or journal", "ball or pin"), strict=True):
+            sectors = int(post["wear_sectors"].values[k])
+            depth = post[f"wear_depth_{side}"].values[k].max(axis=0)[:sectors]
+            factor, unit = by_unit({"": depth}, "m")
+            edges = np.linspace(0.0, 360.0, sectors + 1)
+            panel.stairs(factor * depth, edges, fill=True, color="#D55E00")
+            panel.set(xlim=(0.0, 360.0), xlabel="angle about z of its frame (°)", xticks=range(0, 361, 90))
+            panel.set_title(f"depth if the {what} alone wears ({unit})")
+    more = _rest(post.sizes["worn"], CONTACTS)
+    style.heading(figure, f"Wear of contacts{more}", "Archard's law with the coefficient and hardness of the scene")
+    return style.files("wear", figure)
 
 
 def _energy(run: xr.Dataset) -> dict[str, bytes]:

@@ -72,6 +72,20 @@ def shell(
     axes.add_collection(faces)
 
 
+def skin(axes: Axes, seen: View, points: np.ndarray, triangles: np.ndarray, values: np.ndarray, **look: Any) -> None:
+    """Triangles (m, 3) between points (n, 3), the near ones before the far ones; values: one per point in [0, 1]."""
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(normal, axis=1)
+    there = size > 0.0
+    toward = np.abs(normal[there] / size[there, None] @ seen.axes.T)  # either side may be the outer one
+    light = AMBIENT + (1.0 - AMBIENT) * np.clip(toward @ np.abs(LIGHT / np.linalg.norm(LIGHT)), 0.0, 1.0)
+    colors = np.clip(colormaps["viridis"](values[triangles[there]].mean(axis=1))[:, :3] * light[:, None], 0.0, 1.0)
+    order = np.argsort(seen.depth(corners[there]).mean(axis=1), kind="stable")
+    faces = seen.project(corners[there])[order]
+    axes.add_collection(PolyCollection(list(faces), facecolors=colors[order], edgecolors=colors[order], lw=0.3, **look))
+
+
 def _outwards(rings: np.ndarray, normal: np.ndarray, corners: np.ndarray) -> float:
     """+1 where the normals point out of the tube, else -1."""
     centre = np.repeat(rings[:-1, :-1].mean(axis=1)[:, None], rings.shape[1] - 1, axis=1).reshape(-1, 3)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import html
 import io
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -61,15 +62,18 @@ def from_markdown(text: str) -> Table:
     return Table(blocks[0].strip("*"), cells[0], tuple(cells[2:]), tuple(blocks[2:]))
 
 
-def as_html(table: Table) -> str:
-    """A ``<figure>`` with the table and its notes."""
-    head = "".join(f"<th>{html.escape(column)}</th>" for column in table.columns)
+def as_html(table: Table, *, prose: bool = False) -> str:
+    """A ``<figure>`` with the table and its notes; `prose`: whether cells hold sentences."""
+    head = "".join(f"<th scope='col'>{html.escape(column)}</th>" for column in table.columns)
     rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>\n" for row in table.rows)
-    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in table.notes)
+    # links between pages of the documentation lead nowhere from here
+    told = [re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", note) for note in table.notes]
+    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in told)
     caption = html.escape(table.title)
     return (
         f"<figure class='table'><figcaption>{caption}</figcaption>\n<div "
-        f"class='scroll'><table><thead><tr>{head}</tr></thead>\n"
+        f"class='scroll' tabindex='0' role='region' aria-label='{html.escape(table.title, quote=True)}'>"
+        f"<table class='sorts{' prose' if prose else ''}'><thead><tr>{head}</tr></thead>\n"
         f"<tbody>\n{rows}</tbody></table></div>\n{notes}</figure>\n"
     )
 

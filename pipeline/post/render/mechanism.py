@@ -2,77 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyvista as pv
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.post.body_shape import scale_to, surface
-from flexclear.pipeline.post.render.solids import Solid, equivalent, link, mesh, plate
+from flexclear.pipeline.post.body_shape import faces, is_rod, scale_to, surface
+from flexclear.pipeline.post.render import forms, surfaces
+from flexclear.pipeline.post.render.forms import Seat
+from flexclear.pipeline.post.render.solids import equivalent
+from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
 from flexclear.pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
-COLORS = ("#5b7fa6", "#b9c2cc", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b")
+COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
 JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
-#: joint spheres as a share of the mechanism's size, where no ball radius is known
-JOINT_SHARE = 0.03
-#: radius of the arms from a body to its frames, as a share of the mechanism's size
-ARM_SHARE = 0.014
-#: half width of links, radius of pins, and largest half extent of a body with one place, as shares of it
-LINK_SHARE, PIN_SHARE, LARGEST_LONE = 0.016, 0.014, 0.12
-#: a solid is slender where it is so many times longer than thick
-SLENDER = 2.5
+GROUND_COLOR = "#8d98a4"
+#: as shares of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
+BALL, PIN, RAIL = 0.022, 0.011, 0.008
 #: size of what has none: one body that rests [m]
 LONE = 1.0
-#: a body with at most so many frames that surrounds a joint is drawn translucent: it is the joint's socket
-SOCKET_FRAMES = 3
+#: outputs at which is looked how far a mechanism reaches
+SAMPLES = 24
+_CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a share of the body's length
 DEFORMATION_SHARE = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class Rigid:
-    """A rigid body: mesh about its centre of mass, index in the run."""
+class Part:
+    """A solid that moves with a body.
 
-    index: int
-    mesh: pv.PolyData
+    surface: about the body's centre of mass, or about the origin of `frame`, in the body's axes; of the ground in the
+    world.  contact: its column among the contacts, where it shows a joint with clearance.
+    """
+
+    owner: int | None  #: index of the body in the run; None for the ground
+    surface: Surface
     color: str
-    opacity: float
+    opacity: float = 1.0
+    frame: int | None = None
+    contact: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Flexible:
-    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration."""
+    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour."""
 
     index: int
     bundle: xr.Dataset
     columns: np.ndarray
     scale: float
+    color: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Ball:
-    """A sphere at a spherical joint; `contact` is its column among the contacts, if it has clearance."""
+class Looks:
+    """What a scene says of its pictures.
 
-    frame: int
-    radius: float
-    contact: int | None
+    bodies: `geometry` and `color` by body.  folder: what files of shapes are relative to.  The rest as of `[view]`.
+    """
 
-
-@dataclass(frozen=True, slots=True)
-class Pin:
-    """A pin of a joint that turns about one axis: its frame, mesh about it, index of the body that it turns with."""
-
-    frame: int
-    owner: int | None  #: None for the world
-    mesh: pv.PolyData
-    contact: int | None
+    bodies: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    folder: Path = Path(".")
+    direction: Sequence[float] | None = None
+    up: Sequence[float] | None = None
+    zoom: float = 1.0
+    exaggeration: float | None = None
+    duration: float | None = None
+    impact_slowdown: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,30 +84,39 @@ class Mechanism:
     """All that is drawn of one run."""
 
     run: xr.Dataset
-    rigid: tuple[Rigid, ...]
+    parts: tuple[Part, ...]
     flexible: tuple[Flexible, ...]
-    balls: tuple[Ball, ...]
-    pins: tuple[Pin, ...]
     view: View
-    centre: np.ndarray
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
+    cloud: np.ndarray  #: points that stand for all that is drawn over the run, world axes [m], shape (n, 3)
+    looks: Looks
 
 
-def mechanism(
-    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], direction: Sequence[float] | None = None
-) -> Mechanism:
-    """The drawn mechanism of a run; bundles by name of the flexible body, direction as of `render.view`."""
-    told = parameters(run)
-    flexible = tuple(_flexible(run, name, bundle) for name, bundle in bundles.items() if name in run.body.values)
+def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None) -> Mechanism:
+    """The drawn mechanism of a run; bundles by name of the flexible body."""
+    looks, told = looks or Looks(), parameters(run)
+    flexible = tuple(_flexible(run, name, bundle, looks) for name, bundle in bundles.items() if name in run.body.values)
     places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
     shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     low, high = shown.min(axis=0), shown.max(axis=0)
     size = float(np.linalg.norm(high - low)) or LONE
-    balls = _balls(run, told, JOINT_SHARE * size)
-    solids = _solids(run, told.get("body", {}), bundles)
-    rigid = _rigid(run, solids, balls, _spherical_frames(told), size)
-    pins = _pins(run, told, bundles, PIN_SHARE * size)
-    return Mechanism(run, rigid, flexible, balls, pins, view(run, told, direction), 0.5 * (low + high), size)
+    seats = _seats(told, bundles)
+    parts = (*_bodies(run, told, bundles, seats, looks, size), *_joints(run, told, bundles, size))
+    seen = view(run, told, looks.direction, looks.up)
+    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks)
+
+
+def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
+    """Corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
+    found = []
+    for step in np.unique(np.linspace(0, run.sizes["time"] - 1, SAMPLES).astype(int)):
+        for part in parts:
+            low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
+            corners = np.where(_CORNERS, high, low)
+            matrix = part_pose(run, part, int(step))
+            found.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
+        found += [placed(run, body, int(step))[0][::7] for body in flexible]
+    return np.concatenate(found) if found else run.position.values[0]
 
 
 def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
@@ -114,15 +127,31 @@ def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
     return matrix
 
 
+def part_pose(run: xr.Dataset, part: Part, step: int) -> np.ndarray:
+    """Homogeneous matrix from the axes in which a part's surface is given to the world."""
+    matrix = np.eye(4) if part.owner is None else pose(run, part.owner, step)
+    if part.frame is not None:
+        matrix[:3, 3] = run.frame_position.values[step, part.frame]
+    return matrix
+
+
 def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.ndarray]:
     """World points of the exaggerated surface, shape (point, 3), and their true displacement [m], (point,)."""
     q = run.modal_coordinate.values[step, body.columns]
     points, size = surface(body.bundle, q, body.scale)
-    mass = float(body.bundle.mass)
-    # the run's position is the centre of mass; the bundle's origin is elsewhere
-    centre = (body.bundle.first_moment.values + body.bundle.modal_first_moment.values @ q) / mass
     matrix = pose(run, body.index, step)
-    return (points - centre) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
+    return (points - _centre(body.bundle, q)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
+
+
+def skin(body: Flexible, points: np.ndarray) -> Surface:
+    """The surface of a flexible body through points as of `placed`; empty for bare nodes."""
+    return surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)), sharp=not is_rod(body.bundle))
+
+
+def _centre(bundle: xr.Dataset, q: np.ndarray) -> np.ndarray:
+    """Centre of mass in the bundle's axes: the run's position is that, the bundle's origin is elsewhere."""
+    moment: np.ndarray = bundle.first_moment.values + bundle.modal_first_moment.values @ q
+    return moment / float(bundle.mass)
 
 
 def _names(run: xr.Dataset, dim: str) -> list[str]:
@@ -130,138 +159,156 @@ def _names(run: xr.Dataset, dim: str) -> list[str]:
     return [str(name) for name in run[dim].values] if dim in run.coords else []
 
 
-def _solids(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]) -> dict[str, Solid | None]:
-    found: dict[str, Solid | None] = {}
-    for name in _names(run, "body"):
-        if name not in bundles:
-            body = told.get(name, {})
-            found[name] = equivalent(body["mass"], np.array(body["inertia"])) if "inertia" in body else None
-    return found
-
-
-def _rigid(
-    run: xr.Dataset, solids: Mapping[str, Solid | None], balls: tuple[Ball, ...], sockets: set[str], size: float
-) -> tuple[Rigid, ...]:
-    """Rigid bodies; one whose centre of mass lies inside its joint's ball is drawn by that ball and its arms.
-
-    The equivalent solid of a body is drawn where it can be the body itself: where it is no larger than what its
-    frames span. Else a link between the frames is.
-    """
-    arm = ARM_SHARE * size
-    names, known = _names(run, "body"), _names(run, "frame")
-    radius = {known[ball.frame]: ball.radius for ball in balls}
-    kinds: dict[tuple[float, ...], str] = {}
-    result = []
-    for name, given in solids.items():
-        frames = _frames(run, names.index(name), name)
-        inside = any(np.linalg.norm(origin) < radius.get(frame, 0.0) for frame, origin in frames.items())
-        solid = None if inside else _plausible(given, frames, size)
-        if solid is not None:
-            solid = plate(solid, np.array(list(frames.values())).reshape(-1, 3))
-        # a slim solid is drawn with slim arms
-        width = arm if solid is None else min(arm, float(np.sort(solid.half)[1]))
-        holds = solid is not None and any(solid.holds(frames[frame]) for frame in frames if frame in sockets)
-        if inside:
-            color, opacity = JOINT_COLOR, 1.0
-        elif holds and len(frames) <= SOCKET_FRAMES:
-            color, opacity = SOCKET_COLOR, 0.4
-        else:
-            kind = () if solid is None else tuple(np.round(1e3 * solid.half, 1))
-            color, opacity = kinds.setdefault(kind, COLORS[len(kinds) % len(COLORS)]), 1.0
-        drawn = mesh(solid, frames, width) if solid is not None or inside else link(frames, LINK_SHARE * size)
-        result.append(Rigid(names.index(name), drawn, color, opacity))
-    return tuple(result)
-
-
-def _plausible(solid: Solid | None, frames: Mapping[str, np.ndarray], size: float) -> Solid | None:
-    """The equivalent solid, made smaller where a body with one place is far larger than the mechanism; None for a link.
-
-    A body whose frames lie apart is a link where its solid reaches beyond them, as the disc does that has the inertia
-    of a crank, or where it is slender and lies across them.
-    """
-    if solid is None:
-        return None
-    places = np.array(list(frames.values()) or [np.zeros(3)])
-    span = float(np.linalg.norm(places[:, None] - places[None], axis=-1).max())
-    reach = float(solid.half.max())
-    if span <= JOINT_SHARE * size:  # all frames in one place: a block or a disc there
-        most = LARGEST_LONE * size
-        return solid if reach <= most else Solid(solid.axes, solid.half * most / reach, solid.round)
-    along = places[int(np.linalg.norm(places - places[0], axis=1).argmax())] - places[0]
-    axis = solid.axes[:, int(solid.half.argmax())]
-    slender = reach > SLENDER * float(np.sort(solid.half)[1])
-    if slender:
-        return solid if abs(axis @ along) > 0.9 * np.linalg.norm(along) and 2.0 * reach < 1.5 * span else None
-    flat = float(solid.half.min()) < 0.35 * reach
-    # a plate or a platform carries its joints; a disc about one pin of two is the inertia of a link, not its shape
-    return solid if flat and len(places) > 2 and 2.0 * reach < 2.2 * span else None
-
-
-def _pins(
-    run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], radius: float
-) -> tuple[Pin, ...]:
-    """A pin at the second frame of each joint that turns about one axis, along z of that frame."""
-    bodies, frames, contacts = _names(run, "body"), _names(run, "frame"), _names(run, "contact")
-    found = []
-    for name, joint in told.get("joint", {}).items():
-        frame = joint["between"][1]
-        if "revolute" not in joint["type"] or frame not in frames:
-            continue
-        body = frame.partition(".")[0]
-        axis = _axes(told, bundles, frame)[:, 2]
-        own = float(joint.get("pin_radius", radius))
-        drawn = pv.Cylinder(
-            center=(0, 0, 0),
-            direction=axis,
-            radius=min(max(own, radius), 2.0 * radius),
-            height=float(min(max(joint.get("length", 0.0), 3.2 * radius), 4.0 * radius)),
-            resolution=40,
-        )
-        mesh = drawn.triangulate().compute_normals(split_vertices=True, feature_angle=40.0)
-        owner = bodies.index(body) if body in bodies else None
-        found.append(Pin(frames.index(frame), owner, mesh, contacts.index(name) if name in contacts else None))
-    return tuple(found)
-
-
-def _axes(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str) -> np.ndarray:
-    """Axes of a named frame in those of its body, columns, shape (3, 3)."""
+def frame_pose(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str) -> tuple[np.ndarray, np.ndarray]:
+    """Origin [m] and axes (columns) of a named frame in those of its body."""
     body, _, name = frame.partition(".")
     if body in bundles:
-        rotation: np.ndarray = bundles[body]["frame_rotation"].sel(frame=name).values
-        return rotation
-    pose = told.get("body", {}).get(body, {}).get("frames", {}).get(name, {})
-    return quaternion_to_matrix(Pose.model_validate(pose).as_quaternion())
+        data = bundles[body].sel(frame=name)
+        return data["frame_position"].values, data["frame_rotation"].values
+    given = Pose.model_validate(told.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
+    return np.array(given.position), quaternion_to_matrix(given.as_quaternion())
 
 
-def _frames(run: xr.Dataset, index: int, body: str) -> dict[str, np.ndarray]:
-    """Frame origins of a body relative to its centre of mass, body axes, from the first output."""
-    matrix = pose(run, index, 0)
-    found = {}
-    for k, name in enumerate(_names(run, "frame")):
-        if name.partition(".")[0] == body:
-            found[name] = matrix[:3, :3].T @ (run.frame_position.values[0, k] - matrix[:3, 3])
+def _seats(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]) -> dict[str, list[Seat]]:
+    """Where joints sit on each body."""
+    found: dict[str, list[Seat]] = {}
+    for joint in told.get("joint", {}).values():
+        for k, frame in enumerate(joint["between"]):
+            origin, axes = frame_pose(told, bundles, frame)
+            found.setdefault(frame.partition(".")[0], []).append(Seat(frame, origin, axes, joint["type"], k == 0))
     return found
 
 
-def _spherical_frames(told: Mapping[str, Any]) -> set[str]:
-    """Frames of all spherical joints, either side."""
-    joints = (joint for joint in told.get("joint", {}).values() if "spherical" in joint["type"])
-    return {frame for joint in joints for frame in joint["between"]}
+def _bodies(
+    run: xr.Dataset,
+    told: Mapping[str, Any],
+    bundles: Mapping[str, xr.Dataset],
+    seats: Mapping[str, list[Seat]],
+    looks: Looks,
+    size: float,
+) -> Iterator[Part]:
+    """Rigid bodies and the ground, as their scene draws them or as links between their joints."""
+    names, kinds = _names(run, "body"), dict[tuple[Any, ...], str]()
+    for name, body in told.get("body", {}).items():
+        look = looks.bodies.get(name, {})
+        own = None if "geometry" not in look else forms.shapes(look["geometry"], looks.folder)
+        if name not in names:
+            if own is not None:
+                yield Part(None, own, look.get("color", GROUND_COLOR))
+            continue
+        if name in bundles:
+            if own is not None:  # beside the deformed mesh: what is fixed to it
+                yield Part(
+                    names.index(name),
+                    surfaces.moved(own, -_centre_at_rest(bundles[name])),
+                    look.get("color", COLORS[0]),
+                )
+            continue
+        if "inertia" not in body:
+            continue
+        com = np.array(body.get("com", (0.0, 0.0, 0.0)))
+        inertia = np.array(body["inertia"])
+        key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
+        color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
+        solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
+        drawn = own if own is not None else forms.link(seats.get(name, []), com, solid, size, names.index(name))
+        if len(drawn.points):
+            yield Part(names.index(name), surfaces.moved(drawn, -com), color)
 
 
-def _balls(run: xr.Dataset, told: Mapping[str, Any], radius: float) -> tuple[Ball, ...]:
-    """A sphere at the second frame of each spherical joint; `radius` [m] where the scene gives none."""
-    frames, contacts = _names(run, "frame"), _names(run, "contact")
-    found = []
+def _centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
+    return _centre(bundle, np.zeros(bundle.sizes["mode"]))
+
+
+def _joints(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], size: float) -> Iterator[Part]:
+    """Balls, pins, rails, crosses and planes of the joints."""
+    contacts = _names(run, "contact")
     for name, joint in told.get("joint", {}).items():
-        frame = joint["between"][1]
-        if "spherical" in joint["type"] and frame in frames:
-            column = contacts.index(name) if name in contacts else None
-            found.append(Ball(frames.index(frame), float(joint.get("ball_radius", radius)), column))
-    return tuple(found)
+        kind, (first, second) = joint["type"], joint["between"]
+        contact = contacts.index(name) if name in contacts else None
+        color = JOINT_COLOR if contact is None else CLEARANCE_COLOR
+
+        def at(frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
+            return _seated(run, told, bundles, frame, part, color, contact, opacity)
+
+        if kind in forms.BALLS:
+            radius = float(joint.get("ball_radius", BALL * size))
+            yield at(second, surfaces.sphere(radius), color, contact)
+            if kind == "ball-on-plane":
+                plane = surfaces.box((0.5 * size, 0.5 * size, 0.004 * size))
+                yield at(first, surfaces.moved(plane, np.array([0.0, 0.0, -0.002 * size])), GROUND_COLOR)
+            else:
+                yield at(first, surfaces.sphere(1.3 * radius), SOCKET_COLOR, None, 0.35)
+        elif "revolute" in kind or kind == "clearance-slot":
+            radius = _pin_radius(joint, size)
+            yield at(second, surfaces.cylinder(radius, 3.4 * PIN * size), color, contact)
+            if kind == "clearance-slot":
+                half = np.array([[-0.5 * joint["travel"], 0.0], [0.5 * joint["travel"], 0.0]])
+                rim = surfaces.prism(surfaces.hull(half, 1.8 * radius), 0.8 * PIN * size)
+                yield at(first, rim, SOCKET_COLOR, None, 0.5)
+            elif first.partition(".")[0] not in _names(run, "body"):
+                yield at(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
+        elif kind in forms.SLIDING:
+            low, high = _travel(run, name)
+            rail = surfaces.moved(
+                surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size), np.array([0.0, 0.0, 0.5 * (low + high)])
+            )
+            grounded = first.partition(".")[0] not in _names(run, "body")
+            yield at(first, rail, GROUND_COLOR if grounded else JOINT_COLOR)
+        elif kind == "universal":
+            yield at(
+                first, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _X), color
+            )
+            yield at(
+                second, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _Y), color
+            )
+        elif kind == "planar":
+            yield at(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
 
-def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset) -> Flexible:
+_X, _Y = surfaces.along(np.array([1.0, 0.0, 0.0])), surfaces.along(np.array([0.0, 1.0, 0.0]))
+
+
+def _pin_radius(joint: Mapping[str, Any], size: float) -> float:
+    """The true radius of a pin, within what is seen and hides nothing."""
+    return float(np.clip(joint.get("pin_radius", PIN * size), PIN * size, 1.8 * PIN * size))
+
+
+def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
+    """Least and largest displacement along a joint's axis [m], that of the assembled start included."""
+    for name in (joint, f"{joint}.translation"):
+        if "coordinate" in run.coords and name in run.coordinate.values:
+            values = run.joint_position.sel(coordinate=name).values
+            return min(0.0, float(values.min())), max(0.0, float(values.max()))
+    return 0.0, 0.0
+
+
+def _seated(
+    run: xr.Dataset,
+    told: Mapping[str, Any],
+    bundles: Mapping[str, xr.Dataset],
+    frame: str,
+    part: Surface,
+    color: str,
+    contact: int | None,
+    opacity: float,
+) -> Part:
+    """A part at a named frame, given in its axes."""
+    origin, axes = frame_pose(told, bundles, frame)
+    bodies, frames, body = _names(run, "body"), _names(run, "frame"), frame.partition(".")[0]
+    if body not in bodies:
+        return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
+    if frame in frames:
+        return Part(
+            bodies.index(body), surfaces.moved(part, np.zeros(3), axes), color, opacity, frames.index(frame), contact
+        )
+    com = (
+        _centre_at_rest(bundles[body]) if body in bundles else np.array(told["body"][body].get("com", (0.0, 0.0, 0.0)))
+    )
+    return Part(bodies.index(body), surfaces.moved(part, origin - com, axes), color, opacity, contact=contact)
+
+
+def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks) -> Flexible:
     owners = (
         run.mode_body.values
         if "mode_body" in run.coords
@@ -272,5 +319,5 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset) -> Flexible:
         columns = np.arange(bundle.sizes["mode"])
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
-    scale = max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
-    return Flexible(_names(run, "body").index(name), bundle, columns, scale)
+    scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
+    return Flexible(_names(run, "body").index(name), bundle, columns, scale, looks.bodies.get(name, {}).get("color"))

@@ -61,6 +61,10 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
         number = _first(run["contact"].values, watch) or 0
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
         cursors.append((_dot(axes[2], 7), x, y))
+    for panel in axes:
+        panel.title.set_fontsize(8.2)
+    if contact:
+        axes[2].set_title("path in the socket (mm)")
     figure.suptitle(" ", fontsize=13)  # keeps the place of the clock
     clock = figure.text(
         0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
@@ -91,7 +95,7 @@ def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> t
         axes.set_title(f"{run.body.values[body]}: rotation (°)")
         return _curve(axes, run, angle, "#0072B2")
     axis = int(np.argmax(np.ptp(moved, axis=0)))
-    axes.set_title(f"{run.body.values[body]}: displacement along {'xyz'[axis]} (mm)")
+    axes.set_title(f"{run.body.values[body]}: way along {'xyz'[axis]} (mm)")
     return _curve(axes, run, 1e3 * moved[:, axis], "#0072B2")
 
 

@@ -1,56 +1,66 @@
-"""All pictures of one scene: start, film, mode shapes to turn and for ParaView."""
+"""What is made of a run, its reduced bodies and its vibrations: pictures, films, pages, files for other programs."""
 
 from __future__ import annotations
 
 import io
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.post.render import gl
+from flexclear.pipeline.post.overview.page import viewer_page
+from flexclear.pipeline.post.pages import viewer
+from flexclear.pipeline.post.render import gl, gltf, pace, paraview, player
+from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.series import derive
 
+#: outputs of a series for ParaView, and of a glTF file
+SERIES, KEYS = 100, 240
 
-def pictures(
-    run: xr.Dataset,
-    bundles: Mapping[str, xr.Dataset],
-    post: xr.Dataset | None = None,
-    progress: Progress = silent,
-    *,
-    watched: Sequence[str] = (),
-    direction: Sequence[float] | None = None,
-) -> dict[str, bytes]:
-    """File contents by name: ``mechanism.png``, ``film.mp4`` (or gif), ``mode_<body>.html``, ``modes_<body>.vtu``.
 
-    run: schema RUN.  bundles: schema BUNDLE by name of the flexible body.  watched: as of `film.film`.
-    direction: from the mechanism to the eye, instead of what suits it.  Without GL libraries the
-    result is empty, and one line on stderr says what to install.
+@dataclass(frozen=True)
+class Shown:
+    """What there is to be shown.
+
+    run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched: as of
+    `film.film`.  title: of pages.
     """
-    if not gl.works():
-        print(f"flexclear: no pictures; {gl.remedy()}", file=sys.stderr)
-        return {}
-    # pyvista is imported only where it can draw
-    from flexclear.pipeline.post.render import film, mechanism
 
-    post = derive(run) if post is None else post
-    drawn = mechanism.mechanism(run, bundles, direction)
-    result = {"mechanism.png": png(film.still(drawn, _farthest(run)))}
-    suffix, content = film.film(drawn, post, watched, progress)
-    result[f"film.{suffix}"] = content
-    for body, bundle in bundles.items():
-        result |= shape_files(body, bundle)
-    return result
+    run: xr.Dataset | None = None
+    linear: xr.Dataset | None = None
+    bundles: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    looks: Looks = field(default_factory=Looks)
+    watched: Sequence[str] = ()
+    title: str = ""
+    progress: Progress = silent
+
+    def mechanism(self) -> Mechanism:
+        """The run as moving solids."""
+        assert self.run is not None
+        return mechanism(self.run, self.bundles, self.looks)
+
+    def name(self, what: str) -> str:
+        """A title of a page."""
+        return f"{self.title}: {what}" if self.title else what
 
 
-def shape_files(body: str, bundle: xr.Dataset) -> dict[str, bytes]:
-    """``mode_<body>.html`` with the first mode, and ``modes_<body>.vtu`` with all; GL must work."""
-    from flexclear.pipeline.post.render import shapes
+def make(what: str, kind: str, shown: Shown) -> dict[str, bytes]:
+    """File contents by name.  Raises InputError where `what` cannot be shown so, or the scene has no such thing."""
+    return MAKERS[what][kind](shown)
 
-    return {f"mode_{body}.html": shapes.page(bundle, 0), f"modes_{body}.vtu": shapes.vtu(bundle)}
+
+def formats(what: str) -> tuple[str, ...]:
+    """As what something can be shown."""
+    return tuple(MAKERS[what])
+
+
+def needs_gl(what: str, kind: str) -> bool:
+    """Whether the machine must be able to draw solids for that."""
+    return what == "motion" and kind in ("png", "gif", "mp4")
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -62,6 +72,174 @@ def png(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
+def _still(shown: Shown) -> dict[str, bytes]:
+    film = _film_module()
+    drawn = shown.mechanism()
+    return {"mechanism.png": png(film.still(drawn, _farthest(drawn.run)))}
+
+
+def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
+    def make_film(shown: Shown) -> dict[str, bytes]:
+        film = _film_module()
+        drawn = shown.mechanism()
+        suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind)
+        return {f"film.{suffix}": content}
+
+    return make_film
+
+
+def _film_module() -> Any:
+    """Pyvista is imported only where it can draw: without GL libraries it ends the process."""
+    if not gl.works():
+        raise SolverError(f"no pictures of solids: {gl.remedy()}")
+    from flexclear.pipeline.post.render import film
+
+    return film
+
+
+def _motion_page(shown: Shown) -> dict[str, bytes]:
+    return {"motion.html": viewer_page(shown.name("motion"), [viewer(player.motion(shown.mechanism()), "Motion")])}
+
+
+def _motion_gltf(shown: Shown) -> dict[str, bytes]:
+    drawn = shown.mechanism()
+    count = drawn.run.sizes["time"]
+    steps = np.unique(np.linspace(0, count - 1, KEYS).astype(int))
+    time = drawn.run["time"].values
+    slower = (shown.looks.duration or pace.SECONDS) / float(time[-1] - time[0])
+    return {"motion.glb": gltf.motion(drawn, steps, slower)}
+
+
+def _motion_series(shown: Shown) -> dict[str, bytes]:
+    drawn = shown.mechanism()
+    times = pace.pace(drawn.run, None, shown.looks.impact_slowdown).times
+    times = times[np.unique(np.linspace(0, times.size - 1, SERIES).astype(int))]
+    steps = np.unique(np.searchsorted(drawn.run["time"].values, times - 1e-12))
+    return paraview.series(drawn, steps)
+
+
+def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
+    if not shown.bundles:
+        raise InputError("--what modes", "the scene has no flexible body, and so no modes", "show its motion")
+    return shown.bundles
+
+
+def _mode_sheets(shown: Shown) -> dict[str, bytes]:
+    from flexclear.pipeline.post.plotting import mode_sheet
+
+    found: dict[str, bytes] = {}
+    for body, bundle in _bodies(shown).items():
+        seen = player.side(bundle)
+        found |= mode_sheet.files(f"modes_{body}", body, bundle, seen.direction, seen.up)
+    return found
+
+
+def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
+    def make_films(shown: Shown) -> dict[str, bytes]:
+        from flexclear.pipeline.post.plotting import mode_sheet
+        from flexclear.pipeline.post.render import writing
+
+        found = {}
+        for body, bundle in _bodies(shown).items():
+            seen = player.side(bundle)
+            suffix, content = writing.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
+            found[f"modes_{body}.{suffix}"] = content
+        return found
+
+    return make_films
+
+
+def _mode_pages(shown: Shown) -> dict[str, bytes]:
+    return {
+        f"modes_{body}.html": viewer_page(
+            shown.name(f"modes of {body}"),
+            [viewer(player.modes(bundle), f"{body}: {bundle.sizes['mode']} modes", play=True)],
+        )
+        for body, bundle in _bodies(shown).items()
+    }
+
+
+def _mode_gltf(shown: Shown) -> dict[str, bytes]:
+    return {
+        f"modes_{body}.glb": gltf.modes(body, bundle, player.scales(bundle)) for body, bundle in _bodies(shown).items()
+    }
+
+
+def _mode_series(shown: Shown) -> dict[str, bytes]:
+    found: dict[str, bytes] = {}
+    for body, bundle in _bodies(shown).items():
+        found |= paraview.modes(f"modes_{body}", bundle, player.scales(bundle))
+    return found
+
+
+def _contacts(shown: Shown) -> list[str]:
+    assert shown.run is not None
+    if "contact" not in shown.run.sizes:
+        raise InputError("--what joint", "the scene has no joint with clearance", "show its motion")
+    return [str(name) for name in shown.run["contact"].values]
+
+
+def _joint_figures(shown: Shown) -> dict[str, bytes]:
+    from flexclear.pipeline.post.overview import figures
+    from flexclear.pipeline.post.plotting import style
+
+    _contacts(shown)
+    assert shown.run is not None
+    with style.style():
+        return figures.contacts(shown.run, derive(shown.run), shown.watched)
+
+
+def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
+    def make_films(shown: Shown) -> dict[str, bytes]:
+        from flexclear.pipeline.post.render import joint_film, writing
+
+        found = {}
+        rate = writing.RATE if kind == "mp4" else writing.RATE // 2
+        for k, name in enumerate(_contacts(shown)):
+            assert shown.run is not None
+            pictures = joint_film.frames(shown.run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
+            suffix, content = writing.write(pictures, rate, kind)
+            found[f"joint_{name}.{suffix}"] = content
+        return found
+
+    return make_films
+
+
+def _vibration_page(shown: Shown) -> dict[str, bytes]:
+    assert shown.linear is not None
+    still = player.as_run(shown.linear)
+    drawn = mechanism(still, shown.bundles, shown.looks)
+    if not shown.linear.sizes["vibration"]:
+        raise InputError("--what vibrations", "the mechanism has no motion that vibrates in this pose")
+    told = player.vibrations(drawn, shown.linear)
+    count = shown.linear.sizes["vibration"]
+    page = viewer_page(shown.name("natural vibrations"), [viewer(told, f"{count} natural vibrations", play=True)])
+    return {"vibrations.html": page}
+
+
 def _farthest(run: xr.Dataset) -> int:
     """The output at which the bodies are farthest from where they started."""
     return int(np.argmax(np.abs(run.position.values - run.position.values[:1]).sum(axis=(1, 2))))
+
+
+#: what is shown, and as what
+MAKERS: dict[str, dict[str, Callable[[Shown], dict[str, bytes]]]] = {
+    "motion": {
+        "png": _still,
+        "gif": _film("gif"),
+        "mp4": _film("mp4"),
+        "html": _motion_page,
+        "gltf": _motion_gltf,
+        "pvd": _motion_series,
+    },
+    "modes": {
+        "png": _mode_sheets,
+        "gif": _mode_films("gif"),
+        "mp4": _mode_films("mp4"),
+        "html": _mode_pages,
+        "gltf": _mode_gltf,
+        "pvd": _mode_series,
+    },
+    "joint": {"png": _joint_figures, "gif": _joint_films("gif"), "mp4": _joint_films("mp4")},
+    "vibrations": {"html": _vibration_page},
+}

@@ -10,6 +10,7 @@ import xarray as xr
 from vtkmodules.vtkCommonCore import vtkLogger
 
 from flexclear.pipeline.post.body_shape import is_rod
+from flexclear.pipeline.post.render.surfaces import Surface
 
 BACKGROUND, BACKGROUND_TOP = "#ffffff", "#e6ecf2"
 SOFT = "#5b6570"
@@ -31,6 +32,14 @@ def skin(points: np.ndarray, faces: np.ndarray) -> pv.PolyData:
     """Points (n, 3) joined by faces (m, corners); faces of one corner are bare points."""
     points = np.ascontiguousarray(points)
     return pv.PolyData(points) if faces.shape[1] == 1 else pv.PolyData.from_regular_faces(points, faces)
+
+
+def polydata(surface: Surface) -> pv.PolyData:
+    """A surface for pyvista, its normals included."""
+    mesh = pv.PolyData.from_regular_faces(surface.points, surface.triangles)
+    mesh.point_data["Normals"] = surface.normals.astype(np.float32)
+    mesh.point_data.active_normals_name = "Normals"
+    return mesh
 
 
 def shading(bundle: xr.Dataset) -> dict[str, Any]:

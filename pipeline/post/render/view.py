@@ -13,6 +13,8 @@ import xarray as xr
 SPATIAL, TILT = np.array([-0.95, 1.45, 0.68]), 0.32
 #: speeds out of the plane that are rounding, as a share of those in it
 PLANAR = 1e-3
+#: angle of vision from the lower to the upper edge of a picture [degrees], and what is left around the mechanism
+ANGLE, MARGIN = 30.0, 1.08
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,24 +26,54 @@ class View:
     planar: bool
 
 
-def view(run: xr.Dataset, told: Mapping[str, Any], asked: Sequence[float] | None = None) -> View:
+def view(
+    run: xr.Dataset,
+    told: Mapping[str, Any],
+    asked: Sequence[float] | None = None,
+    upwards: Sequence[float] | None = None,
+) -> View:
     """The view of a run.
 
     told: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
-    asked: direction to the eye that the user wants.
+    asked, upwards: direction to the eye, and what is up, as the user wants them.
     """
-    up = _up(told)
+    up = _up(told) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     if asked is not None:
         direction = np.array(asked, dtype=float)
         return View(direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _across(up, direction), False)
     normal = plane(run)
     if normal is None:
-        return View(SPATIAL, np.array([0.0, 0.0, 1.0]), False)
+        return _spatial(up if upwards is not None else np.array([0.0, 0.0, 1.0]))
     above = _across(up, normal)
     right = np.cross(above, normal)
     if right[np.argmax(np.abs(right))] < 0.0:  # the axis across the picture runs to the right
         normal, right = -normal, -right
     return View(np.linalg.norm(SPATIAL) * (normal + TILT * (0.6 * above - 0.5 * right)), above, True)
+
+
+def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Where the eye is, and what it looks at, so that all points of a cloud (n, 3) are in the picture.
+
+    aspect: width of the picture over its height; the angle of vision is ANGLE upright.
+    """
+    near = seen.direction / np.linalg.norm(seen.direction)
+    up = _across(seen.up, near)
+    axes = np.array([np.cross(up, near), up, near])
+    local = cloud @ axes.T
+    middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
+    slope = np.tan(0.5 * np.radians(ANGLE))
+    x, y, z = (local - middle).T
+    distance = float(np.max(z + np.maximum(np.abs(y), np.abs(x) / aspect) / slope, initial=0.0))
+    focus = middle @ axes
+    return focus + MARGIN * distance / zoom * near, focus
+
+
+def _spatial(up: np.ndarray) -> View:
+    """From above and in front, whatever is up."""
+    side = np.eye(3)[int(np.argmin(np.abs(up) + np.array([0.0, 1e-9, 2e-9])))]
+    x = side - (side @ up) * up
+    x /= np.linalg.norm(x)
+    return View(np.column_stack([x, np.cross(up, x), up]) @ SPATIAL, up, False)
 
 
 def plane(run: xr.Dataset) -> np.ndarray | None:

@@ -19,7 +19,10 @@ SAME_PLACE = 1e-9
 
 
 class StraightBeam(Part):
-    """A beam along x of the rod frame, from x = 0 to `length`, cut into equal elements."""
+    """A beam along x of the rod frame, from x = 0 to `length`, cut into equal elements.
+
+    length: of the rod.
+    """
 
     type: Literal["straight-beam"]
     length: Annotated[Length, Positive]
@@ -30,6 +33,8 @@ class Segment(Part):
 
     end_section: the section at `end` when it tapers linearly from `section`, of the same type.
     material: where it differs from the recipe's.
+    start, end: places along the rod.  elements: number of elements.  section: cross section.  inertia_section: gives
+    the second moments of the mass; default: `section`.
     """
 
     start: Length
@@ -49,7 +54,10 @@ class Segment(Part):
 
 
 class SegmentedBeam(Part):
-    """A beam along x of the rod frame, from x = 0 to `length`, of segments that cover it without gap or overlap."""
+    """A beam along x of the rod frame, from x = 0 to `length`, of segments that cover it without gap or overlap.
+
+    length: of the rod.  segments: pieces in their order.
+    """
 
     type: Literal["segmented-beam"]
     length: Annotated[Length, Positive]
@@ -74,6 +82,7 @@ class LumpedMass(Part):
     """A body tied rigidly to the node at `x` (a ball, a stem).
 
     com: its centre of mass seen from the node, inertia: about that centre; both in axes of the rod frame.
+    x: place along the rod.  mass: its mass.
     """
 
     x: Length
@@ -92,6 +101,7 @@ class NodeFrame(Part):
     axes: as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod.
     A pin across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``.
     axis: as of a pose, the direction of z alone: ``axis = [0, 0, 1]``.
+    x: place along the rod, at a node.
     """
 
     x: Length
@@ -119,6 +129,7 @@ class BeamRecipe(Part):
     pose: of the rod frame in the mesh frame.
     masses: lumped masses by name.
     interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
+    title: what the body is, in words.  frames: named frames at nodes.
     """
 
     title: str = ""
@@ -141,6 +152,7 @@ class StraightBeamRecipe(BeamRecipe):
 
     section: gives area and stiffness.  end_section: the one at the far end of a linear taper, of the same type.
     inertia_section: gives the second moments of the mass; default: `section`.
+    elements: number of elements.  shape: the rod.  material: elastic constants and density.
     """
 
     elements: Elements
@@ -158,7 +170,10 @@ class StraightBeamRecipe(BeamRecipe):
 
 
 class SegmentedBeamRecipe(BeamRecipe):
-    """A rod whose section changes in steps."""
+    """A rod whose section changes in steps.
+
+    shape: the rod and its pieces.  material: elastic constants and density.
+    """
 
     shape: SegmentedBeam
     material: Isotropic

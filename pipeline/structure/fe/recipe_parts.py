@@ -14,7 +14,10 @@ Positive = Field(gt=0.0)
 
 
 class Isotropic(Part):
-    """A linear elastic, isotropic material."""
+    """A linear elastic, isotropic material.
+
+    density: mass density.  youngs_modulus: Young's modulus.  poisson: Poisson's ratio.
+    """
 
     density: Annotated[Density, Positive]
     youngs_modulus: Annotated[Pressure, Positive]
@@ -27,7 +30,10 @@ class Isotropic(Part):
 
 
 class TurnedFrame(Part):
-    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's."""
+    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's.
+
+    axes: as of a pose.  axis: as of a pose, the direction of z alone.
+    """
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
     axis: Direction | None = None

@@ -33,7 +33,10 @@ ShearCoefficient = Annotated[
 
 
 class CircleSection(Part):
-    """Full circle.  shear_coefficient: kappa instead of Cowper's (1966)."""
+    """Full circle.  shear_coefficient: kappa instead of Cowper's (1966).
+
+    radius: of the circle.
+    """
 
     type: Literal["circle"]
     radius: Annotated[Length, Positive]
@@ -41,7 +44,10 @@ class CircleSection(Part):
 
 
 class TubeSection(Part):
-    """Circular tube; `inner_radius` is that of the hole."""
+    """Circular tube; `inner_radius` is that of the hole.
+
+    radius, inner_radius: of the outer circle and of the hole.  shear_coefficient: kappa instead of Cowper's (1966).
+    """
 
     type: Literal["tube"]
     radius: Annotated[Length, Positive]
@@ -58,7 +64,10 @@ class TubeSection(Part):
 
 
 class RectangleSection(Part):
-    """Full rectangle, `width` along y and `height` along z of the rod."""
+    """Full rectangle, `width` along y and `height` along z of the rod.
+
+    width, height: along y and along z of the rod.  shear_coefficient: kappa instead of Cowper's (1966).
+    """
 
     type: Literal["rectangle"]
     width: Annotated[Length, Positive]
@@ -72,6 +81,7 @@ class GeneralSection(Part):
     second_y: int z^2 dA.  second_z: int y^2 dA.  product: int y z dA.  torsion: St. Venant's J.
     inertia: polar and bending second moments of the mass [about x, y, z], where they are not those of the area.
     shear_coefficient: kappa, one number or [along y, along z]; needed by Timoshenko beams only.
+    area: of the section.
     """
 
     type: Literal["general"]

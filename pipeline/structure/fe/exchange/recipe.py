@@ -16,6 +16,7 @@ class Matrices(Part):
     Either `file`, an npz as `exchange.files.write_npz` makes it, or `stiffness` and `mass` (MatrixMarket) and
     `unknowns` (CSV with the columns node, x, y, z, component, one line per row of the matrices).
     units: the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe.
+    file: npz with everything.  stiffness, mass: MatrixMarket files.  unknowns: CSV table of the rows.
     """
 
     type: Literal["matrices"]
@@ -50,7 +51,10 @@ class NodeFrame(TurnedFrame):
 
 
 class MatricesRecipe(Part):
-    """A body given by its matrices. interfaces: frames at which the body is joined to others."""
+    """A body given by its matrices. interfaces: frames at which the body is joined to others.
+
+    title: what the body is, in words.  shape: files of the matrices.  frames: named frames and their nodes.
+    """
 
     title: str = ""
     shape: Matrices

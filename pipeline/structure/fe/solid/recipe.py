@@ -14,7 +14,10 @@ ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]
 
 
 class CylinderCells(Part):
-    """Numbers of cells: along the axis, along a side of the section's square core, and rings around the core."""
+    """Numbers of cells: along the axis, along a side of the section's square core, and rings around the core.
+
+    along, across, rings: cells along the axis, along a side of the core, and rings around it.
+    """
 
     along: Cells
     across: Cells
@@ -22,7 +25,10 @@ class CylinderCells(Part):
 
 
 class Cylinder(Part):
-    """A round rod along x of the mesh frame, from x = 0 to `length`. Regions: body, start, end, side."""
+    """A round rod along x of the mesh frame, from x = 0 to `length`. Regions: body, start, end, side.
+
+    radius, length: of the rod.  cells: how it is cut.  element: type of the cells.
+    """
 
     type: Literal["cylinder"]
     radius: Annotated[Length, Positive]
@@ -32,7 +38,10 @@ class Cylinder(Part):
 
 
 class Block(Part):
-    """A box from x = 0 to size[0], centred in y and z. Regions: body, start (x = 0), end, side."""
+    """A box from x = 0 to size[0], centred in y and z. Regions: body, start (x = 0), end, side.
+
+    size: lengths along x, y, z.  cells: numbers along x, y, z.  element: type of the cells.
+    """
 
     type: Literal["block"]
     size: Position
@@ -50,6 +59,7 @@ class MeshFile(Part):
     """A mesh of tetrahedra or of hexahedra in a file that meshio reads; `file` is relative to the recipe.
 
     length_unit: unit of the file's coordinates; a file does not say.
+    file: the mesh, relative to the recipe.
     """
 
     type: Literal["mesh-file"]
@@ -67,14 +77,20 @@ Pointing = Annotated[Direction, AfterValidator(_pointing)]
 
 
 class Plane(Part):
-    """Nodes on a plane."""
+    """Nodes on a plane.
+
+    point, normal: a point of the plane and its normal.
+    """
 
     point: Position
     normal: Pointing
 
 
 class Tube(Part):
-    """Nodes on a cylinder's surface around the line through `point` along `axis`."""
+    """Nodes on a cylinder's surface around the line through `point` along `axis`.
+
+    point, axis, radius: a point of the axis, its direction, and the radius.
+    """
 
     point: Position
     axis: Pointing
@@ -82,7 +98,10 @@ class Tube(Part):
 
 
 class Sphere(Part):
-    """Nodes on a sphere's surface."""
+    """Nodes on a sphere's surface.
+
+    centre, radius: of the sphere.
+    """
 
     centre: Position
     radius: Annotated[Length, Positive]
@@ -92,6 +111,7 @@ class On(Part):
     """Which nodes a frame is tied to: those of a named region, or on a surface; on the boundary of the body only.
 
     tolerance: largest distance from the surface; default: 1e-6 of the body's size.
+    region: a named region of the mesh.  plane, cylinder, sphere: a surface.
     """
 
     region: str | None = None
@@ -113,6 +133,7 @@ class TiedFrame(TurnedFrame):
     """A named frame tied to nodes: rigidly (RBE2; they move as one), or to their mean motion (RBE3; they deform).
 
     position: origin in the mesh frame; default: the centre of the nodes.
+    on: which nodes.  tie: rigid or mean.
     """
 
     on: On
@@ -125,6 +146,8 @@ class SolidRecipe(Part):
 
     material: of all cells, or materials: by region.
     interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
+    title: what the body is, in words.  shape: the solid.  materials: elastic constants and density by region.  frames:
+    named frames and their nodes.
     """
 
     title: str = ""

@@ -1,0 +1,286 @@
+"""Mechanisms of many kinds, each with a question that a run of its scene answers, and a picture."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.page import DOCS
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.post import derive
+from flexclear.stages.run import bundles, find_scene
+
+PICTURES = DOCS / "gallery"
+#: of the pictures: pixels, and colours that are kept, so that a page of them stays small
+WIDTH, COLOURS = 640, 64
+Bundles = Mapping[str, xr.Dataset]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A mechanism of the gallery.
+
+    answer: what a run, the reduced bodies and the scene say to the question, in words with numbers.
+    change: of the scene, so that the run is short.  linear: the answer is about vibrations, whose dataset it gets.
+    at: time of the picture as a share of the run.
+    """
+
+    scene: str
+    question: str
+    answer: Callable[[xr.Dataset, Scene], str]
+    change: Mapping[str, Any] = field(default_factory=dict)
+    linear: bool = False
+    moving: bool = False
+    at: float = 0.35
+
+    @property
+    def name(self) -> str:
+        """Last part of the scene's name."""
+        return self.scene.rpartition("/")[2]
+
+
+def _amplitude(values: xr.DataArray) -> float:
+    return 0.5 * float(values.max() - values.min())
+
+
+def _four_bar(run: xr.Dataset, scene: Scene) -> str:
+    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="D")))
+    torque = derive(run)["peak_drive_force"].sel(drive="motor")
+    return f"The rocker swings by {swing:.1f}°; the motor needs up to {float(torque):.3g} N m."
+
+
+def _slider_crank(run: xr.Dataset, scene: Scene) -> str:
+    post = derive(run)
+    count, peak = int(post["impact_count"].sel(contact="pin")), float(post["peak_force"].sel(contact="pin"))
+    return (
+        f"The pin hits its journal {count} times in {1e3 * scene.time.end:.0f} ms, with up to {peak / 1e3:.2g} kN; "
+        f"it is in contact for {100 * float(post['contact_time_share'].sel(contact='pin')):.0f} % of the time."
+    )
+
+
+def _scott_russell(run: xr.Dataset, scene: Scene) -> str:
+    point = run["frame_position"].sel(frame="rod.point")
+    way = float(abs(point.sel(axis="y")[-1] - point.sel(axis="y")[0]))
+    off = float(abs(point.sel(axis="x")).max())
+    apart = "less than 1e-12" if off < 1e-12 else f"{off:.0e}"
+    return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {apart} m."
+
+
+def _stewart(run: xr.Dataset, scene: Scene) -> str:
+    forces = derive(run)["peak_drive_force"]
+    lengths = run["joint_position"].isel(coordinate=run["coordinate_joint"].str.startswith("leg").values)
+    stroke = float((lengths.max("time") - lengths.min("time")).max())
+    hardest = float(forces.isel(drive=(run["drive_motion"] == "translation").values).sel(drive=_legs(forces)).max())
+    return f"The legs need a stroke of {1e3 * stroke:.0f} mm and push with up to {hardest:.0f} N."
+
+
+def _legs(forces: xr.DataArray) -> list[str]:
+    return [name for name in forces["drive"].values.tolist() if name.startswith("leg")]
+
+
+def _robot_arm(run: xr.Dataset, scene: Scene) -> str:
+    tip, seat = (run["frame_position"].sel(frame=f"arm.{end}") for end in ("tip", "seat"))
+    way = (tip - seat).isel(time=(run["time"] > 0.4).values)
+    angle = np.arctan2(way.sel(axis="y").values, way.sel(axis="x").values)
+    return f"The tip swings on by ±{1e3 * 0.6 * 0.5 * float(np.ptp(angle)):.2g} mm about its new place."
+
+
+def _universal(run: xr.Dataset, scene: Scene) -> str:
+    speed = np.linalg.norm(run["angular_velocity"].sel(body="second").values, axis=1)
+    first = np.linalg.norm(run["angular_velocity"].sel(body="first").values, axis=1)
+    low, high = (speed / first).min(), (speed / first).max()
+    return f"Its speed goes from {low:.3f} to {high:.3f} of the first one's (cos 30° and 1/cos 30°)."
+
+
+def _top(run: xr.Dataset, scene: Scene) -> str:
+    p = run["position"].sel(body="top").values
+    turned = np.degrees(np.unwrap(np.arctan2(p[:, 1], p[:, 0])))
+    nodding = np.degrees(np.ptp(np.arcsin(p[:, 2] / np.linalg.norm(p, axis=1))))
+    rate = abs(turned[-1] - turned[0]) / (run["time"].values[-1] - run["time"].values[0])
+    return f"It precesses at {rate:.0f}°/s on average and nods by {nodding:.2g}°."
+
+
+def _governor(run: xr.Dataset, scene: Scene) -> str:
+    lift = run["position"].sel(body="sleeve", axis="z")
+    speed = run["joint_velocity"].sel(coordinate="spindle")[-1]
+    return (
+        f"After {scene.time.end:.0f} s it turns at {float(speed) * 30 / np.pi:.0f} rpm, "
+        f"and the sleeve has risen by {1e3 * float(lift[-1] - lift[0]):.0f} mm."
+    )
+
+
+def _rotor(linear: xr.Dataset, scene: Scene) -> str:
+    told = ", ".join(f"{value:.1f}" for value in np.unique(linear["frequency"].values.round(1))[:4])
+    return f"In the axes that turn with the shaft its lowest whirls have {told} Hz."
+
+
+def _bracket(linear: xr.Dataset, scene: Scene) -> str:
+    found = linear["frequency"].values
+    swing, bend = found[found > 0.0][:2]
+    return f"It swings at {swing:.2f} Hz; its first vibration of the metal has {bend:.0f} Hz."
+
+
+def _bricard(run: xr.Dataset, scene: Scene) -> str:
+    return (
+        f"It has {int(run['mobility'][0])} freedom, though counting joints leaves none; "
+        f"{run.attrs['redundant_closure_rows']} closure equation is redundant."
+    )
+
+
+def _squeezer(run: xr.Dataset, scene: Scene) -> str:
+    angle = run["joint_position"].sel(coordinate="O")
+    return f"The crank turns {float(angle[-1] - angle[0]) / (2 * np.pi):.1f} times in {1e3 * scene.time.end:.0f} ms."
+
+
+def _gears(run: xr.Dataset, scene: Scene) -> str:
+    sun, carrier = (run["angular_velocity"].sel(body=name, axis="z")[-1] for name in ("sun", "carrier"))
+    return f"The sun turns {float(sun / carrier):.3f} times as fast as the carrier, as Willis' equation says."
+
+
+def _yoke(run: xr.Dataset, scene: Scene) -> str:
+    post = derive(run)
+    return f"The pin hits the slot's walls {int(post['impact_count'].sel(contact='slot'))} times in half a second."
+
+
+def _balls(run: xr.Dataset, scene: Scene) -> str:
+    height = run["contact_gap"].sel(contact="floor")
+    hits = int(derive(run)["impact_count"].sel(contact="floor"))
+    return f"Dropped from {1e3 * float(height[0]):.0f} mm it bounces {hits} times."
+
+
+def _bushing(run: xr.Dataset, scene: Scene) -> str:
+    moved = np.linalg.norm(run["bushing_displacement"].values, axis=-1)
+    return f"It gives by up to {1e3 * moved.max():.1f} mm."
+
+
+def _bifilar(run: xr.Dataset, scene: Scene) -> str:
+    force = derive(run)["peak_reaction"].sel(joint="hook_left")
+    return f"Each rod carries up to {float(force):.1f} N."
+
+
+def _controllers(run: xr.Dataset, scene: Scene) -> str:
+    push = abs(run["controller_force"]).max("time")
+    return f"The hardest push is {float(push.max()):.3g} N, by '{push.idxmax().item()}'."
+
+
+def _pendulum(run: xr.Dataset, scene: Scene) -> str:
+    turns = run["joint_position"][:, 0]
+    return f"It turns over: {abs(float(turns[-1])) / (2 * np.pi):.1f} turns in {scene.time.end:.3g} s."
+
+
+def _paper(run: xr.Dataset, scene: Scene) -> str:
+    post = derive(run)
+    return (
+        f"Ball and socket meet {int(post['impact_count'].sel(contact='A1'))} times in the first "
+        f"{1e3 * scene.time.end:.0f} ms, with up to {float(post['peak_force'].sel(contact='A1')):.0f} N."
+    )
+
+
+ENTRIES = {
+    entry.name: entry
+    for entry in (
+        Entry("gallery/four_bar", "How far does the rocker swing, and what must the motor supply?", _four_bar),
+        Entry("checks/clearance_slider_crank", "What does 0.1 mm of clearance do at 5000 rpm?", _slider_crank),
+        Entry("gallery/scott_russell", "How straight is its straight line?", _scott_russell),
+        Entry("gallery/stewart", "Which stroke and force must the six legs have for this path?", _stewart, at=0.0),
+        Entry("gallery/robot_arm", "How much does the load swing after the arm has stopped?", _robot_arm),
+        Entry("checks/universal_shaft", "How unevenly does the second shaft turn?", _universal),
+        Entry("checks/heavy_top", "How does a fast top move that leans to its side?", _top, {"time.end": "0.3 s"}),
+        Entry("checks/governor", "At which speed does it settle, and how high is the sleeve?", _governor),
+        Entry("checks/overhung_rotor", "Which whirls has a disc on a turning shaft?", _rotor, linear=True, moving=True),
+        Entry("gallery/bracket", "Which frequencies has a part meshed with Gmsh on its pin?", _bracket, linear=True),
+        Entry("checks/bricard", "How many freedoms has it?", _bricard, {"time.end": "1 s"}),
+        Entry("checks/andrews_squeezer", "How fast does the squeezer run away?", _squeezer),
+        Entry("checks/gears", "Which ratio has the planetary train?", _gears, {"time.end": "0.2 s"}),
+        Entry("checks/scotch_yoke", "How often does a loose pin hit its slot?", _yoke),
+        Entry("checks/ball_on_plane", "How often does a ball bounce in half a second?", _balls),
+        Entry("checks/bushing", "How far does a block move on its rubber mount?", _bushing),
+        Entry("checks/bifilar_pendulum", "What do the rods of a hanging bar carry?", _bifilar),
+        Entry("checks/controllers", "How hard do the controllers push?", _controllers),
+        Entry("sps4/csj", "What happens in the paper's loose ball joint?", _paper, {"time.end": "20 ms"}),
+    )
+}
+
+
+def cases() -> list[Case]:
+    """A case for each entry."""
+    return [Case(name) for name in ENTRIES]
+
+
+def scene_of(entry: Entry) -> Scene:
+    """Its scene, with its changes."""
+    return load_scene(find_scene(entry.scene), entry.change)
+
+
+def solved(entry: Entry, scene: Scene, reduced: Bundles) -> xr.Dataset:
+    """What its answer is read from."""
+    if entry.linear:
+        return dynamics.frequencies(scene, reduced, silent, moving=entry.moving)
+    return dynamics.simulate(scene, reduced, silent)
+
+
+def measure(chosen: Sequence[Case], jobs: int) -> Measured:
+    """Question, answer, warm time of one run, and the picture, which is kept beside the page."""
+    PICTURES.mkdir(exist_ok=True)
+    for case in chosen:
+        entry = ENTRIES[case.name]
+        scene = scene_of(entry)
+        reduced = bundles(scene)
+        found = solved(entry, scene, reduced)  # once before, so that what is compiled is there
+        begun = time.perf_counter()
+        found = solved(entry, scene, reduced)
+        seconds = time.perf_counter() - begun
+        _draw(entry, scene, reduced, dynamics.simulate(scene, reduced, silent) if entry.linear else found)
+        record: Record = {"scene": entry.scene, "title": scene.title, "question": entry.question}
+        yield case, [{**record, "answer": entry.answer(found, scene), "seconds": seconds, "parts": scene.summary()}]
+
+
+def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None:
+    """Write the picture of a run, where this machine can draw."""
+    from flexclear.pipeline.post.render import gl
+
+    if not gl.works():
+        return
+    from PIL import Image
+
+    from flexclear.pipeline.post.render import film, mechanism
+
+    direction = scene.view.direction if scene.view is not None else None
+    drawn = mechanism.mechanism(run, reduced, direction)
+    row = round(entry.at * (run.sizes["time"] - 1))
+    picture = Image.fromarray(film.still(drawn, row))
+    small = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)
+    small.quantize(COLOURS).save(PICTURES / f"{entry.name}.png", optimize=True)
+
+
+def show(records: list[Record]) -> str:
+    """A paragraph and a picture for each."""
+    parts = []
+    for record in records:
+        name = record["case"]
+        picture = f"![{record['title']}](gallery/{name}.png)\n\n" if (PICTURES / f"{name}.png").is_file() else ""
+        parts.append(
+            f"## {record['title']}\n\n{picture}*{record['question']}* {record['answer']}\n\n"
+            f"`scenes/{record['scene']}.toml`: {record['parts']}; one run takes {record['seconds']:.2g} s.\n"
+        )
+    return "\n".join(parts)
+
+
+FAMILY = Family(
+    what="Mechanisms of many kinds: a question, what a run answers, a picture, and how long that takes.",
+    takes="three minutes",
+    page="gallery.md",
+    cases=cases,
+    measure=measure,
+    show=show,
+    times=False,
+)

@@ -1,0 +1,13 @@
+"""docs/index.md: the README, as the first page of the site."""
+
+from __future__ import annotations
+
+import re
+
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+
+
+def text() -> str:
+    """The README, with its links told from docs/."""
+    page = (TREE / "README.md").read_text()
+    return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)

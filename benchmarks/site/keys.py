@@ -1,0 +1,250 @@
+"""docs/reference: every key of scenes, mesh recipes and sweeps, from the schemas that files are checked against."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from benchmarks.site.text import table
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.sweep import Sweep
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+from flexclear.pipeline.structure.fe.recipe import Recipe
+
+#: how `Field` describes what may be written as a number or with a unit
+_QUANTITY = re.compile(r"(?:^|; )([a-z ]+): SI number, or text with a unit$")
+_VECTORS = ("length", "velocity", "angular velocity", "number", "acceleration", "angle")
+_OWN_UNIT = "SI number, or text with a unit that fits where the law stands"
+#: unit of a bare number
+SI = {
+    "length": "m",
+    "time": "s",
+    "mass": "kg",
+    "angle": "rad",
+    "velocity": "m/s",
+    "angular velocity": "rad/s",
+    "acceleration": "m/s^2",
+    "stiffness": "N/m",
+    "damping": "N s/m",
+    "pressure": "Pa",
+    "density": "kg/m^3",
+    "area": "m^2",
+    "second moment of area": "m^4",
+}
+#: wherever all of these may stand, any law of time may
+_LAW_KINDS = {"Constant", "Step", "Harmonic"}
+#: names that are not made of words
+_NAMES = {"LuGre": "LuGre", "Pid": "PID", "SampledPid": "Sampled PID"}
+#: a definition's name where two modules have a class of one name
+_MODULE = re.compile(r"^flexclear__.*__(\w+?)__(?:recipe|beam_recipe)__(\w+)$|^flexclear__.*__(\w+)$")
+HEADS = {
+    "scene": (
+        "Keys of a scene",
+        'A scene is a TOML file. Numbers are SI, or text with a unit (`"20.5 mm"`). Every part may say where its '
+        "values come from in `source`, either one text or one per key.",
+    ),
+    "recipe": (
+        "Keys of a mesh recipe",
+        "A recipe is a TOML file that a flexible body names as its `mesh`. Which keys it has depends on `shape.type`.",
+    ),
+    "sweep": (
+        "Keys of a sweep",
+        "A TOML file for `flexclear sweep`; [sweeps](../sweeps.md) shows how to use it.",
+    ),
+}
+WHERE = "Files are checked against what this page is written from (`python -m benchmarks.site`).\n\n"
+EDITS = """## Edits of another file
+
+| key | value | meaning |
+|---|---|---|
+| `extends` | text | scene file that this one edits, relative to it |
+| `[replace.<family>.<name>]` | a part | put in the place of the old one, of which nothing stays |
+| `[set.<family>.<name>]` | some keys | only these change |
+| `remove` | list of text | places that are taken away, such as `"joint.A1"` |
+
+"""
+
+
+def page(kind: str) -> str:
+    """The page of scenes, recipes or sweeps."""
+    found = _schema(kind)
+    definitions = found.pop("$defs", {})
+    title, text = HEADS[kind]
+    parts = [f"# {title}\n\n{text} {WHERE}"]
+    if "properties" in found:
+        parts.append(f"{_table(found, definitions)}\n\n")
+    parts += [EDITS] if kind == "scene" else []
+    examples = _examples(kind)
+    for name in _order(found, definitions):
+        parts.append(_section(name, definitions, examples))
+    return "".join(parts).rstrip() + "\n"
+
+
+def _schema(kind: str) -> dict[str, Any]:
+    if kind == "recipe":
+        adapter: TypeAdapter[Any] = TypeAdapter(Recipe)
+        return adapter.json_schema()
+    return (Scene if kind == "scene" else Sweep).model_json_schema()
+
+
+def _order(schema: Any, definitions: dict[str, Any]) -> list[str]:
+    """Definitions in the order in which they are met from the top."""
+    waiting, found = [schema], dict[str, None]()
+    while waiting:
+        for name in _references(waiting.pop(0)):
+            if name not in found:
+                found[name] = None
+                waiting.append(definitions[name])
+    return list(found)
+
+
+def _references(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if key == "$ref":
+                yield value.rpartition("/")[2]
+            elif key != "discriminator":
+                yield from _references(value)
+    elif isinstance(node, list):
+        for item in node:
+            yield from _references(item)
+
+
+def _section(name: str, definitions: dict[str, Any], examples: dict[str, str]) -> str:
+    part = definitions[name]
+    told = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
+    told = re.split(r"(?<=\.) +\w[\w, ]*: ", told)[0]
+    key = _kind(part)
+    example = f"```toml\n{examples[key]}\n```\n\n" if key in examples else ""
+    return f"## {_heading(name, part)}\n\n{told}\n\n{_table(part, definitions)}\n\n{example}"
+
+
+def _heading(name: str, part: dict[str, Any]) -> str:
+    found = _MODULE.match(name)
+    plain = (f"{found[2]} of {found[1]}" if found[2] else found[3]) if found else name
+    words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
+    told = _NAMES.get(plain, f"{words[0]}{words[1:].lower()}")
+    return f"{told} (`{_kind(part)}`)" if _kind(part) else told
+
+
+def _kind(part: dict[str, Any]) -> str:
+    """What tells this part from others of its family: `type`, `law` or `integrator`, where it is one word."""
+    for key in ("type", "law", "integrator"):
+        told = part.get("properties", {}).get(key, {})
+        if "const" in told:
+            return str(told["const"])
+    return ""
+
+
+def _anchor(name: str, definitions: dict[str, Any]) -> str:
+    words = re.sub(r"[^\w\- ]", "", _heading(name, definitions[name]).lower())
+    return words.replace(" ", "-")
+
+
+def _table(part: dict[str, Any], definitions: dict[str, Any]) -> str:
+    required = part.get("required", [])
+    rows = []
+    for key, told in part.get("properties", {}).items():
+        if key == "source":
+            continue
+        default = "needed" if key in required else _default(told)
+        meaning = "this kind" if "const" in told else _meaning(told)
+        rows.append((f"`{key}`", _value(told, definitions), default, meaning))
+    return table(("key", "value", "default", "meaning"), rows) if rows else "It has no keys."
+
+
+def _default(told: dict[str, Any]) -> str:
+    value = told.get("default")
+    return "-" if value in (None, {}, [], "") or isinstance(value, dict) else f"`{json.dumps(value)}`"
+
+
+def _meaning(told: dict[str, Any]) -> str:
+    text = _QUANTITY.sub("", str(told.get("description", ""))).removesuffix(_OWN_UNIT).removesuffix("; ")
+    for vector in _VECTORS:
+        text = text.removesuffix(f"; {vector}")
+    return text.replace("\n", " ")
+
+
+def _value(told: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """What may be written there, in words."""
+    if "const" in told:
+        return f"`{json.dumps(told['const'])}`"
+    if "enum" in told:
+        return ", ".join(f"`{json.dumps(one)}`" for one in told["enum"])
+    if "$ref" in told:
+        name = told["$ref"].rpartition("/")[2]
+        return f"[{_heading(name, definitions[name])}](#{_anchor(name, definitions)})"
+    for several in ("anyOf", "oneOf"):
+        if several in told:
+            kinds = [_value(one, definitions) for one in told[several] if one.get("type") != "null"]
+            if set(_references(told)) >= _LAW_KINDS and len(kinds) > 1:
+                return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
+            return " or ".join(dict.fromkeys(kinds))
+    quantity = _QUANTITY.search(str(told.get("description", "")))
+    if quantity is not None:
+        return _with_unit(quantity[1])
+    return _plain(told, definitions)
+
+
+def _with_unit(quantity: str) -> str:
+    """A quantity with the SI unit that a bare number of it has."""
+    return f"{quantity} [{SI[quantity]}]" if SI.get(quantity) else quantity
+
+
+def _plain(told: dict[str, Any], definitions: dict[str, Any]) -> str:
+    kind = told.get("type")
+    if kind == "array":
+        vector = next((v for v in _VECTORS if str(told.get("description", "")).endswith(v)), "")
+        if vector:
+            return f"three components, {_with_unit(vector)}"
+        inner = told.get("items") or (told.get("prefixItems") or [{}])[0]
+        return f"list of {_value(inner, definitions)}" if inner else "list"
+    if kind == "object":
+        inner = told.get("additionalProperties")
+        return f"by name: {_value(inner, definitions)}" if isinstance(inner, dict) and inner else "table"
+    words = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false"}
+    if isinstance(kind, list):
+        return "number or text with a unit"
+    return words.get(str(kind), "any value")
+
+
+def _examples(kind: str) -> dict[str, str]:
+    """For each kind of part the shortest one that a scene or recipe of this project has, as TOML."""
+    found: dict[str, str] = {}
+    folders = {"scene": ("scenes",), "recipe": ("meshes", "scenes"), "sweep": ("scenes/sweeps",)}[kind]
+    for path in sorted(path for folder in folders for path in (TREE / folder).rglob("*.toml")):
+        for place, part in _parts(tomllib.loads(path.read_text())):
+            name = next((part[key] for key in ("type", "law", "integrator") if isinstance(part.get(key), str)), "")
+            text = _toml(place, part)
+            if name and place and (name not in found or len(text) < len(found[name])):
+                found[name] = text
+    return {name: text for name, text in found.items() if len(text) < 900}
+
+
+def _parts(node: Any, place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    if not isinstance(node, dict):
+        return
+    if place:
+        yield place, node
+    for key, value in node.items():
+        if key not in ("replace", "set") and not (place and "." in place and key == "source"):
+            yield from _parts(value, f"{place}.{key}" if place else key)
+
+
+def _toml(place: str, part: dict[str, Any]) -> str:
+    lines = [f"{key} = {_inline(value)}" for key, value in part.items() if key != "source"]
+    return "\n".join([f"[{place}]", *lines])
+
+
+def _inline(value: Any) -> str:
+    if isinstance(value, dict):
+        pairs = (f"{key} = {_inline(inner)}" for key, inner in value.items() if key != "source")
+        return "{ " + ", ".join(pairs) + " }" if value else "{}"
+    if isinstance(value, list):
+        return "[" + ", ".join(_inline(item) for item in value) + "]"
+    return json.dumps(value, ensure_ascii=False)

@@ -1,0 +1,14 @@
+"""Where ideal joints rub: the bearings of each type."""
+
+from __future__ import annotations
+
+#: kinds of bearings: a pin turns, a slider slides, a sleeve does both, a ball turns about every axis
+PIN, SLIDER, SLEEVE, BALL = range(4)
+#: by type of joint, for each bearing: kind, side (0: first frame, 1: second) and axis of the frame along which it lies
+BEARINGS: dict[str, tuple[tuple[int, int, int], ...]] = {
+    "revolute": ((PIN, 0, 2),),
+    "prismatic": ((SLIDER, 0, 2),),
+    "cylindrical": ((SLEEVE, 0, 2),),
+    "universal": ((PIN, 0, 0), (PIN, 1, 1)),
+    "spherical": ((BALL, 0, 2),),
+}

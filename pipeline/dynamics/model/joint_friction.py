@@ -1,0 +1,156 @@
+"""The tables of ideal joints with friction: their bearings, what moves them, and what their reactions consist of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.parts import IdealJoint
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
+from flexclear.pipeline.dynamics.joints.bearings import BEARINGS, SLIDER
+from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
+from flexclear.pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
+
+Rows = list[tuple[int, ...]]
+
+
+def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
+    """(floor, number of variables) of the error groups: loss of each joint [J], then bristles [m] of each bearing."""
+    losses = [(energy, 1)] * len(mechanism.scene.rubbing())
+    return losses + [(size, 3) for size in _bristles(mechanism) if size is not None]
+
+
+def _bristles(mechanism: Mechanism) -> list[float | None]:
+    """Size of the bristles of each bearing, or None."""
+    sizes = []
+    for name, joint in mechanism.scene.rubbing().items():
+        sizes += [_law(name, joint).bristle(joint.friction)] * len(BEARINGS[joint.type])
+    return sizes
+
+
+def _law(name: str, joint: IdealJoint) -> Any:
+    assert joint.friction is not None
+    return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
+
+
+def fill(
+    numbering: Numbering, laws: Sequence[str], closures: Sequence[Closure | Coupling], slot: int
+) -> dict[Any, Any]:
+    """The tables of joints with friction and their bearings.
+
+    laws: names of those present.  closures: as the table CLOSURES has them.  slot: of the first loss in the ledger.
+    """
+    mechanism, tables, ends = numbering.mechanism, _Tables(), closure_ends(numbering, closures)
+    bristle = numbering.nq + numbering.nv + slot + len(mechanism.scene.rubbing())
+    sizes = iter(_bristles(mechanism))
+    for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
+        a, b = (mechanism.site(frame) for frame in joint.between)
+        sites = numbering.site(a), numbering.site(b)
+        link, reverse = _link(mechanism, name)
+        closure = next((c for c, one in enumerate(closures) if isinstance(one, Closure) and one.name == name), -1)
+        entries = uncommon(closure_route(numbering, *sites))
+        reaction = _terms(numbering, link, ends) if link >= 0 else _Reaction([], [], [])
+        ranges = tables.add(list(entries), reaction, len(BEARINGS[joint.type]))
+        tables.joints.append((*sites, link, int(reverse), closure, *ranges))
+        for kind, side, axis in BEARINGS[joint.type]:
+            size = next(sizes)
+            law = laws.index(joint.friction.law) if joint.friction is not None else -1
+            tables.bearings.append((number, kind, law, side, axis, bristle if size is not None else -1))
+            tables.numbers.append(_numbers(name, joint, kind))
+            bristle += 3 if size is not None else 0
+    return {
+        m.RUBBING: tables.joints,
+        m.BEARINGS: tables.bearings,
+        m.RUBBING_ENTRIES: tables.entries,
+        m.REACTION_TERMS: tables.terms,
+        m.REACTION_LOOPS: tables.loops,
+        m.BEARING_NUMBERS: tables.numbers,
+    }
+
+
+class _Reaction(NamedTuple):
+    """What the reaction of a tree's joint consists of: terms of momenta and of columns, and closures beyond it."""
+
+    momenta: Rows
+    columns: Rows
+    loops: Rows
+
+
+@dataclass
+class _Tables:
+    """Rows given out so far."""
+
+    joints: Rows = field(default_factory=list)
+    bearings: Rows = field(default_factory=list)
+    entries: Rows = field(default_factory=list)
+    terms: Rows = field(default_factory=list)
+    loops: Rows = field(default_factory=list)
+    numbers: list[list[float]] = field(default_factory=list)
+
+    def add(self, entries: Rows, reaction: _Reaction, bearings: int) -> tuple[int, ...]:
+        """Keep the rows of one joint; where they begin and how many there are, in the order of RUBBING."""
+        terms, momenta, columns = len(self.terms), len(reaction.momenta), len(reaction.columns)
+        of_terms = (terms, momenta, terms + momenta, columns)
+        loops = (len(self.loops), len(reaction.loops))
+        ranges = (len(self.entries), len(entries), *of_terms, *loops, len(self.bearings), bearings)
+        self.entries += entries
+        self.terms += [*reaction.momenta, *reaction.columns]
+        self.loops += reaction.loops
+        return ranges
+
+
+def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
+    """Row of the table BEARING_NUMBERS."""
+    friction = joint.friction
+    assert friction is not None
+    radius = friction.radius or 0.0
+    axial = (friction.axial_radius or radius) / radius if joint.type == "revolute" else 0.0
+    torsion = 1.0 / radius if kind == SLIDER and radius else 0.0
+    lever = 1.0 / friction.length if friction.length else 0.0
+    return [radius, lever, axial, torsion, friction.preload, *_law(name, joint).parameters(friction)]
+
+
+def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
+    """The link whose inboard joint this is (of a chain its last one), and whether it is on the first frame's side."""
+    found = [
+        (i, link.branch.reverse)
+        for i, link in enumerate(mechanism.links)
+        if link.branch.edge is not None and link.branch.edge.name == name
+    ]
+    return found[-1] if found else (-1, False)
+
+
+def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]]) -> _Reaction:
+    """What the reaction of a link's joint consists of; ends: of all closures."""
+    mechanism = numbering.mechanism
+    beyond = {link}
+    for i in range(link + 1, len(mechanism.links)):
+        if mechanism.links[i].branch.parent in beyond:
+            beyond.add(i)
+    momenta: Rows = [
+        (c, c)
+        for i in sorted(beyond)
+        for c in (*numbering.coordinates[i], *numbering.modal_coordinates.get(i, ()))
+        if c < numbering.nv
+    ]
+    columns: Rows = [(c, col) for c, col in numbering.route(link - 1) if c < numbering.nv]
+    loops: Rows = []
+    for c, part, a, b in ends:
+        sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)
+        if sign:
+            loops.append((c, sign, part))
+    return _Reaction(momenta, columns, loops)
+
+
+def closure_ends(numbering: Numbering, closures: Sequence[Closure | Coupling]) -> list[tuple[int, int, int, int]]:
+    """(closure, part, first site, second site) of all closures; a coupling has two parts."""
+    ends = []
+    for c, closure in enumerate(closures):
+        sides = [(side.a, side.b) for side, _ in closure.parts] if isinstance(closure, Coupling) else [closure[1:]]
+        ends += [(c, part, numbering.site(a), numbering.site(b)) for part, (a, b) in enumerate(sides)]
+    return ends

@@ -1,0 +1,55 @@
+"""What ideal joints with friction do: loads of their bearings, sliding, and the wrench of friction."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
+
+
+def friction_series(
+    model: Model, seen: Observed
+) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+    """Load [N], largest sliding speed [m/s] and power [W] of the bearings of each joint, and the wrench of friction.
+
+    The wrench is part of the joint's own; on its second body, about the second frame's origin.
+    """
+    bearings, joints = seen.bearings, model.arrays.table(m.RUBBING)
+    size = bearings["load"]
+    wrench = {half: size[..., None] * bearings[f"unit_{half}"] for half in ("moment", "force")}
+    middle = seen.sites[:, joints["site_b"]]["origin"]
+    force, moment = _summed(joints, wrench["force"]), _summed(joints, wrench["moment"])
+    slip = np.stack([bearings["slip"][:, _mine(row)].max(axis=1) for row in joints], axis=1)
+    dims = ("time", "rubbing")
+    return {
+        "joint_bearing_load": (dims, _summed(joints, size)),
+        "joint_sliding_speed": (dims, slip),
+        "joint_friction_power": (dims, _summed(joints, -size * bearings["loss"])),
+        "joint_friction_force": ((*dims, "axis"), force),
+        "joint_friction_moment": ((*dims, "axis"), moment - np.cross(middle, force)),
+    }, {"rubbing": list(model.scene.rubbing())}
+
+
+def _mine(row: np.ndarray) -> slice:
+    return slice(int(row["bearing0"]), int(row["bearing0"] + row["n_bearings"]))
+
+
+def _summed(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Sums over the bearings of each joint, (time, bearing, ...) to (time, joint, ...)."""
+    return np.stack([values[:, _mine(row)].sum(axis=1) for row in joints], axis=1)
+
+
+def warnings(model: Model, redundant: Collection[str]) -> list[str]:
+    """Sentences about friction that follows reactions which rigid bodies leave undetermined (of joints `redundant`)."""
+    doubted = [name for name in model.scene.rubbing() if name in redundant]
+    if not doubted:
+        return []
+    return [
+        f"friction of {', '.join(doubted)} follows reactions of which rigid bodies leave a part undetermined, such as "
+        "those out of the plane of a planar loop: one of many solutions is taken; a spherical or cylindrical joint in "
+        "the loop makes it unique"
+    ]

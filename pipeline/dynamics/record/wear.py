@@ -1,0 +1,34 @@
+"""What wears contacts, for the run dataset: sliding, load path, and where on both surfaces the contact is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.model import Model
+
+
+def wear_series(
+    model: Model, seen: Observed
+) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+    """Sliding distance [m] and load path [N m] since the start, and the direction of the contact in both surfaces.
+
+    A direction is a unit vector from the centre of a surface to the contact, in the axes of the surface's frame; zero
+    while the centres coincide.
+    """
+    ledger, first = seen.state[:, model.speeds.stop :], model.arrays.size(m.WEAR_SLOT)
+    rows = model.arrays.table(m.WORN)["contact"]
+    books = m.named(m.WEAR_LEDGER, ledger[:, first : first + m.WEAR_LEDGER.size * len(rows)])
+    wiring, offset = model.arrays.table(m.CONTACTS)[rows], seen.touch["offset"][:, rows]
+    length = np.linalg.norm(offset, axis=-1, keepdims=True)
+    outer = np.divide(offset, length, out=np.zeros_like(offset), where=length > 0.0)
+    R_WO, R_WI = (seen.sites["axes"][:, wiring[side]] for side in ("outer", "inner"))
+    inner = np.einsum("tkji,tkjl,tkl->tki", R_WI, R_WO, outer)
+    dims = ("time", "worn")
+    return {
+        "wear_sliding_distance": (dims, books["sliding"]),
+        "wear_load_path": (dims, books["load_path"]),
+        "wear_direction_outer": ((*dims, "axis"), outer),
+        "wear_direction_inner": ((*dims, "axis"), inner),
+    }, {"worn": list(model.scene.worn())}

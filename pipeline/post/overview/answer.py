@@ -1,0 +1,160 @@
+"""What a report says first: what clearance and flexibility do, in sentences that the numbers make."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.post.overview.curves import scaled
+from flexclear.pipeline.post.series import parameters
+
+#: a difference is told from none where it is so many times larger than both runs' own errors
+TOLD_APART = 2.0
+#: below this share of the largest value an effect is called slight
+SLIGHT = 0.01
+#: an energy that the ledger misses counts from this share of the largest energy on
+LEDGER = 1e-3
+
+
+def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence[str]) -> str:
+    """A list of sentences, as HTML.
+
+    compared: of `overview.comparison`, the ideal twin first and the scene last; None where there is none.
+    run: schema RUN of the scene.  doubts: warnings of the run.
+    """
+    said = [] if compared is None else [*_effects(compared), *_impacts(compared), *_horizon(compared)]
+    if compared is None and run is not None:
+        said.append(
+            "The scene has neither clearance nor flexible bodies: it is its own ideal, and nothing is compared with it."
+        )
+    if run is not None:
+        said += _trust(run)
+    if doubts:
+        many = "One thing is" if len(doubts) == 1 else f"{len(doubts)} things are"
+        said.append(f"<span class='bad'>{many} to be doubted</span>, see <a href='#doubts'>below</a>.")
+    head = "" if compared is None else "<p>Beside the same mechanism with ideal joints and rigid bodies:</p>"
+    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"
+
+
+def _effects(compared: xr.Dataset) -> list[str]:
+    """A sentence for each quantity: by how much the scene differs from its ideal, and whether that is told apart."""
+    found = []
+    last = compared.sizes["run"] - 1
+    for j, name in enumerate(str(q) for q in compared["quantity"].values):
+        unit = str(compared["unit"].values[j])
+        difference = float(compared["difference"][last, j])
+        if not np.isfinite(difference):
+            continue
+        errors = [float(compared["error"][i, j]) for i in (0, last)]
+        error = sum(errors) if np.isfinite(errors).all() else np.nan
+        size = float(compared["largest"][0, j])
+        share = difference / size if size > 0.0 else np.nan
+        value = number(difference, error, unit)
+        part = f", {100.0 * share:.2g} % of the ideal's largest value" if np.isfinite(share) and share < 100.0 else ""
+        if np.isfinite(error) and difference < TOLD_APART * error:
+            told = f"no effect is told apart from the errors ({value})"
+        elif np.isfinite(share) and share < SLIGHT:
+            told = f"a slight effect, <b class='n'>{value}</b>{part}"
+        else:
+            told = f"differs by up to <b class='n'>{value}</b>{part}"
+        found.append(f"<b>{html.escape(name)}</b>: {told}.")
+    return found
+
+
+def _impacts(compared: xr.Dataset) -> list[str]:
+    found = []
+    last = compared.isel(run=compared.sizes["run"] - 1)
+    for k, name in enumerate(str(c) for c in last["contact"].values) if "contact" in last.coords else ():
+        count, peak = float(last["impact_count"][k]), float(last["peak_force"][k])
+        if not np.isfinite(count):
+            continue
+        many = "No impact" if not count else "One impact" if count == 1 else f"{count:.0f} impacts"
+        found.append(
+            f"<b>{html.escape(name)}</b>: {many}; the contact force reaches "
+            f"<b class='n'>{number(peak, np.nan, 'N')}</b>."
+        )
+    return found
+
+
+def _horizon(compared: xr.Dataset) -> list[str]:
+    end, horizon = float(compared["time"].values[-1]), float(compared["horizon"].values[-1])
+    if horizon >= end:
+        return ["Neighbouring starts stay together over the whole run: it can be read point by point."]
+    return [
+        f"Neighbouring starts part after <span class='n'>{1e3 * horizon:.4g} ms</span> of "
+        f"<span class='n'>{1e3 * end:.4g} ms</span>: what is later holds for this run, and for others only in the mean."
+    ]
+
+
+def _trust(run: xr.Dataset) -> list[str]:
+    energies = [
+        np.abs(run[n].values - run[n].values[0]).max()
+        for n in ("kinetic", "potential", "elastic", "drive_work", "load_work")
+        if n in run
+    ]
+    largest, missed = max(map(float, energies), default=0.0), float(np.abs(run["energy_error"].values).max())
+    share = missed / largest if largest > 0.0 else 0.0
+    word = "<span class='good'>closes</span>" if share < LEDGER else "<span class='bad'>does not close</span>"
+    return [f"The energy ledger {word}: it misses <span class='n'>{share:.1e}</span> of the largest energy."]
+
+
+def number(value: float, error: float, unit: str) -> str:
+    """A value with its error, in a unit that reads well, to the second digit of the error."""
+    factor, written = scaled(value, unit)
+    value, error = factor * value, factor * error
+    if not np.isfinite(error) or error <= 0.0:
+        return f"{value:.4g} {written}"
+    places = 1 - int(np.floor(np.log10(error)))
+    if places > 6 or error < 1e-4 * abs(value):
+        return f"{value:.4g} ± {error:.2g} {written}"
+    return f"{value:.{max(places, 0)}f} ± {error:.{max(places, 0)}f} {written}"
+
+
+def effects(scene: Mapping[str, Any]) -> dict[str, str]:
+    """Which effects a scene (its parameters) has, by name, in words; those that it has not say so."""
+    body, joint = scene.get("body", {}), scene.get("joint", {})
+    load = scene.get("load", {})
+    flexible = [n for n, b in body.items() if b["type"] == "flexible"]
+    loose = [n for n, j in joint.items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"]
+    there = {
+        "clearance": loose,
+        "contact friction": [f"{n} ({joint[n]['friction']['law']})" for n in loose if joint[n].get("friction")],
+        "wear": [n for n in loose if joint[n].get("wear")],
+        "flexible bodies": [f"{n} ({body[n]['modes']['reference']})" for n in flexible],
+        "damping of flexible bodies": [n for n in flexible if body[n].get("damping") is not None],
+        "geometric stiffening": [n for n in flexible if body[n].get("stiffening") is not None],
+        "gravity": [n for n, part in load.items() if part["type"] == "gravity"],
+        "springs, dampers, bushings": [
+            n for n, p in load.items() if p["type"] in ("spring-damper", "joint-spring", "bushing")
+        ],
+        "joint friction": [n for n, part in load.items() if part["type"] == "joint-friction"]
+        + [n for n, part in joint.items() if n not in loose and part.get("friction")],
+        "controllers": [n for n, part in load.items() if "pid" in part["type"]],
+        "other forces": [n for n, p in load.items() if p["type"] in ("point-force", "point-torque", "joint-force")],
+        "stops": list(scene.get("stop", {})),
+        "gears": list(scene.get("gear", {})),
+    }
+    return {name: ", ".join(found) if found else "absent: not computed" for name, found in there.items()}
+
+
+def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
+    """Assumptions in the order of what hangs on them: of joints with clearance and flexible bodies first."""
+    scene = {} if run is None else parameters(run)
+    loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
+    flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}
+
+    def weight(place: str) -> int:
+        family, _, rest = place.partition(".")
+        part = rest.partition(".")[0]
+        if (family, part in loose) == ("joint", True):
+            return 0
+        if (family, part in flexible) == ("body", True):
+            return 1
+        order = {"drive": 2, "load": 3, "stop": 3, "gear": 3, "start": 4, "joint": 5, "body": 6}
+        return order.get(family, 7)
+
+    return dict(sorted(assumptions.items(), key=lambda item: (weight(item[0]), item[0])))

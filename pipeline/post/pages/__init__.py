@@ -1,0 +1,56 @@
+"""What pages are made of: style, scripts, and the viewer; each page carries its own copy."""
+
+from __future__ import annotations
+
+import html
+import json
+import re
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+
+@cache
+def asset(name: str) -> str:
+    """The text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``."""
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+
+
+def viewer(told: dict[str, Any], caption: str, *, play: bool = False) -> str:
+    """A view that can be turned, as a figure; the page needs its script.
+
+    told: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
+    """
+    moving = "shapes" not in told
+    tools = ["<button type='button' data-part='play' aria-pressed='false'>Play</button>"]
+    if moving:
+        last = len(told["times"]) - 1
+        tools.append(f"<label>time <input type='range' data-part='time' min='0' max='{last}' value='0'></label>")
+    elif len(told["shapes"]) > 1:
+        options = "".join(
+            f"<option value='{k}'>{html.escape(shape['label'])}</option>" for k, shape in enumerate(told["shapes"])
+        )
+        tools.append(f"<label>mode <select data-part='shape'>{options}</select></label>")
+    if any("fields" in mesh for mesh in told["meshes"]):
+        tools.append(
+            "<label>deformation <input type='range' data-part='factor' min='-1' max='1' step='0.05' value='0'></label>"
+        )
+        tools.append("<span class='viewer-scale'>0 <i></i> <span></span></span>")
+    tools.append("<button type='button' data-part='home'>Reset view</button>")
+    label = f"{caption}: drag or arrow keys turn, plus and minus zoom, space plays"
+    # a closing tag inside of the data would end the script
+    data = json.dumps(told, separators=(",", ":")).replace("</", "<\\/")
+    return (
+        f"<figure><figcaption>{html.escape(caption)}</figcaption>"
+        f"<div class='viewer' data-play='{'yes' if play else 'no'}'>"
+        f"<canvas tabindex='0' role='img' aria-label='{html.escape(label, quote=True)}'></canvas>"
+        f"<div class='viewer-tools'>{''.join(tools)}</div><p class='viewer-state' aria-live='off'></p>"
+        f"<script type='application/json'>{data}</script></div></figure>\n"
+    )
+
+
+def figures_of(page: str) -> str:
+    """The views of a page of this program, to be put into another one."""
+    return "".join(
+        re.findall(r"<figure><figcaption>[^<]*</figcaption><div class='viewer'.*?</figure>\n", page, re.DOTALL)
+    )

@@ -1,0 +1,114 @@
+"""All modes of a body on one sheet: shape, frequency, exaggeration; as a picture, or moving."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib import pyplot as plt
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from flexclear.pipeline.post.body_shape import faces, is_rod, scale_to, surface
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.drawing import View, skin, view
+from flexclear.pipeline.post.plotting.style import SOFT
+
+#: modes beside each other, and drawn size of the largest displacement as a share of the body's length
+COLUMNS, SHARE = 3, 0.14
+#: pictures of one vibration in a film
+FRAMES = 16
+
+
+def files(name: str, body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> dict[str, bytes]:
+    """``<name>.png`` and ``<name>.svg`` of all modes of a body (schema BUNDLE), seen from a direction."""
+    with style.style():
+        return style.files(name, _sheet(body, bundle, view(towards, up), 1.0))
+
+
+def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -> Iterator[np.ndarray]:
+    """One vibration of all modes, pictures of shape (height, width, 3)."""
+    with style.style():
+        seen = view(towards, up)
+        drawn: dict[float, np.ndarray] = {}  # on the way back bodies look as on the way out
+        for phase in np.linspace(0.0, 2.0 * np.pi, FRAMES, endpoint=False):
+            share = round(float(np.sin(phase)), 6)
+            if share not in drawn:
+                drawn[share] = _pixels(_sheet(body, bundle, seen, share))
+            yield drawn[share]
+
+
+def _pixels(figure: Figure) -> np.ndarray:
+    """A figure as a picture, and closed."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="rgba", dpi=80)
+    plt.close(figure)
+    width, height = (int(v) for v in figure.get_size_inches() * 80)
+    pixels = np.frombuffer(buffer.getvalue(), dtype=np.uint8).reshape(height, width, 4)
+    # films want even numbers of pixels
+    return pixels[: height - height % 2, : width - width % 2, :3].copy()
+
+
+def _sheet(body: str, bundle: xr.Dataset, seen: View, share: float) -> Figure:
+    count = bundle.sizes["mode"]
+    rows = -(-count // COLUMNS)
+    rest, _ = surface(bundle, np.zeros(count))
+    places = seen.project(rest)
+    span = np.ptp(places, axis=0)
+    ratio = float(np.clip((span[1] + 2.2 * SHARE * span.max()) / (span[0] + 0.1 * span.max()), 0.25, 1.6))
+    width = 11.0
+    figure, axes = style.grid(rows, COLUMNS, (width, 1.1 + rows * (0.35 + ratio * width / COLUMNS * 0.92)))
+    for k, panel in enumerate(axes.flat):
+        if k < count:
+            _mode(panel, bundle, seen, k, share, rest)
+        else:
+            panel.set_visible(False)
+    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=axes, shrink=0.6, pad=0.01, aspect=30)
+    bar.set_label("displacement, largest = 1")
+    kind = str(bundle.attrs.get("reference", "")).replace("-", " ")
+    style.heading(
+        figure,
+        f"{body}: {count} modes{f', {kind}' if kind else ''}",
+        "mass-normalised shapes (in kg^-1/2) times the factor beside each; dashed: at rest",
+    )
+    return figure
+
+
+def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, share: float, rest: np.ndarray) -> None:
+    q = np.zeros(bundle.sizes["mode"])
+    q[mode] = 1.0
+    factor = scale_to(bundle, q, SHARE)
+    points, size = surface(bundle, q, share * factor)
+    moved = size if size.max() > 1e-9 * np.ptp(rest) else np.linalg.norm(points - rest, axis=1)
+    largest = float(scale_to_size(bundle, q, factor, rest))
+    index = faces(bundle)
+    if index.shape[1] >= 3:
+        triangles = index if index.shape[1] == 3 else np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
+        skin(panel, seen, points, triangles, np.clip(moved / largest, 0.0, 1.0), zorder=2)
+    else:
+        x, y = seen.project(points).T
+        panel.scatter(x, y, c=moved / largest, cmap="viridis", vmin=0.0, vmax=1.0, s=9)
+    line = seen.project(rest if not is_rod(bundle) else bundle["node_position"].values)
+    panel.plot(*line.T, color=SOFT, lw=0.8 if is_rod(bundle) else 0.0, ls="--", zorder=3)
+    both = np.concatenate([seen.project(surface(bundle, q, sign * factor)[0]) for sign in (1.0, -1.0)] + [line])
+    low, high = both.min(axis=0), both.max(axis=0)
+    edge = 0.03 * float((high - low).max())
+    panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
+    panel.set_aspect("equal")
+    panel.set_axis_off()
+    frequency = float(bundle["frequency"].values[mode])
+    told = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
+    panel.set_title(f"mode {mode + 1}: {told}, × {factor:.2g} √kg m", fontsize=8.8)
+
+
+def scale_to_size(bundle: xr.Dataset, q: np.ndarray, factor: float, rest: np.ndarray) -> float:
+    """The largest drawn displacement [m] of a shape: of its centre line, or of its skin where that rests."""
+    points, size = surface(bundle, q, factor)
+    return (
+        max(float(size.max()), 1e-300)
+        if size.max() > 1e-9 * np.ptp(rest)
+        else float(np.linalg.norm(points - rest, axis=1).max())
+    )

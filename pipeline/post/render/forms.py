@@ -1,0 +1,195 @@
+"""What a rigid body looks like: bars, plates and blocks between the joints that it has.
+
+Mass and inertia say little about a shape: the uniform cylinder with the inertia of a crank is a drum that hides the
+mechanism. So bodies are drawn as links between their joints, and the inertia only tells the thickness of slender bars,
+the radius of discs, and the size of what has no joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.post.render import shape_files, surfaces
+from flexclear.pipeline.post.render.solids import Solid
+from flexclear.pipeline.post.render.surfaces import Surface
+
+#: half width of a link as a share of the mechanism's size, and of the distance of its joints at most
+WIDTH, WIDEST = 0.016, 0.2
+#: thickness of flat links, in half widths
+FLAT = 0.9
+#: places nearer to each other than this many half widths are one
+NEAR = 0.3
+#: a solid is slender where it is so many times longer than thick
+SLENDER = 2.5
+#: largest half extent of a body without joints apart, as a share of the mechanism's size
+LARGEST = 0.1
+#: joints that turn about z of their frames, and that slide along it
+TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
+SLIDING = ("prismatic", "cylindrical")
+BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """A joint's place on a body: frame name, its origin and axes in the body's, type of the joint, which side it is."""
+
+    frame: str
+    origin: np.ndarray
+    axes: np.ndarray
+    joint: str
+    first: bool
+
+
+def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int = 0) -> Surface:
+    """Surface of a body in its own axes [m]; empty where the joints' own balls are all there is.
+
+    com: centre of mass [m].  solid: what has its inertia, about that.  size: of the mechanism [m].  layer: counts
+    bodies, so that flat links in one plane are not equally thick and their faces do not lie in each other.
+    """
+    joined = [seat for seat in seats if seat.joint != "fixed"] or list(seats)
+    places = _apart([seat.origin for seat in (*joined, *seats)], NEAR * WIDTH * size)
+    if len(places) < 2:
+        return _lone(joined, places, com, solid, size)
+    spans = np.linalg.norm(places[:, None] - places[None], axis=-1)
+    width = min(WIDTH * size, WIDEST * float(spans.max()))
+    normal = _common_axis(joined)
+    if normal is not None and np.ptp(places @ normal) < width:
+        return _plate(places, normal, width, layer)
+    axis = _line(places, width)
+    if axis is not None:
+        low, high = places[np.argmin(places @ axis)], places[np.argmax(places @ axis)]
+        return surfaces.bar(low, high, _thickness(solid, axis, width))
+    flat = _plane(places, width)
+    if flat is not None:
+        return _plate(places, flat, 1.3 * width, layer)
+    middle = places.mean(axis=0)
+    bars = [surfaces.bar(middle, place, 0.8 * width) for place in places if np.linalg.norm(place - middle) > width]
+    return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
+
+
+def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
+    """The shapes that a scene gives of a body, in the body frame [m]; files are relative to `folder`.
+
+    Raises InputError for files that cannot be read.
+    """
+    found = []
+    for shape in told:
+        kind = shape["type"]
+        if kind == "box":
+            part = surfaces.box(shape["size"])
+        elif kind == "cylinder":
+            part = surfaces.cylinder(shape["radius"], shape["length"])
+        elif kind == "sphere":
+            part = surfaces.sphere(shape["radius"])
+        else:
+            part = shape_files.read(folder / shape["file"], float(shape.get("unit", 1.0)))
+        pose = Pose.model_validate(shape.get("pose", {}))
+        found.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
+    return surfaces.merged(found)
+
+
+def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
+    """A body whose joints are all in one place, or that has none."""
+    width = WIDTH * size
+    place = places[0] if len(places) else com
+    arm = com - place
+    reach = float(np.linalg.norm(arm))
+    kinds = [seat.joint for seat in seats]
+    if reach > 1.5 * width:
+        return _arm(place, com, solid, width)
+    slide = next((seat for seat in seats if seat.joint in SLIDING), None)
+    if slide is not None:
+        block = surfaces.box((3.0 * width, 3.0 * width, 4.4 * width))
+        return surfaces.moved(block, place, slide.axes)
+    wheel = next((seat for seat in seats if seat.joint in TURNING), None)
+    if wheel is not None:
+        return surfaces.moved(_wheel(solid, wheel.axes[:, 2], size), place, surfaces.along(wheel.axes[:, 2]))
+    if any(kind in BALLS for kind in kinds):
+        return surfaces.EMPTY
+    if solid is None:
+        return surfaces.moved(surfaces.sphere(2.0 * width), place)
+    half = solid.half * min(1.0, LARGEST * size / float(solid.half.max()))
+    if kinds and np.ptp(half) <= 1e-9 * half.max():  # alike about all axes and fixed to something: a ball
+        return surfaces.moved(surfaces.sphere(float(half[0])), com)
+    part = surfaces.cylinder(half[0], 2.0 * half[2]) if solid.round else surfaces.box(tuple(2.0 * half))
+    return surfaces.moved(part, com, solid.axes)
+
+
+def _arm(place: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
+    """A body that hangs on one joint: a bar where its inertia is that of one, else a bob on an arm."""
+    axis = (com - place) / np.linalg.norm(com - place)
+    half = 0.0 if solid is None else float(solid.half.max())
+    if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - place):
+        far = com + half * axis
+        return surfaces.bar(place, far, _thickness(solid, axis, width))
+    radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
+    return surfaces.merged([surfaces.bar(place, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
+
+
+def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
+    """A disc about z with a mark that shows how it turns."""
+    width = WIDTH * size
+    radius = 3.0 * width
+    if solid is not None and solid.round and abs(solid.axes[:, 2] @ axis) > 0.99:
+        radius = float(np.clip(solid.half[0], 2.4 * width, LARGEST * size))
+    mark = surfaces.moved(surfaces.box((0.7 * radius, 0.5 * width, 1.3 * width)), np.array([0.55 * radius, 0.0, 0.0]))
+    return surfaces.merged([surfaces.cylinder(radius, width), mark])
+
+
+def _thickness(solid: Solid | None, axis: np.ndarray, width: float) -> float:
+    """Radius of a bar along an axis: that of the slender solid with its inertia, within what can be seen."""
+    if solid is None or not _slender(solid, axis):
+        return 0.8 * width
+    return float(np.clip(np.sort(solid.half)[1], 0.4 * width, 1.7 * width))
+
+
+def _slender(solid: Solid, axis: np.ndarray) -> bool:
+    longest = solid.axes[:, int(solid.half.argmax())]
+    return float(solid.half.max()) > SLENDER * float(np.sort(solid.half)[1]) and abs(float(longest @ axis)) > 0.95
+
+
+def _plate(places: np.ndarray, normal: np.ndarray, width: float, layer: int) -> Surface:
+    axes = surfaces.along(normal)
+    middle = places.mean(axis=0)
+    flat = (places - middle) @ axes
+    thickness = FLAT * width * (1.0 - 0.12 * (layer % 5))
+    return surfaces.moved(surfaces.prism(surfaces.hull(flat[:, :2], width), thickness), middle, axes)
+
+
+def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
+    """The axis about which all joints of a body turn, slides in its plane aside; None where there is none."""
+    axes = [seat.axes[:, 2] for seat in seats if seat.joint in TURNING]
+    if not axes or any(abs(axis @ axes[0]) < 0.999 for axis in axes):
+        return None
+    slides = [seat.axes[:, 2] for seat in seats if seat.joint in SLIDING]
+    others = [seat for seat in seats if seat.joint not in (*TURNING, *SLIDING, *BALLS)]
+    return None if others or any(abs(axis @ axes[0]) > 0.05 for axis in slides) else axes[0]
+
+
+def _line(places: np.ndarray, width: float) -> np.ndarray | None:
+    """Direction of a line on which all places lie."""
+    way = places - places.mean(axis=0)
+    _, size, axes = np.linalg.svd(way, full_matrices=False)
+    return axes[0] if len(size) < 2 or size[1] < 0.5 * width else None
+
+
+def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
+    """Normal of a plane in which all places lie."""
+    _, size, axes = np.linalg.svd(places - places.mean(axis=0))
+    return axes[2] if len(size) < 3 or size[2] < 0.5 * width else None
+
+
+def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
+    """The places, those closer than `same` to an earlier one left out, shape (n, 3)."""
+    found: list[np.ndarray] = []
+    for place in places:
+        if all(np.linalg.norm(place - other) > same for other in found):
+            found.append(place)
+    return np.array(found).reshape(-1, 3)

@@ -1,0 +1,91 @@
+"""How fast a film runs: evenly, and slower around the strongest impacts, so that they are seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from flexclear.pipeline.post.impacts import impacts
+
+#: length of a film [s], and how much slower it runs around impacts
+SECONDS, SLOWER = 3.75, 8.0
+#: so many of the strongest impacts are shown slowly, each within this share of the run
+SHOWN, AROUND = 3, 0.008
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """times: of the run at each frame [s].  slower: how many times slower than in reality the film is there."""
+
+    times: np.ndarray
+    slower: np.ndarray
+
+
+def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = None, rate: int = 24) -> Pace:
+    """The times of the frames of a film, so many a second, in which impacts take `slower` times longer."""
+    time, seconds = run["time"].values, seconds or SECONDS
+    start, span = float(time[0]), float(time[-1] - time[0])
+    strong = strongest(run)
+    way = np.linspace(0.0, 1.0, 4001)
+    weight = np.ones_like(way)
+    factor = SLOWER if slower is None else slower
+    for when in strong:
+        # a smooth bump: the film slows down and speeds up again, it does not jump
+        near = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
+        weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * near, 1.0))
+    passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(way))])
+    total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
+    share = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
+    length = total / rate
+    return Pace(start + span * share, length / passed[-1] * np.interp(share, way, weight) / span)
+
+
+def strongest(run: xr.Dataset) -> np.ndarray:
+    """When the strongest impacts begin [s], at most SHOWN, ascending; none without contacts."""
+    found = impacts(run)
+    if "impact_time" not in found:
+        return np.empty(0)
+    times, force = np.asarray(found["impact_time"][1]), np.nan_to_num(np.asarray(found["impact_peak_force"][1]))
+    kept: list[float] = []
+    least = 4.0 * AROUND * float(run["time"].values[-1] - run["time"].values[0])
+    for k in np.argsort(-force, kind="stable"):
+        if len(kept) < SHOWN and all(abs(times[k] - other) > least for other in kept):
+            kept.append(float(times[k]))
+    return np.sort(kept)
+
+
+def told(slower: float) -> str:
+    """The pace in words."""
+    if 0.95 < slower < 1.05:
+        return "as fast as it is"
+    return f"{slower:.2g} times slower" if slower > 1.0 else f"{1.0 / slower:.2g} times faster"
+
+
+class Caption:
+    """A line of text at the lower left of pictures; each text is drawn once."""
+
+    def __init__(self, size: tuple[int, int], color: str) -> None:
+        self.size, self.color = size, color
+        self.drawn = lru_cache(maxsize=64)(self._drawn)
+
+    def onto(self, picture: np.ndarray, text: str) -> None:
+        """Put a text into a picture of shape (height, width, 3), in place."""
+        shade = self.drawn(text)
+        height = len(shade)
+        ink = np.array([int(self.color[k : k + 2], 16) for k in (1, 3, 5)])
+        place = picture[-height:, : shade.shape[1]]
+        place[:] = np.round(place * (1.0 - shade[..., None]) + ink * shade[..., None]).astype(picture.dtype)
+
+    def _drawn(self, text: str) -> np.ndarray:
+        """How dark each pixel is, in [0, 1]."""
+        width, height = self.size
+        canvas = FigureCanvasAgg(Figure(figsize=(width / 100, height / 100), dpi=100))
+        canvas.figure.text(14 / width, 0.45, text, fontsize=9.5, va="center", color="black", parse_math=False)
+        canvas.draw()
+        shade: np.ndarray = 1.0 - np.asarray(canvas.buffer_rgba())[..., 0] / 255.0
+        return shade

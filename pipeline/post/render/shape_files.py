@@ -1,0 +1,51 @@
+"""Surfaces from files: the only place besides `pipeline.structure` that reads meshes, and only to draw them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.post.render import surfaces
+from flexclear.pipeline.post.render.surfaces import Surface
+
+#: faces of cells, by their corners, seen from outside
+_SIDES = {
+    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
+
+
+def read(path: Path, unit: float) -> Surface:
+    """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
+    import meshio
+
+    opened.note(path)  # some readers are not written in Python
+    try:
+        with np.errstate(over="ignore"):  # meshio takes text for the length of a binary file, to see that it is none
+            mesh = meshio.read(path)
+    except (Exception, SystemExit) as error:  # meshio ends the process for what it does not know
+        said = str(error) if not isinstance(error, SystemExit) else "meshio does not know its format"
+        raise InputError(
+            f"{path}", f"is no surface that can be drawn: {said}", "give an STL, VTK, PLY or OBJ file"
+        ) from None
+    faces = []
+    for block in mesh.cells:
+        if block.type in ("triangle", "quad"):
+            faces.append(surfaces.triangulated(block.data.astype(int)))
+        elif block.type in _SIDES:
+            faces.append(_boundary(block.data.astype(int), _SIDES[block.type]))
+    if not faces:
+        raise InputError(f"{path}", "has no triangles, quadrangles, tetrahedra or hexahedra", "export a surface")
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = unit * mesh.points
+    return surfaces.shaded(points, np.concatenate(faces), sharp=True)
+
+
+def _boundary(cells: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Triangles of the faces that belong to one cell only."""
+    faces = cells[:, list(sides)].reshape(-1, len(sides[0]))
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return surfaces.triangulated(faces[first[count == 1]])

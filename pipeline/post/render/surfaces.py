@@ -1,0 +1,158 @@
+"""Triangulated surfaces of simple solids, with normals; pure numbers, whoever draws them.
+
+Edges are sharp: points are repeated where two faces meet at an angle, each with the normal of its face.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+#: corners of what is drawn round
+ROUND = 32
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """points, normals [m, -], shape (n, 3); triangles: indices of points, outside seen anticlockwise, shape (m, 3)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    triangles: np.ndarray
+
+
+EMPTY = Surface(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, 3), dtype=int))
+
+
+def merged(parts: Sequence[Surface]) -> Surface:
+    """Several surfaces as one."""
+    if not parts:
+        return EMPTY
+    offsets = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
+    return Surface(
+        np.concatenate([part.points for part in parts]),
+        np.concatenate([part.normals for part in parts]),
+        np.concatenate([part.triangles + offset for part, offset in zip(parts, offsets, strict=True)]),
+    )
+
+
+def moved(surface: Surface, origin: np.ndarray, axes: np.ndarray | None = None) -> Surface:
+    """The surface in a frame with this origin [m] and these axes (columns), seen from the frame's parent."""
+    R = np.eye(3) if axes is None else axes
+    return Surface(surface.points @ R.T + origin, surface.normals @ R.T, surface.triangles)
+
+
+def along(direction: np.ndarray) -> np.ndarray:
+    """Right-handed axes, columns, whose z is a direction, shape (3, 3)."""
+    z = direction / np.linalg.norm(direction)
+    x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+def prism(outline: np.ndarray, thickness: float, *, smooth: bool = False) -> Surface:
+    """A convex outline, anticlockwise, shape (n, 2), extruded along z by `thickness`, the middle at z = 0.
+
+    smooth: whether its walls are shaded as round.
+    """
+    n, h = len(outline), 0.5 * thickness
+    centre = outline.mean(axis=0)
+    edge = np.roll(outline, -1, axis=0) - outline
+    flat = np.column_stack([edge[:, 1], -edge[:, 0]]) / np.linalg.norm(edge, axis=1)[:, None]
+    if smooth:
+        corner = flat + np.roll(flat, 1, axis=0)
+        corner /= np.linalg.norm(corner, axis=1)[:, None]
+        pairs = np.stack([corner, np.roll(corner, -1, axis=0)], axis=1)
+    else:
+        pairs = np.stack([flat, flat], axis=1)
+    ends = np.stack([outline, np.roll(outline, -1, axis=0)], axis=1)
+    wall = np.concatenate([_at(ends, -h), _at(ends, h)], axis=1).reshape(-1, 3)
+    normal = np.concatenate([_at(pairs, 0.0), _at(pairs, 0.0)], axis=1).reshape(-1, 3)
+    k = 4 * np.arange(n)[:, None, None]
+    walls = Surface(wall, normal, (k + np.array([[0, 1, 3], [0, 3, 2]])).reshape(-1, 3))
+    return merged([walls, *(_cap(outline, centre, side * h, side) for side in (1.0, -1.0))])
+
+
+def hull(places: np.ndarray, margin: float) -> np.ndarray:
+    """Outline around places in a plane, shape (n, 2), at a distance `margin` from them, anticlockwise, shape (m, 2)."""
+    turn = np.linspace(0.0, 2.0 * np.pi, ROUND, endpoint=False)
+    circle = margin * np.column_stack([np.cos(turn), np.sin(turn)])
+    spread = (places[:, None, :] + circle).reshape(-1, 2)
+    outline: np.ndarray = spread[ConvexHull(spread).vertices]
+    return outline
+
+
+def cylinder(radius: float, length: float) -> Surface:
+    """About the origin, its axis along z."""
+    return prism(hull(np.zeros((1, 2)), radius), length, smooth=True)
+
+
+def box(size: Sequence[float]) -> Surface:
+    """About the origin."""
+    x, y = 0.5 * size[0], 0.5 * size[1]
+    return prism(np.array([[-x, -y], [x, -y], [x, y], [-x, y]]), size[2])
+
+
+def sphere(radius: float) -> Surface:
+    """About the origin."""
+    across = ROUND // 2
+    theta, phi = np.meshgrid(
+        np.linspace(0.0, np.pi, across + 1), np.linspace(0.0, 2.0 * np.pi, ROUND + 1), indexing="ij"
+    )
+    normals = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    return Surface(radius * normals.reshape(-1, 3), normals.reshape(-1, 3), grid(across + 1, ROUND + 1))
+
+
+def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
+    """A round bar with flat ends."""
+    way = end - start
+    return moved(cylinder(radius, float(np.linalg.norm(way))), 0.5 * (start + end), along(way))
+
+
+def grid(rows: int, columns: int) -> np.ndarray:
+    """Triangles between points in rows and columns, shape (2 (rows - 1) (columns - 1), 3)."""
+    index = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
+    return np.stack([np.stack([a, b, c], axis=-1), np.stack([a, c, d], axis=-1)], axis=2).reshape(-1, 3)
+
+
+def triangulated(faces: np.ndarray) -> np.ndarray:
+    """Faces of three or four corners as triangles, shape (m, 3); bare points and lines give none."""
+    if faces.shape[1] < 3:
+        return np.empty((0, 3), dtype=int)
+    return faces if faces.shape[1] == 3 else np.concatenate([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]])
+
+
+def shaded(points: np.ndarray, triangles: np.ndarray, *, sharp: bool = False) -> Surface:
+    """Points and triangles with normals: averaged over each point's triangles, or of each triangle where `sharp`."""
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    if sharp:
+        return Surface(
+            corners.reshape(-1, 3), np.repeat(_unit(normal), 3, axis=0), np.arange(3 * len(corners)).reshape(-1, 3)
+        )
+    total = np.zeros_like(points)
+    for k in range(3):
+        np.add.at(total, triangles[:, k], normal)
+    return Surface(points, _unit(total), triangles)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    size = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return np.where(size > 0.0, vectors / np.where(size > 0.0, size, 1.0), np.array([0.0, 0.0, 1.0]))
+
+
+def _at(flat: np.ndarray, height: float) -> np.ndarray:
+    """Points in the plane (..., 2) with their z."""
+    return np.concatenate([flat, np.full((*flat.shape[:-1], 1), height)], axis=-1)
+
+
+def _cap(outline: np.ndarray, centre: np.ndarray, height: float, side: float) -> Surface:
+    n = len(outline)
+    points = _at(np.vstack([outline, centre]), height)
+    ring = np.arange(n)
+    order = [np.full(n, n), ring, np.roll(ring, -1)] if side > 0.0 else [np.full(n, n), np.roll(ring, -1), ring]
+    return Surface(points, np.tile([0.0, 0.0, side], (n + 1, 1)), np.column_stack(order))

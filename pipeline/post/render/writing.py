@@ -1,0 +1,46 @@
+"""Pictures one after the other as a film."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+#: pictures a second
+RATE = 24
+
+
+def write(frames: Iterator[np.ndarray], rate: int, kind: str = "mp4") -> tuple[str, bytes]:
+    """Frames of shape (height, width, 3) as MP4, or as GIF where that is asked for or no ffmpeg is found."""
+    import imageio.v2 as imageio
+
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            if kind != "mp4":
+                raise ValueError(kind)
+            path = Path(folder) / "film.mp4"
+            # one thread and no metadata: equal frames give equal bytes
+            options = [
+                "-threads",
+                "1",
+                "-map_metadata",
+                "-1",
+                "-fflags",
+                "+bitexact",
+                "-flags:v",
+                "+bitexact",
+                "-crf",
+                "21",
+            ]
+            writer = imageio.get_writer(
+                path, fps=rate, codec="libx264", quality=None, macro_block_size=2, output_params=options
+            )
+        except (ImportError, RuntimeError, ValueError):
+            path = Path(folder) / "film.gif"
+            writer = imageio.get_writer(path, duration=1000.0 / rate, loop=0)
+        with writer:
+            for frame in frames:
+                writer.append_data(frame)
+        return path.suffix.lstrip("."), path.read_bytes()

@@ -1,0 +1,245 @@
+"""Bodies are drawn between their joints, with shapes of the scene where it gives some; files say what was computed."""
+
+from __future__ import annotations
+
+import json
+import struct
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.post.overview.answer import number
+from flexclear.pipeline.post.render import forms, pace, player, shape_files, surfaces
+from flexclear.pipeline.post.render.forms import Seat
+from flexclear.pipeline.post.render.mechanism import Looks, mechanism, placed
+from flexclear.pipeline.post.render.pictures import Shown, make
+from flexclear.pipeline.post.render.solids import equivalent
+from flexclear.pipeline.post.rod_shape import AROUND
+from flexclear.stages import s4_simulate, s6_render
+from tests.paper import synthetic
+
+#: points are kept in single precision by files and pages
+SINGLE = 1e-6
+
+
+def seat(place: list[float], joint: str, axis: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> Seat:
+    return Seat(f"b.{place}", np.array(place), surfaces.along(np.array(axis)), joint, True)
+
+
+def spans(surface: surfaces.Surface) -> np.ndarray:
+    return np.ptp(surface.points, axis=0)
+
+
+def volume(surface: surfaces.Surface) -> float:
+    a, b, c = np.moveaxis(surface.points[surface.triangles], 1, 0)
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+def test_a_crank_with_the_inertia_of_a_flywheel_is_a_flat_bar_between_its_pins():
+    """The drum with its inertia has a radius of 141 mm; the crank is 50 mm long."""
+    flywheel = equivalent(2.0, np.diag([0.01, 0.01, 0.02]))
+    bar = forms.link([seat([0, 0, 0], "revolute"), seat([0.05, 0, 0], "revolute")], np.zeros(3), flywheel, 0.3)
+    width = 2.0 * min(forms.WIDTH * 0.3, forms.WIDEST * 0.05)
+    np.testing.assert_allclose(spans(bar)[:2], [0.05 + width, width], rtol=0.02)  # corners of a polygon of 32
+    assert spans(bar)[2] < width
+
+
+def test_three_pins_are_joined_by_a_plate_across_their_axis():
+    places = [[0, 0, 0], [0.1, 0, 0], [0, 0, 0.1]]
+    plate = forms.link([seat(p, "revolute", (0, 1, 0)) for p in places], np.zeros(3), None, 0.5)
+    assert spans(plate)[1] < 0.1 * spans(plate)[0]
+    assert volume(plate) > 0.5 * 0.1 * 0.1 * spans(plate)[1]
+
+
+def test_balls_in_space_are_joined_by_round_bars():
+    places = [[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]]
+    star = forms.link([seat(p, "spherical") for p in places], np.zeros(3), None, 0.5)
+    for place in places:
+        assert np.linalg.norm(star.points - place, axis=1).min() < 0.01
+
+
+def test_a_slender_bar_has_the_radius_of_its_inertia():
+    """A steel bar of radius 6 and length 300 mm."""
+    radius, length, mass = 0.006, 0.3, 0.27
+    across = mass * (3 * radius**2 + length**2) / 12
+    solid = equivalent(mass, np.diag([0.5 * mass * radius**2, across, across]))
+    bar = forms.link([seat([-0.15, 0, 0], "spherical"), seat([0.15, 0, 0], "spherical")], np.zeros(3), solid, 0.4)
+    np.testing.assert_allclose(spans(bar), [0.3, 0.012, 0.012], rtol=0.01)
+
+
+def test_a_bob_hangs_on_its_arm():
+    pendulum = forms.link([seat([0, 0, 0], "revolute")], np.array([0.0, -0.5, 0.0]), None, 1.0)
+    assert pendulum.points[:, 1].max() < 0.05
+    assert pendulum.points[:, 1].min() < -0.5
+
+
+@pytest.mark.parametrize(
+    "surface, size",
+    [
+        (surfaces.box((0.1, 0.2, 0.3)), 0.006),
+        (surfaces.cylinder(0.1, 0.3), np.pi * 0.003),
+        (surfaces.sphere(0.1), 4 / 3 * np.pi * 0.001),
+        (surfaces.bar(np.zeros(3), np.array([0.3, 0.3, 0.0]), 0.02), np.pi * 0.0004 * 0.3 * np.sqrt(2)),
+        (surfaces.prism(surfaces.hull(np.array([[0.0, 0], [1, 0]]), 0.1), 0.2), 0.2 * (0.2 + np.pi * 0.01)),
+    ],
+)
+def test_surfaces_are_closed_and_turned_outwards(surface: surfaces.Surface, size: float):
+    assert volume(surface) == pytest.approx(size, rel=0.03)  # round ones have 32 corners
+    corners = surface.points[surface.triangles]
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    large = np.linalg.norm(face, axis=1) > 1e-9
+    assert (np.einsum("ij,ij->i", face, surface.normals[surface.triangles[:, 0]])[large] > 0.0).all()
+
+
+SHAPES = [
+    {"type": "box", "size": ["100 mm", "20 mm", "10 mm"], "pose": {"position": ["0.2 m", 0, 0]}},
+    {"type": "cylinder", "radius": "5 mm", "length": "40 mm", "pose": {"axis": [1, 0, 0]}},
+]
+
+
+def test_a_scene_says_what_a_body_looks_like_and_no_run_depends_on_it():
+    plain = load_scene("scenes/checks/pendulum.toml")
+    name = next(iter(plain.rigid()))
+    drawn = load_scene(
+        "scenes/checks/pendulum.toml", override={f"body.{name}.geometry": SHAPES, f"body.{name}.color": "#CC79A7"}
+    )
+    assert s4_simulate.params(drawn) == s4_simulate.params(plain)
+    told = s6_render.params(drawn, "motion", "html")["bodies"][name]
+    assert told["color"] == "#CC79A7"
+    surface = forms.shapes(told["geometry"], Path("."))
+    assert surface.points.max(axis=0) == pytest.approx([0.25, 0.01, 0.005], rel=1e-12)
+    assert surface.points[:, 0].min() == pytest.approx(-0.02, rel=1e-12)
+    assert "bodies" not in s6_render.params(plain, "modes", "html")
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".vtk", ".ply", ".obj"])
+def test_shapes_come_from_files_of_other_programs(suffix: str, tmp_path: Path):
+    box = surfaces.box((100.0, 20.0, 10.0))
+    meshio.Mesh(box.points, [("triangle", box.triangles)]).write(tmp_path / f"part{suffix}")
+    read = shape_files.read(tmp_path / f"part{suffix}", 1e-3)
+    np.testing.assert_allclose(spans(read), [0.1, 0.02, 0.01], rtol=SINGLE)
+    assert volume(read) == pytest.approx(2e-5, rel=SINGLE)
+
+
+def test_of_a_volume_mesh_the_boundary_is_drawn(tmp_path: Path):
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
+    meshio.Mesh(x, [("tetra", np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))]).write(tmp_path / "two.vtk")
+    read = shape_files.read(tmp_path / "two.vtk", 1.0)
+    assert len(read.triangles) == 6  # of eight faces two are inside
+    # the corner's sixth of a cube, and what lies beyond it: a third
+    assert volume(read) == pytest.approx(1 / 6 + 1 / 3, rel=1e-12)
+
+
+@pytest.mark.parametrize("content", [b"no mesh at all", b"solid\nendsolid\n"])
+def test_a_file_that_is_no_surface_is_refused_in_words(content: bytes, tmp_path: Path):
+    (tmp_path / "part.stl").write_bytes(content)
+    with pytest.raises(InputError, match=r"part\.stl"):
+        shape_files.read(tmp_path / "part.stl", 1.0)
+
+
+def test_a_shape_file_that_is_not_there_is_told_with_its_place():
+    scene = load_scene("scenes/checks/pendulum.toml")
+    name = next(iter(scene.rigid()))
+    there = load_scene(
+        "scenes/checks/pendulum.toml", override={f"body.{name}.geometry": [{"type": "file", "file": "/no/part.stl"}]}
+    )
+    with pytest.raises(InputError, match=rf"body\.{name}\.geometry\.0.*no/part\.stl"):
+        s6_render.params(there, "motion", "png")
+
+
+def test_a_film_is_slow_around_the_strongest_impact_and_even_without():
+    run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
+    strong = pace.strongest(run)
+    assert strong.size
+    shown = pace.pace(run, seconds=4.0, slower=10.0)
+    slowest = shown.times[np.argmax(shown.slower)]
+    assert np.abs(strong - slowest).min() < pace.AROUND * np.ptp(run.time.values) * 2.0
+    assert (np.diff(shown.times) > 0.0).all()
+    even = pace.pace(run, seconds=4.0, slower=1.0)
+    np.testing.assert_allclose(np.diff(even.times), np.diff(even.times)[0], rtol=1e-3)  # by the grid of the pace
+    assert even.times[[0, -1]] == pytest.approx(run.time.values[[0, -1]], abs=1e-12)
+
+
+def test_the_viewer_bends_a_rod_as_the_run_does():
+    """Its linear fields, against the drawn skin: apart from what round sections keep of second order."""
+    run, bundle = synthetic.run("sps4/far_cb", modes=7), synthetic.bundle()
+    (rod,) = mechanism(run, {"rod1": bundle}, Looks(exaggeration=1.0)).flexible
+    step = run.sizes["time"] // 2
+    rest = surfaces_of(bundle)
+    q = run.modal_coordinate.values[step, rod.columns]
+    fields = player.linear_fields(rod, rest)
+    points = rest - bundle.first_moment.values / float(bundle.mass) + np.tensordot(q, fields, axes=1)
+    true, _ = placed(run, rod, step)
+    own = true - run.position.values[step, rod.index]
+    lengths = [np.linalg.norm(x.reshape(-1, AROUND + 1, 3).mean(axis=1), axis=1) for x in (points, own)]
+    np.testing.assert_allclose(*lengths, atol=1e-9)
+
+
+def surfaces_of(bundle) -> np.ndarray:
+    from flexclear.pipeline.post.body_shape import surface
+
+    return surface(bundle, np.zeros(bundle.sizes["mode"]))[0]
+
+
+@pytest.fixture(scope="module")
+def shown() -> Shown:
+    run = synthetic.run("sps4/far_csj_cb", clearance=True, modes=7)
+    return Shown(run=run, bundles={"rod1": synthetic.bundle()}, title="A scene")
+
+
+def test_a_gltf_file_is_whole_and_moves_every_body(shown: Shown):
+    content = make("motion", "gltf", shown)["motion.glb"]
+    magic, version, length, size, kind = struct.unpack("<IIIII", content[:20])
+    assert (magic, version, length, kind) == (0x46546C67, 2, len(content), 0x4E4F534A)
+    told = json.loads(content[20 : 20 + size])
+    for accessor in told["accessors"]:
+        view = told["bufferViews"][accessor["bufferView"]]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        assert view["byteLength"] == 4 * width * accessor["count"]
+        assert view["byteOffset"] + view["byteLength"] <= told["buffers"][0]["byteLength"]
+    (animation,) = told["animations"]
+    moved = {told["nodes"][c["target"]["node"]]["name"] for c in animation["channels"]}
+    assert moved == {str(name) for name in shown.run.body.values}
+    assert sum(c["target"]["path"] == "weights" for c in animation["channels"]) == 1
+
+
+def test_a_series_for_paraview_names_files_that_are_there(shown: Shown):
+    found = make("motion", "pvd", shown)
+    entries = ET.fromstring(found["motion.pvd"]).findall(".//DataSet")
+    assert {e.get("file") for e in entries} == set(found) - {"motion.pvd"}
+    assert {e.get("name") for e in entries} == {"bodies", "forces"}
+    times = [float(e.get("timestep", "nan")) for e in entries if e.get("name") == "bodies"]
+    assert times == sorted(times)
+    for name, content in found.items():
+        assert ET.fromstring(content).tag == "VTKFile", name
+
+
+def test_all_modes_of_a_body_are_in_its_page(shown: Shown):
+    page = make("modes", "html", shown)["modes_rod1.html"].decode()
+    told = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
+    assert len(told["shapes"]) == 7
+    assert all(
+        f"{f:.5g} Hz" in shape["label"]
+        for f, shape in zip(synthetic.bundle().frequency.values, told["shapes"], strict=True)
+        if f > 0
+    )
+    assert "<title>A scene: modes of rod1</title>" in page
+
+
+@pytest.mark.parametrize("what, kind", [("joint", "html"), ("vibrations", "pvd")])
+def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
+    from flexclear.pipeline.post.render.pictures import MAKERS
+
+    assert kind not in MAKERS[what]
+    assert {name: tuple(kinds) for name, kinds in MAKERS.items()} == s6_render.FORMATS
+
+
+def test_a_number_is_written_to_the_second_digit_of_its_error():
+    assert number(0.0984812, 0.07, "m/s") == "98 ± 70 mm/s"
+    assert number(1.1044e-4, 2.01e-5, "m") == "110 ± 20 µm"
+    assert number(12.34567, 0.0123, "N") == "12.346 ± 0.012 N"

@@ -1,0 +1,52 @@
+"""What README and the tutorial show can be done as it stands there."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flexclear.stages.__main__ import main
+from flexclear.stages.new import write
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Texts between fences of a language, in their order."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(), re.DOTALL | re.MULTILINE)
+
+
+@pytest.fixture
+def apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder to work in, with results of its own."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    return tmp_path
+
+
+def test_the_scene_of_the_readme_its_variant_and_its_python_run(root: Path, apart: Path) -> None:
+    pendulum, worn = blocks(root / "README.md", "toml")
+    (apart / "pendulum.toml").write_text(pendulum.replace('end = "1 s"', 'end = "50 ms"'))
+    (apart / "worn.toml").write_text(worn)
+    assert main(["check", "pendulum.toml", "worn.toml"]) == 0
+    names: dict[str, Any] = {}
+    (code,) = blocks(root / "README.md", "python")
+    exec(compile(code, "README.md", "exec"), names)
+    assert float(names["run"]["contact_normal_force"].max()) > 2.0 * 9.81
+
+
+def test_the_tutorials_scenes_and_python_run(root: Path, apart: Path) -> None:
+    scene, _ = write("slider-crank", apart)
+    scene.write_text(scene.read_text().replace('end = "0.13 s"', 'end = "5 ms"'))
+    (worn,) = blocks(root / "docs" / "tutorial.md", "toml")
+    (apart / "worn.toml").write_text(worn)
+    assert main(["check", "slider_crank.toml", "worn.toml"]) == 0
+    assert main(["run", "-q", "slider_crank.toml", "--set", "joint.pin.clearance=0.3 mm"]) == 0
+    assert main(["run", "-q", "slider_crank.toml"]) == 0
+    (code,) = blocks(root / "docs" / "tutorial.md", "python")
+    quick = code.replace('page = fc.report("slider_crank.toml")\n', "")  # a film: tests of the report make one
+    assert quick != code
+    names: dict[str, Any] = {}
+    exec(compile(quick, "tutorial.md", "exec"), names)
+    assert set(names["tree"].children) >= {"run", "bundle"}
