@@ -11,17 +11,23 @@ import xarray as xr
 from benchmarks.mechanisms import Mechanism
 from benchmarks.timing import once
 from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.dynamics.run.run import observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
-#: two codes are compared at multiples of this [s]
+#: two codes are compared at multiples of this [s], unless more rarely
 SAMPLING = 1e-3
-TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
+#: the integrators that are tried
+OURS = ("dop853", "dopri5", "radau", "exponential")
+TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 #: of the reference
 FINEST = 1e-13
+#: a method's ladder ends with a run so many times longer than the fastest of all
+DEAR = 60.0
 
 
 @dataclass(frozen=True)
@@ -53,27 +59,30 @@ class Error:
 
 @dataclass(frozen=True)
 class Rung:
-    """One of our runs: its tolerance, what it costs, how wrong it is, and how to time it once more [s]."""
+    """One of our runs: by what, its time once [s], how wrong it is, and how to time it once more [s]."""
 
+    integrator: str
     rtol: float
     evaluations: int
+    seconds: float
     error: Error
     time: Callable[[], float]
 
 
 @dataclass(frozen=True)
 class Reference:
-    """A motion to compare with, up to a horizon [s]."""
+    """A motion to compare with, up to a horizon [s], every so many seconds."""
 
     samples: Samples
     horizon: float
+    sampling: float = SAMPLING
 
     def error(self, samples: Samples) -> Error:
         """Deviation of a motion; ValueError when it was sampled at other times."""
         here, known = samples.time <= self.horizon * (1.0 + 1e-9), self.samples
         t = samples.time[here]
-        k = np.minimum(np.searchsorted(known.time, t - 0.5 * SAMPLING), len(known.time) - 1)
-        if not np.allclose(known.time[k], t, rtol=0.0, atol=1e-6 * SAMPLING):
+        k = np.minimum(np.searchsorted(known.time, t - 0.5 * self.sampling), len(known.time) - 1)
+        if not np.allclose(known.time[k], t, rtol=0.0, atol=1e-6 * self.sampling):
             raise ValueError("the two runs were not sampled at the same times")
         return Error(
             float(np.max(np.linalg.norm(samples.position[here] - known.position[k], axis=1))),
@@ -82,33 +91,44 @@ class Reference:
         )
 
 
-def converged(here: Mechanism, body: str, horizon: float) -> Reference:
+def converged(here: Mechanism, body: str, horizon: float, sampling: float = SAMPLING) -> Reference:
     """Our run at the tightest tolerance."""
-    return Reference(_regular(_run(_at(here, FINEST)), body), horizon)
+    finest = _at(here, DEFAULT, FINEST, sampling)
+    return Reference(_regular(_run(finest), body, sampling), horizon, sampling)
 
 
 def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
-    """Our runs at all tolerances."""
-    rungs = []
-    for rtol in TOLERANCES:
-        mine = _at(here, rtol)
-        run = _run(mine)
-        rungs.append(Rung(rtol, int(run.attrs["evaluations"]), reference.error(_regular(run, body)), _timer(mine)))
+    """Our runs by all methods at all tolerances, as far as they are not refused and not far dearer than others."""
+    rungs: list[Rung] = []
+    for integrator in OURS:
+        if integrator == VIBRATING and not here.scene.flexible():
+            continue
+        for rtol in TOLERANCES:
+            mine = _at(here, integrator, rtol, reference.sampling)
+            try:
+                run = _run(mine)
+            except SolverError:
+                continue
+            error, timer = reference.error(_regular(run, body, reference.sampling)), _timer(mine)
+            rungs.append(Rung(integrator, rtol, int(run.attrs["evaluations"]), timer(), error, timer))
+            if len(rungs) > 1 and rungs[-1].seconds > DEAR * min(r.seconds for r in rungs):
+                break  # tighter ones are dearer still
     return rungs
 
 
-def _at(here: Mechanism, rtol: float) -> Mechanism:
-    return here.with_scene(here.name, edited(here.scene, {"solver.rtol": rtol, "output.interval": SAMPLING}))
+def _at(here: Mechanism, integrator: str, rtol: float, sampling: float) -> Mechanism:
+    change = {"solver.integrator": integrator, "solver.rtol": rtol, "output.interval": sampling}
+    return here.with_scene(here.name, edited(here.scene, change))
 
 
 def _run(here: Mechanism) -> xr.Dataset:
     return dynamics.simulate(here.scene, here.bundles, silent)
 
 
-def _regular(run: xr.Dataset, body: str) -> Samples:
+def _regular(run: xr.Dataset, body: str, sampling: float) -> Samples:
     """The rows at multiples of the sampling time; those of events lie in between."""
     time, motion = run["time"].values, run.sel(body=body)
-    here = np.abs(time / SAMPLING - np.round(time / SAMPLING)) < 1e-6
+    here = np.abs(time / sampling - np.round(time / sampling)) < 1e-6
     return Samples(time[here], motion["position"].values[here], motion["velocity"].values[here])
 
 
@@ -120,5 +140,5 @@ def _timer(here: Mechanism) -> Callable[[], float]:
 
 
 def cheapest(rungs: list[Rung], good: Callable[[Error], bool]) -> Rung | None:
-    """Our run with the fewest evaluations whose error is good."""
-    return min((rung for rung in rungs if good(rung.error)), key=lambda rung: rung.evaluations, default=None)
+    """Our fastest run whose error is good."""
+    return min((rung for rung in rungs if good(rung.error)), key=lambda rung: rung.seconds, default=None)

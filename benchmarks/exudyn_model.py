@@ -9,8 +9,7 @@ from __future__ import annotations
 import contextlib
 import io
 import sys
-from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
@@ -19,7 +18,7 @@ import numpy as np
 import xarray as xr
 from numpy.polynomial.polynomial import polyder
 
-from benchmarks.errors import SAMPLING, Samples
+from benchmarks.errors import Samples
 from benchmarks.mechanisms import Mechanism, joint_laws
 from benchmarks.timing import once
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
@@ -41,8 +40,14 @@ EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j
 X_FROM_Z = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 #: mass of the slide between a cylinder and a flexible rod, which a drive's marker needs, as a share of the rod's
 SLIDE_SHARE = 1e-8
-#: Newmark's method (beta 1/4, gamma 1/2) or not, and the spectral radius of generalized-alpha, by name
-METHODS = {"trapezoidal, index 2": (True, 1.0), "generalized-alpha, index 3": (False, 0.9)}
+#: Newmark's method (beta 1/4, gamma 1/2) or not, the spectral radius of generalized-alpha, relative tolerance of
+#: Newton's iterations (the absolute one is a hundredth), by name
+METHODS = {
+    "trapezoidal, index 2": (True, 1.0, 1e-5),
+    "generalized-alpha, index 3": (False, 0.9, 1e-5),
+    "trapezoidal, loose Newton": (True, 1.0, 1e-3),
+    "generalized-alpha, loose Newton": (False, 0.9, 1e-3),
+}
 
 
 @dataclass
@@ -136,7 +141,7 @@ def _add_rigid(model: Model, place: Placement, mass: float, J: np.ndarray) -> An
 
 
 def _rigid_body(model: Model, scene: Scene, i: int) -> None:
-    mass, com, J = rigid_inertia(scene, model.groups[i], Placement())
+    mass, com, J = rigid_inertia(scene, model.groups[i].places)
     model.bodies.append(_add_rigid(model, model.starts[i].of(Placement(com)), mass, J))
     model.centres.append(com)
 
@@ -277,14 +282,35 @@ def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
             axis0=inner.R[:, 2],
         )
     )
-    position, rate = derivative(law, 0), derivative(law, 1)
     add(
         parts.CoordinateConstraint(
             markerNumbers=[model.ground_coordinate, coordinate],
-            offsetUserFunction=lambda mbs, t, item, offset: position(t),
-            offsetUserFunction_t=lambda mbs, t, item, offset: rate(t),
+            offsetUserFunction=_symbolic(model, law, 0, "offsetUserFunction"),
+            offsetUserFunction_t=_symbolic(model, law, 1, "offsetUserFunction_t"),
         )
     )
+
+
+def _symbolic(model: Model, law: Pieces, order: int, name: str) -> Any:
+    """A derivative of a law as an expression that Exudyn evaluates itself, without calling Python."""
+    from exudyn.advancedUtilities import CreateSymbolicUserFunction
+
+    choose = load().symbolic.IfThenElse
+    starts, falling = polynomials(law, order)
+
+    def value(mbs: Any, t: Any, item: Any, offset: Any) -> Any:
+        found, end = None, starts[-1]
+        for start, coefficients in zip(reversed(starts), reversed(falling), strict=True):
+            result, s = 0.0 * t, t - start
+            for c in coefficients:
+                result = result * s + c
+            found = result if found is None else choose(t < end, result, found)
+            end = start
+        return found
+
+    made = CreateSymbolicUserFunction(model.system, value, name, itemTypeName="ObjectConnectorCoordinate")
+    model.system.variables.setdefault("laws", []).append(made)  # must live as long as its system
+    return made
 
 
 def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) -> None:
@@ -332,28 +358,19 @@ def holds_at_zero(law: Pieces) -> bool:
     return all(not piece.terms and not any(piece.coefficients) for piece in law.pieces)
 
 
-def derivative(law: Pieces, order: int) -> Callable[[float], float]:
-    """A derivative of a law of polynomials; at a break the later side.
+def polynomials(law: Pieces, order: int) -> tuple[list[float], list[list[float]]]:
+    """Starts of the pieces [s], and coefficients of falling order of a derivative of each in the time since.
 
-    Plain floats, no arrays: a peer calls it at every iteration.  ValueError for laws with harmonics.
+    ValueError for laws with harmonics.
     """
     if law.harmonic:
         raise ValueError("laws with harmonics have no polynomials")
     starts = [piece.start for piece in law.pieces]
-    falling = [polyder(piece.coefficients, order)[::-1].tolist() for piece in law.pieces]
-
-    def value(t: float) -> float:
-        k = max(bisect_right(starts, t) - 1, 0)
-        s, result = t - starts[k], 0.0
-        for c in falling[k]:
-            result = result * s + c
-        return result
-
-    return value
+    return starts, [polyder(piece.coefficients, order)[::-1].tolist() for piece in law.pieces]
 
 
-def solve(here: Mechanism, body: str, method: str, step: float) -> Outcome:
-    """Run a scene in Exudyn at a fixed step; building and assembling the model is not timed."""
+def solve(here: Mechanism, body: str, method: str, step: float, sampling: float) -> Outcome:
+    """Run a scene in Exudyn at a fixed step, sampled every so many seconds; building the model is not timed."""
     exudyn = load()
     model = build(here.scene, here.bundles)
     i = model.group_of[body]
@@ -371,7 +388,7 @@ def solve(here: Mechanism, body: str, method: str, step: float) -> Outcome:
         for kind in (exudyn.OutputVariableType.Position, exudyn.OutputVariableType.Velocity)
     ]
     model.system.Assemble()
-    settings = _settings(exudyn, here.scene.time.end, method, step)
+    settings = _settings(exudyn, here.scene.time.end, method, step, sampling)
     try:
         seconds = once(lambda: model.system.SolveDynamic(settings))
     except exudyn.SolverError as error:
@@ -380,8 +397,8 @@ def solve(here: Mechanism, body: str, method: str, step: float) -> Outcome:
     return Outcome(seconds, Samples(position[:, 0], position[:, 1:4], velocity[:, 1:4]))
 
 
-def _settings(exudyn: Any, span: float, method: str, step: float) -> Any:
-    newmark, radius = METHODS[method]
+def _settings(exudyn: Any, span: float, method: str, step: float, sampling: float) -> Any:
+    newmark, radius, tolerance = METHODS[method]
     settings = exudyn.SimulationSettings()
     integration = settings.timeIntegration
     integration.numberOfSteps, integration.endTime = round(span / step), span
@@ -391,10 +408,10 @@ def _settings(exudyn: Any, span: float, method: str, step: float) -> Any:
     integration.generalizedAlpha.spectralRadius = radius
     integration.newton.useModifiedNewton = True
     integration.newton.modifiedNewtonContractivity = 0.005
-    integration.newton.relativeTolerance, integration.newton.absoluteTolerance = 1e-5, 1e-7
+    integration.newton.relativeTolerance, integration.newton.absoluteTolerance = tolerance, 0.01 * tolerance
     integration.discontinuous.useRecommendedStepSize = False
     settings.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
     settings.parallel.numberOfThreads = 1
     settings.solution.file.write = False
-    settings.solution.sensors.writePeriod = SAMPLING
+    settings.solution.sensors.writePeriod = sampling
     return settings

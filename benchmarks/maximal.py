@@ -174,7 +174,7 @@ def _mass(a: _Assembly, i: int) -> np.ndarray:
     """Share of group i in the mass matrix."""
     R, p = a.starts[i].R, a.starts[i].p
     if not a.groups[i].flexible:
-        mass, com, inertia = rigid_inertia(a.scene, a.groups[i], Placement())
+        mass, com, inertia = rigid_inertia(a.scene, a.groups[i].places)
         T = a.twist(i, p + R @ com, None)
         block = np.zeros((6, 6))
         block[:3, :3], block[3:, 3:] = mass * np.eye(3), R @ inertia @ R.T

@@ -119,7 +119,7 @@ def states(engine: Engine, run: Trajectory) -> dict[str, State]:
 def set_state(engine: Engine, state: State) -> None:
     """Put contact modes, impact rates and the pieces of the drives as they are in a state."""
     engine.modes[:], engine.latched[:] = state.modes, state.latched
-    engine.select_pieces(state.t)
+    engine.select_pieces_after(state.t)
 
 
 def evaluation_time(engine: Engine, state: State, repeat: int, *, straight: bool = False) -> float:

@@ -32,10 +32,12 @@ __all__ = [
     "compare",
     "cost",
     "edited",
+    "effects",
     "equilibrium",
     "frequencies",
     "load_scene",
     "open",
+    "plan",
     "render",
     "report",
     "run",
@@ -205,6 +207,26 @@ def compare(
     without = "both" if ideal is True else ideal or None
     found = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
     return found.dataset()
+
+
+def effects(scene: Scene | str | Path) -> xr.Dataset:
+    """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
+
+    Variables and meanings: `pipeline.post.influences`.  The quantities are those of `[view] watch`, else of
+    `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    """
+    found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
+    return found
+
+
+def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
+    """Which of a scene's effects the accuracy that it wants calls for: the planned scene, and the evidence.
+
+    The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
+    `[accuracy]`, what was decided, and why.  Raises FlexclearError.
+    """
+    found = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
+    return found.planned, found.dataset()
 
 
 def render(scene: Scene | str | Path) -> Path:

@@ -24,6 +24,8 @@ COMMANDS = {
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
     "compare": "scenes beside each other or their ideal twins: differences, errors, events, costs",
+    "plan": "which effects, modes and tolerance the wanted accuracy calls for",
+    "effects": "what each part does to each quantity, alone and in pairs",
     "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
     "frequencies": "equilibrium in a pose, and natural frequencies there",
     "report": "the page of scenes; without scenes, all figures and tables of the paper",

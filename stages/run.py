@@ -46,6 +46,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset of the run here (one scene)")
+    parser.add_argument(
+        "--planned", action="store_true", help="plan first (flexclear plan), and run what the wanted accuracy calls for"
+    )
+    parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
 
 
 def command(options: argparse.Namespace) -> None:
@@ -54,8 +58,16 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
     if options.out is not None:
         check_target(options.out)
+    if options.verify and not options.planned:
+        raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
     wanted = graphs(options.scenes, options.set)
     place = workplace(options)
+    plans = []
+    if options.planned:
+        planning = import_module("flexclear.stages.plan")
+        plans = [planning.bring(graph.scene, place) for graph in wanted]
+        print(*(plan.text() for plan in plans), sep="\n")
+        wanted = [Graph(plan.planned) for plan in plans]
     for graph in wanted:
         check_run(graph.scene, place.store.root)
         taken = owner.claim(graph.scene, place.store)
@@ -69,7 +81,10 @@ def command(options: argparse.Namespace) -> None:
         copy_run(wanted[0], place, options.out)
     for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
         told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+    missed = [text for plan in plans if options.verify for text in planning.verify(plan, place)]
     conclude(wanted, place, outcome)
+    if missed:
+        raise MissedAccuracyError("\n".join(missed))
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:

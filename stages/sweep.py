@@ -94,17 +94,21 @@ class _Desk:
     begun: float = field(default_factory=now)
     stored: float = field(default_factory=now)
     fresh: int = 0
+    refused: int = 0
+
+    def __post_init__(self) -> None:
+        self.refused = sum(bool(point.refused) for point in self.done.values())
 
     def take(self, finished: Sequence[tuple[Job, Point]], tell: Callable[[float, str], None]) -> None:
         """Note finished points."""
         self.waiting += finished
         self.done |= {job.key: point for job, point in finished}
         self.fresh += len(finished)
+        self.refused += sum(bool(point.refused) for _, point in finished)
         since = now() - self.begun
         if now() - self.stored > max(OFTEN, SHARE * since):
             self.store()
-        refused = sum(bool(point.refused) for point in self.done.values())
-        told = f", {refused} refused" if refused else ""
+        told = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
         tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{told}, {rate:.3g}/s")
 

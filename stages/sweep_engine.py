@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,10 +19,16 @@ from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 SHARE, MOST, QUEUED = 0.5, 1000, 2
+#: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
+PER_WORKER = 5e-3
 #: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
 LONG = 5.0
 #: seconds in which a scheduler must have answered
 PATIENCE = 10.0
+#: seconds after which a cluster is asked again how many workers it has
+LOOK = 5.0
+#: how often in a row processes of this machine may be lost before it is for good
+LOSSES = 3
 
 
 @dataclass(frozen=True)
@@ -36,47 +42,67 @@ class Job:
 
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
+Points = list[dict[str, Any]]
+#: gives `stages.sweep_points.work` to whoever does it, with its first five arguments
+Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None]], Future[Any]]
 
 
 @dataclass(frozen=True)
 class Engine:
-    """An executor (None: this process), and how many tasks it works on at a time; whether on this machine."""
+    """Who does the work, and on how many tasks at a time; whether on this machine.
 
-    executor: Executor | None
-    width: int
+    renew: called where a worker has died and taken the others with it, before work is given out again.
+    """
+
+    submit: Submit
+    width: Callable[[], int]
     here: bool = True
+    renew: Callable[[], None] = lambda: None
 
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
         """Run points; `done` is told finished ones and their processor time [s], in any order of the batches.
 
-        families: what `stages.sweep_points.work` is given of each.  Raises StoppedError when all is to stop.
+        families: what `stages.sweep_points.work` is given of each.  Raises ResourceError when workers keep dying,
+        StoppedError when all is to stop.
         """
-        waiting, running, pace = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0
+        waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
         while waiting or running:
             stopping.check()
             # nothing is compiled twice: until the first point is there nothing else begins
-            while waiting and len(running) < (QUEUED * self.width if pace else 1):
-                count = min(MOST, max(1, int(SHARE / pace))) if pace else 1
-                mine = _take(waiting, count)
-                future = self._submit(mine, families, alone=not pace, keep=self.here and not 0.0 < pace < LONG)
-                running[future] = mine
+            width = self.width()
+            while waiting and len(running) < (QUEUED * width if pace else 1):
+                mine = _take(waiting, min(MOST, max(1, int(max(SHARE, PER_WORKER * width) / pace))) if pace else 1)
+                keep = self.here and not 0.0 < pace < LONG
+                running[self._given(mine, families, alone=not pace, keep=keep)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
-                points, seconds = _result(future)
+                try:
+                    points, seconds = future.result()
+                except BrokenProcessPool:
+                    # whose fault it was is not known: every batch on its way is lost, and made again
+                    again = [mine, *running.values()]
+                    running.clear()
+                    lost += 1
+                    if lost > LOSSES:
+                        told = f"worker processes were killed {lost} times in a row; is the memory full?"
+                        raise ResourceError(told) from None
+                    waiting += [list(reversed(batch)) for batch in again]
+                    self.renew()
+                    break
                 done(list(zip(mine, points, strict=True)), seconds)
-                first = not pace  # what it took held compiling and fetching
+                first, lost = not pace, 0  # what the first one took held compiling and fetching
                 pace = max(1e-6, seconds / len(mine)) if not first else SHARE / 2.0
 
-    def _submit(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool) -> Future[Any]:
+    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
         journals = [job.journal if keep else None for job in mine]
-        if self.executor is None:
-            future: Future[Any] = Future()
-            future.set_result(work(family, families[family], points, alone, journals))
-            return future
-        with workers.without_main():
-            return self.executor.submit(work, family, families[family], points, alone, journals)
+        try:
+            return self.submit(family, families[family], points, alone, journals)
+        except BrokenProcessPool as error:
+            failed: Future[Any] = Future()
+            failed.set_exception(error)
+            return failed
 
 
 def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
@@ -95,14 +121,6 @@ def _take(waiting: list[list[Job]], count: int) -> list[Job]:
     return taken
 
 
-def _result(future: Future[Any]) -> tuple[list[Point], float]:
-    try:
-        found: tuple[list[Point], float] = future.result()
-    except BrokenProcessPool:
-        raise ResourceError("a worker process was killed; is the memory full?") from None
-    return found
-
-
 @contextmanager
 def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
     """The engine of a sweep: a Dask cluster at an address, that many processes here, or this one."""
@@ -111,15 +129,31 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
             yield found
         return
     if width == 1:
-        yield Engine(None, 1)
+        yield Engine(_here, lambda: 1)
         return
-    pool: ProcessPoolExecutor = workers.pool(width)
+    pools: list[ProcessPoolExecutor] = [workers.pool(width)]
+
+    def submit(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
+        with workers.without_main():
+            return pools[-1].submit(work, family, packed, points, alone, journals)
+
+    def renew() -> None:
+        workers.kill(pools[-1])
+        pools.append(workers.pool(width))
+
     try:
-        yield Engine(pool, width)
+        yield Engine(submit, lambda: width, renew=renew)
     except BaseException:
-        workers.kill(pool)
+        workers.kill(pools[-1])
         raise
-    pool.shutdown()
+    pools[-1].shutdown()
+
+
+def _here(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
+    """The work, done in this process at once."""
+    future: Future[Any] = Future()
+    future.set_result(work(family, packed, points, alone, journals))
+    return future
 
 
 @contextmanager
@@ -127,7 +161,8 @@ def _cluster(address: str) -> Iterator[Engine]:
     """The workers of a Dask scheduler; InputError when there are none, or they run other sources."""
     place = f"--scheduler {address}"
     try:
-        from distributed import Client
+        from distributed import Client, KilledWorker
+        from distributed.client import FutureCancelledError
     except ImportError:
         raise InputError(place, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
     try:
@@ -137,13 +172,39 @@ def _cluster(address: str) -> Iterator[Engine]:
             place, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
         ) from None
     try:
-        yield Engine(client.get_executor(), _threads(client, place), here=False)
+        yield _on_cluster(client, place)
+    except KilledWorker as error:
+        told = f"{place}: workers died again and again over a task ({error}); is their memory full?"
+        raise ResourceError(told) from None
+    except (CancelledError, FutureCancelledError):
+        raise ResourceError(f"{place}: the scheduler has gone; what was finished is kept") from None
     finally:
         client.close()
 
 
+def _on_cluster(client: Any, place: str) -> Engine:
+    """The engine of a cluster; points that are lost with a worker are run by another one, as its scheduler sees to."""
+    executor, seen = client.get_executor(), [now(), _threads(client, place)]
+    held: dict[str, Any] = {}
+
+    def submit(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
+        # sent once; workers fetch it from each other, and the scheduler has it made again when it is lost with one
+        if family not in held:
+            held[family] = client.submit(bytes, packed, key=f"family-{family}", pure=False)
+        future: Future[Any] = executor.submit(work, family, held[family], points, alone, journals, source_digest())
+        return future
+
+    def width() -> int:
+        """Workers may come and go."""
+        if now() - seen[0] > LOOK:
+            seen[:] = now(), sum(client.nthreads().values())
+        return max(1, int(seen[1]))
+
+    return Engine(submit, width, here=False)
+
+
 def _threads(client: Any, place: str) -> int:
-    """Tasks that the workers run at a time."""
+    """Tasks that the workers run at a time; InputError where there are none, or they run other sources."""
     threads = sum(client.nthreads().values())
     if not threads:
         raise InputError(place, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
@@ -154,7 +215,7 @@ def _threads(client: Any, place: str) -> int:
     others = [worker for worker, digest in found.items() if digest != source_digest()]
     if others:
         raise InputError(place, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
-    return threads
+    return int(threads)
 
 
 def now() -> float:

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 CHECKED = 200
 #: what a place of the scene decides that cannot be in one series
 TIMES = ("time.start", "time.end", "output.interval")
+#: and what decides how many sections there are
+COUNTS = ("sections.periods",)
 #: stands for what is varied in the facts of a family
 VARIED = "varied"
 
@@ -179,10 +181,20 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
                 f"'{one.name}' is a series, whose times are those of all points, but {timed[0]} is varied",
                 "keep a number of it, such as the final or the largest value",
             )
+        if one.reduction == "sections" and varied & set(COUNTS):
+            raise InputError(f"{where} [vary.{COUNTS[0]}]", "points would have different numbers of sections", "set it")
         if one.quantity.kind == "drive_force" and isinstance(base.drive[one.quantity.owner], PathDrive):
             raise InputError(
                 f"{where} [keep]", f"'{one.quantity.owner}' leads a frame along a path and has no single force"
             )
+    sections = [one.reduction == "sections" for one in kept]
+    if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
+        raise InputError(
+            f"{where} [keep]",
+            "a motion that is looked at once in each period goes on from period to period: neither runs of one period, "
+            "nor members, nor an estimated error go with it",
+            "keep sections alone, or make two sweeps of it",
+        )
     if sweep.members and not base.contacts() and not base.stop:
         raise InputError(
             f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
@@ -207,7 +219,8 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
     families = {}
     for text, graph in graphs.items():
         records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
-        simulate = s4_simulate.params(graph.scene)
+        sections = any(one.reduction == "sections" for one in wanted.kept)
+        simulate = s4_simulate.params(graph.scene, sections=sections)
         task = Task(
             stage="sweep",
             scene=graph.scene.name,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,17 +50,26 @@ def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
 
 
 def work(
-    key: str, packed: bytes, points: Sequence[Mapping[str, Any]], alone: bool, journals: Sequence[Path | None] = ()
+    key: str,
+    packed: bytes,
+    points: Sequence[Mapping[str, Any]],
+    alone: bool,
+    journals: Sequence[Path | None] = (),
+    sources: str = "",
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
     journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
+    sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
+    of a worker that has joined since.
     """
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
     from flexclear.pipeline.core.workflow import cores, journal
 
+    if sources and sources != source_digest():
+        raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
     cores.tell(alone)
     scene, runner = _opened(key, packed)
     begun, found = time.process_time(), list[Point]()
@@ -79,6 +88,7 @@ def work(
     return found, time.process_time() - begun
 
 
+@cache
 def source_digest() -> str:
     """Digest of the sources that a worker runs, to be compared with those of who asks it."""
     import hashlib

@@ -13,5 +13,8 @@ NAMES = {
     "stability": "stability:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
+    "sweep": "sweep:FAMILY",
     "gallery": "gallery:FAMILY",
+    "plan": "plan:FAMILY",
+    "effects": "effects:FAMILY",
 }

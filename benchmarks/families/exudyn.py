@@ -31,8 +31,9 @@ REPEATS = 3
 #: Exudyn runs longer than this are not repeated [s]
 LONG = 1.0
 SMOOTH = (1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
+RARELY = (9e-3, 4.5e-3, 2.25e-3, 1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 STIFF = (5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
-#: the second method is no better in the long run; it takes part at the first steps of each ladder
+#: the other methods are no better in the long run; they take part at the first steps of each ladder
 TRIED = 4
 
 
@@ -40,7 +41,8 @@ TRIED = 4
 class Comparison:
     """A scene, edited or not.
 
-    horizon: end of the comparison [s].  own_law: Exudyn has another friction law.
+    horizon: end of the comparison [s].  sampling: both codes record every so many seconds.
+    own_law: Exudyn has another friction law.
     study: the cost study in whose figure its runs are points.  note: how they differ from that scene.
     """
 
@@ -48,6 +50,7 @@ class Comparison:
     steps: tuple[float, ...]
     edit: Callable[[Scene], Scene] = field(default=lambda scene: scene, repr=False)
     horizon: float | None = None
+    sampling: float = errors.SAMPLING
     own_law: bool = False
     study: str = ""
     note: str = ""
@@ -56,7 +59,9 @@ class Comparison:
 OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
 COMPARISONS = {
     "ideal": Comparison("ideal", SMOOTH, study="sps4/ideal"),
+    "ideal, recorded every 9 ms": Comparison("ideal", RARELY, sampling=9e-3),
     "far_cb": Comparison("far_cb", SMOOTH, study="sps4/far_cb"),
+    "far_cb, recorded every 9 ms": Comparison("far_cb", RARELY, sampling=9e-3),
     "csj without friction": Comparison("csj", STIFF, without_friction),
     "csj, each code with its own friction law": Comparison(
         "csj", STIFF, own_law=True, study="sps4/csj", note=f"; {OWN_LAW}"
@@ -94,18 +99,19 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 def _records(case: Case, here: Mechanism) -> Iterator[Record]:
     asked: Comparison = case.of
     horizon = asked.horizon or here.scene.time.end
-    reference = errors.converged(here, BODY, horizon)
+    reference = errors.converged(here, BODY, horizon, asked.sampling)
     ours = errors.ladder(here, BODY, reference)
     theirs, law, steps = reference, {}, asked.steps
     if asked.own_law:
-        finest = solve(here, BODY, next(iter(METHODS)), steps[-1])
+        finest = solve(here, BODY, next(iter(METHODS)), steps[-1], asked.sampling)
         if finest.samples is None:
             raise RuntimeError(f"Exudyn fails on its finest run of {case.name}: {finest.failure}")
-        theirs, steps = Reference(finest.samples, horizon), steps[:-1]
+        theirs, steps = Reference(finest.samples, horizon, asked.sampling), steps[:-1]
         law = {"difference_of_laws": _numbers(reference.error(finest.samples))}
     yield {"horizon": horizon, "version": version("exudyn"), **law}
     for r in ours:
-        yield {"by": "flexclear", "rtol": r.rtol, "evaluations": r.evaluations, **_numbers(r.error)}
+        what = {"integrator": r.integrator, "rtol": r.rtol, "evaluations": r.evaluations, "s": r.seconds}
+        yield {"by": "flexclear", **what, **_numbers(r.error)}
     for k, method in enumerate(METHODS):
         for step in steps[:TRIED] if k else steps:
             yield {"by": "exudyn", "method": method, "step": step, **_run(here, method, step, theirs, ours)}
@@ -117,45 +123,58 @@ def _numbers(error: Error) -> dict[str, float]:
 
 def _run(here: Mechanism, method: str, step: float, reference: Reference, ours: list[Rung]) -> Record:
     """One of their runs, and next to it ours that match its error or one of the levels."""
-    first = solve(here, BODY, method, step)
+    first = solve(here, BODY, method, step, reference.sampling)
     if first.samples is None:
         return {"failed": first.failure}
     error = reference.error(first.samples)
     wanted = {"equal": errors.cheapest(ours, lambda e: e.within(error))}
     for level in LEVELS:
         wanted[str(level)] = errors.cheapest(ours, partial(_reaches, level))
-    seconds, timed = _side_by_side(here, method, step, first, [rung for rung in wanted.values() if rung])
-    matches = {
-        name: {"rtol": rung.rtol, "s": timed[rung.rtol], "ratio": seconds / timed[rung.rtol]}
-        for name, rung in wanted.items()
-        if rung
-    }
+    rungs = [rung for rung in wanted.values() if rung]
+    seconds, timed = _side_by_side(partial(solve, here, BODY, method, step, reference.sampling), first, rungs)
+    matches = {name: _match(rung, seconds, timed[_name(rung)]) for name, rung in wanted.items() if rung}
     return {"s": seconds, **_numbers(error), "ours": matches}
+
+
+def _name(rung: Rung) -> str:
+    return f"{rung.integrator} {rung.rtol:g}"
+
+
+def _match(rung: Rung, theirs: float, ours: float) -> dict[str, Any]:
+    error = 1e6 * rung.error.position
+    return {"run": _name(rung), "position_um": error, "s": ours, "ratio": theirs / ours}
 
 
 def _reaches(level: float, error: Error) -> bool:
     return error.relative <= level
 
 
-def _side_by_side(
-    here: Mechanism, method: str, step: float, first: Outcome, rungs: list[Rung]
-) -> tuple[float, dict[float, float]]:
-    """Median times [s] of theirs, and of ours by tolerance, measured in turns."""
-    theirs, ours = [first.seconds], {rung.rtol: [rung.time()] for rung in rungs}
+def _side_by_side(again: Callable[[], Outcome], first: Outcome, rungs: list[Rung]) -> tuple[float, dict[str, float]]:
+    """Median times [s] of theirs, and of ours by name, measured in turns."""
+    theirs, ours = [first.seconds], {_name(rung): [rung.time()] for rung in rungs}
     for _ in range(REPEATS - 1):
         if first.seconds < LONG:
-            theirs.append(solve(here, BODY, method, step).seconds)
-        for rung in {rung.rtol: rung for rung in rungs}.values():
-            ours[rung.rtol].append(rung.time())
-    return float(np.median(theirs)), {rtol: float(np.median(times)) for rtol, times in ours.items()}
+            theirs.append(again().seconds)
+        for rung in {_name(rung): rung for rung in rungs}.values():
+            ours[_name(rung)].append(rung.time())
+    return float(np.median(theirs)), {name: float(np.median(times)) for name, times in ours.items()}
 
 
 def show(records: list[Record]) -> str:
     """Times needed for an accuracy, then every run of Exudyn with ours beside it."""
     heads, runs = {r["case"]: r for r in records if "horizon" in r}, _runs(records)
     levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
-    head = ("velocity error below", "Exudyn [s]", "step [s]", "ours [s]", "rtol", "Exudyn / ours")
-    columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "rtol", "ours, no worse [s]", "ratio")
+    head = (
+        "velocity error below",
+        "Exudyn [s]",
+        "its run",
+        "its position [um]",
+        "ours [s]",
+        "our run",
+        "our position [um]",
+        "Exudyn / ours",
+    )
+    columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")
     texts = [pipe_table(head, levels)]
     for case, r in heads.items():
         note = f"error over {1e3 * r['horizon']:g} ms"
@@ -184,11 +203,12 @@ def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     done = [r for r in runs if "s" in r and str(level) in r["ours"]]
     reaching = [r for r in done if r["relative"] <= level]
     if not done:
-        return [name, "", "", "", "", ""]
+        return [name, *[""] * 7]
     best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
     mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
-    return [name, seconds, f"{best['step']:g}", f"{ours['s']:.3g}", f"{ours['rtol']:g}", ratio]
+    theirs = [seconds, f"{best['method']}, {best['step']:g} s", short(best["position_um"])]
+    return [name, *theirs, f"{ours['s']:.3g}", ours["run"], short(ours["position_um"]), ratio]
 
 
 def _run_row(run: Record) -> list[str]:
@@ -197,7 +217,7 @@ def _run_row(run: Record) -> list[str]:
         return [name, "failed", "", "", "", "", ""]
     cells = [short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
     equal = run["ours"].get("equal")
-    matched = [f"{equal['rtol']:g}", f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""]
+    matched = [equal["run"], f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""]
     return [name, *cells, *matched]
 
 

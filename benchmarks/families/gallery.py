@@ -255,7 +255,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
     from flexclear.pipeline.post.render import film, mechanism
 
     direction = scene.view.direction if scene.view is not None else None
-    drawn = mechanism.mechanism(run, reduced, direction)
+    drawn = mechanism.mechanism(run, reduced, mechanism.Looks(direction=direction))
     row = round(entry.at * (run.sizes["time"] - 1))
     picture = Image.fromarray(film.still(drawn, row))
     small = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)

@@ -14,9 +14,16 @@ from types import MappingProxyType
 DEFAULT = "dop853"
 #: the implicit method for what is stiff
 STIFF = "radau"
+#: the one that flexible bodies' vibrations do not slow down
+VIBRATING = "exponential"
 #: what studies of costs compare: decades of tolerances, as far as rounding or patience go, and steps [s]
 TO_1E_9, TO_1E_13 = (tuple(10.0**-k for k in range(3, last + 1)) for last in (9, 13))
 STEPS = (1e-4, 3e-5, 1e-5, 3e-6)
+
+
+def by_need(flexible: bool) -> tuple[str, ...]:
+    """Integrators among which one is chosen where a scene asks for accuracy alone."""
+    return (DEFAULT, *((VIBRATING,) if flexible else ()), STIFF)
 
 
 @dataclass(frozen=True)
@@ -25,11 +32,13 @@ class Traits:
 
     module: of `pipeline.dynamics.integrate`, which holds its METHOD.
     order: the error of a run falls with this power of the step.
-    implicit: its steps solve equations, by Newton's method.
+    implicit: its steps solve equations, by iteration.
     multistep: its steps use slopes of earlier ones, so that it is begun by a one-step method.
     estimates: it estimates its error, by which steps can be chosen; otherwise a scene must give their length.
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
+    long_steps: they hold many vibrations, whose work on the drives is known less exactly than the motion.
     retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
+    reads_all: it reads more of an evaluation than the rates, so that straight code does not serve it.
     hands_over_to: implicit method that goes on where stability limits the steps that it chooses, and that is named as
         the remedy where steps are given; empty for methods that are stable themselves.
     tolerances, steps: at which `flexclear cost` runs it; steps in s.
@@ -41,7 +50,9 @@ class Traits:
     multistep: bool = False
     estimates: bool = True
     dissipative: bool = False
+    long_steps: bool = False
     retracts: bool = False
+    reads_all: bool = False
     hands_over_to: str = ""
     tolerances: tuple[float, ...] = ()
     steps: tuple[float, ...] = ()
@@ -60,5 +71,8 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
             "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),
         "radau": Traits("radau", 5, implicit=True, tolerances=TO_1E_9),
+        "exponential": Traits(
+            "exponential", 6, implicit=True, long_steps=True, retracts=True, reads_all=True, tolerances=TO_1E_9
+        ),
     }
 )

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
+    from flexclear.pipeline.dynamics.run.pace import Judge
 
 __all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
 
@@ -19,7 +20,8 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     """One run of a scene (schema RUN).
 
     bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
-    A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for.
+    A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for; where it
+    names no integrator, by the one that suits it.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
     there is of it, marked as incomplete, when it is asked to stop.
     """
@@ -28,9 +30,9 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     from flexclear.pipeline.dynamics.record.dataset import dataset, warnings
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
-    def once(edited: Scene) -> xr.Dataset:
+    def once(edited: Scene, judges: Mapping[str, tuple[Judge, str]] | None = None) -> xr.Dataset:
         try:
-            done = integrate(edited, bundles, progress)
+            done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:
             there = stopped.partial
             # another one's motion, such as where the run begins, is nothing of this run
@@ -44,7 +46,11 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         return once(scene)
     from flexclear.pipeline.dynamics.run.accuracy import deliver
 
-    return deliver(scene, once, progress)
+    if not scene.by_need():
+        return deliver(scene, once, progress)
+    from flexclear.pipeline.dynamics.run.suited import suit
+
+    return deliver(scene, once, progress, suit(scene, bundles))
 
 
 def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:

@@ -7,7 +7,7 @@ Nothing is compiled here, nor is anything imported that compiles: generated file
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -117,7 +117,8 @@ def _laws(scene: Scene) -> set[str]:
 def named(scene: Scene) -> Iterator[Named]:
     """Every part of a family that a scene names."""
     contacts = scene.contacts()
-    yield Named(INTEGRATORS, scene.solver.integrator, "[solver]")
+    for integrator in _integrators(scene):
+        yield Named(INTEGRATORS, integrator, "[solver]")
     for name, joint in scene.joint.items():
         yield Named(JOINTS, joint.type, f"[joint.{name}]", "CONTACTS" if name in contacts else "NAMES")
     for name, contact in contacts.items():
@@ -143,7 +144,16 @@ def named(scene: Scene) -> Iterator[Named]:
 
 
 def schemes(scene: Scene) -> list[Scheme]:
-    """The scheme that a scene asks for, and that of the method that takes over where it would crawl."""
+    """The scheme that a scene asks for, and that of the method that takes over where it would crawl.
+
+    Those of all methods among which it is chosen, where a scene leaves that open.
+    """
     scheme = scheme_of(scene.solver)
+    if scene.by_need():
+        return [replace(scheme, integrator=name) for name in _integrators(scene)]
     heir = integrators.INTEGRATORS[scheme.integrator].hands_over_to
     return [scheme, *([Scheme(heir)] if heir and not scheme.fixed else [])]
+
+
+def _integrators(scene: Scene) -> tuple[str, ...]:
+    return integrators.by_need(bool(scene.flexible())) if scene.by_need() else (scene.solver.integrator,)

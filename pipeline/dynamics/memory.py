@@ -286,7 +286,8 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # of the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has
 # left of the most that it had, steps in a row that ended blindly near a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
-# length of the last first step with a contact closed, whether the next accepted step is the first of a segment
+# what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
+# segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
 SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, SHARE, LEFT, BLIND_STEPS = range(13, 22)
 REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import ceil
+from pathlib import PurePath
 
 import numpy as np
 import xarray as xr
@@ -23,16 +24,16 @@ NAME = "sweep"
 
 def figures(sweep: xr.Dataset) -> dict[str, bytes]:
     """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, or text along them."""
-    panels = _panels(sweep)
     parameters = [str(name) for name in sweep["status"].dims]
     draw = _drawn(sweep, parameters)
+    panels = _panels(sweep, sections=draw is _curve)
     if draw is None or not panels:
         return {}
     rows = ceil(len(panels) / COLUMNS)
     with style():
         figure, axes = grid(rows, COLUMNS, (9.6, 1.0 + 2.9 * rows))
         for ax, name in zip(axes.ravel(), panels, strict=False):
-            draw(figure, ax, sweep, name)
+            draw(figure, ax, panels[name], name)
             ax.set_title(name)
         for ax in axes.ravel()[len(panels) :]:
             ax.set_visible(False)
@@ -48,11 +49,23 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
 Draw = Callable[[Figure, Axes, xr.Dataset, str], None]
 
 
-def _panels(sweep: xr.Dataset) -> list[str]:
-    """Variables with one number for each point; vectors and series are left to the user's own figures."""
-    dims = sweep["status"].dims
-    names = [str(name) for name in sweep.data_vars if sweep[name].dims == dims and "units" in sweep[name].attrs]
-    return [name for name in names if not name.endswith((".error", ".deviation"))]
+def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
+    """By the name of each panel, the sweep with what it shows as a variable of that name.
+
+    One number for each point or section; vectors component by component.  Series are left to the user's own figures.
+    """
+    dims, found = sweep["status"].dims, dict[str, xr.Dataset]()
+    for name in map(str, sweep.data_vars):
+        inner = tuple(dim for dim in sweep[name].dims if dim not in dims)
+        told = "units" in sweep[name].attrs and not name.endswith((".error", ".deviation"))
+        if not told or ("section" in inner and not sections):
+            continue
+        if inner in ((), ("section",)):
+            found[name] = sweep
+        elif inner in (("axis",), ("section", "axis")):
+            for k, axis in enumerate(sweep["axis"].values):
+                found[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].isel(axis=k, drop=True)})
+    return found
 
 
 def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
@@ -62,8 +75,9 @@ def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
             return None
         ordered = len(names) > 1 and _walks(sweep, names)
         return _curve if len(names) == 1 or ordered else _cloud
-    if any(sweep[name].dtype.kind not in "fiu" for name in parameters):
-        return None
+    text = [name for name in parameters if sweep[name].dtype.kind not in "fiu"]
+    if text:
+        return _family if len(parameters) == 2 and len(text) == 1 else None
     return {1: _curve, 2: _map}.get(len(parameters))
 
 
@@ -82,16 +96,36 @@ def _walks(sweep: xr.Dataset, names: list[str]) -> bool:
 def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     parameter = _parameter(sweep)
     x, y = sweep[parameter].values * _scale(sweep, parameter)[0], sweep[name].values
+    if "section" in sweep[name].dims:
+        every = sweep[name].transpose(..., "section").values
+        ax.plot(np.repeat(x, every.shape[-1]), every.ravel(), ".", color=LINE, ms=1.6, mew=0.0)
+        _refusals_and_scale(ax, sweep, x)
+        _label(ax, sweep, parameter, name)
+        return
     spread = next((sweep[f"{name}{end}"].values for end in (".deviation", ".error") if f"{name}{end}" in sweep), None)
     if spread is not None:
         ax.fill_between(x, y - spread, y + spread, color=LINE, alpha=0.22, lw=0.0)
     ax.plot(x, y, color=LINE, marker="o", ms=3.0)
+    _refusals_and_scale(ax, sweep, x)
+    _label(ax, sweep, parameter, name)
+
+
+def _refusals_and_scale(ax: Axes, sweep: xr.Dataset, x: np.ndarray) -> None:
     for place in x[sweep["status"].values == 1]:
         ax.axvline(place, color=REFUSED, lw=0.8, ls=":")
-    _label(ax, sweep, parameter, name)
     if x.min() > 0.0 and x.max() > DECADE * x.min():
         ax.set_xscale("log")
         plain(ax.xaxis)
+
+
+def _family(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
+    """A curve for each value that is text."""
+    text, numeric = sorted((str(dim) for dim in sweep["status"].dims), key=lambda dim: sweep[dim].dtype.kind in "fiu")
+    x = sweep[numeric].values * _scale(sweep, numeric)[0]
+    for value in sweep[text].values:
+        ax.plot(x, sweep[name].sel({text: value}).values, marker="o", ms=3.0, label=PurePath(str(value)).stem)
+    ax.legend(fontsize="small", frameon=False)
+    _label(ax, sweep, numeric, name)
 
 
 def _parameter(sweep: xr.Dataset) -> str:

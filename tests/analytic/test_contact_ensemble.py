@@ -10,10 +10,11 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
@@ -50,6 +51,31 @@ def test_members_tell_impacts_and_their_share_of_the_time() -> None:
     share = (known.end - known.start) / END
     assert members().contact_time_share.values == pytest.approx(np.full((MEMBERS, 1), share), rel=1e-5)
     assert np.ptp(members().peak_force.values) > 0.0
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_members_are_the_same_to_the_last_bit_whoever_makes_them(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    monkeypatch.setattr(cores, "cores", lambda: threads)
+    assert dynamics.ensemble(scene(), {}, silent).identical(members())
+
+
+def test_of_members_side_by_side_the_first_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cores, "cores", lambda: 2)
+    ended = []
+
+    def work(k: int, alive: Progress) -> None:
+        if k in (1, 3):
+            raise SolverError(f"member {k}")
+        while k == 2:  # until it is told that another one has failed
+            try:
+                alive(None, "")
+            except BaseException:
+                ended.append(k)
+                raise
+
+    with pytest.raises(SolverError, match="member 1"):
+        cores.side_by_side(work, 4, lambda _: None)
+    assert ended in ([], [2])  # it may not have begun
 
 
 def test_statistics_of_the_members_are_in_the_post_artifact() -> None:

@@ -17,6 +17,7 @@ CASES: dict[str, tuple[int, int, tuple[int, ...], float]] = {
     "adams-bashforth-moulton": (4, 4, (1280, 1920, 2560), NO_PROJECTION),
     "generalized-alpha": (2, 2, (200, 400, 800), 1e-6),
     "radau": (5, 4, (20, 40, 80), 1e-11),
+    "exponential": (6, 5, (20, 28, 40), 1e-12),
 }
 MECHANISMS = ["double pendulum", pytest.param("spatial four-bar", marks=pytest.mark.slow)]
 
@@ -55,7 +56,7 @@ def test_order_is_as_claimed(name: str, integrator: str) -> None:
 
 #: integrator -> error that rtol 1e-7 leaves at most: some ten steps, through a motion that doubles errors a few times;
 #: of second order, a thousand steps, at speeds of some 10 rad/s
-TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-3}
+TOLERANCES = {"dop853": 1e-5, "dopri5": 1e-5, "radau": 1e-5, "generalized-alpha": 1e-3, "exponential": 1e-5}
 
 
 @pytest.mark.parametrize("integrator", TOLERANCES)

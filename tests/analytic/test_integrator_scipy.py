@@ -15,7 +15,7 @@ def test_radau_goes_where_scipys_goes() -> None:
     scene = Scene.model_validate({**double_pendulum(), "solver": {"integrator": "radau"}})
     engine = engine_with(scene)
     start = consistent_start(engine)
-    engine.select_pieces(0.5)
+    engine.select_pieces_after(0.5)
     known = solve_ivp(
         lambda t, y: engine.evaluate(y, t), (engine.start, engine.end), start, "Radau", rtol=1e-10, atol=1e-10
     )

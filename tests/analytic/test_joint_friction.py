@@ -16,8 +16,9 @@ from scipy.optimize import brentq
 
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.scene.schema import Scene
+from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene, simulate
-from tests.reference.rubbing_slider_crank import LAWS, SIZES, Crank
+from tests.reference.rubbing_slider_crank import Crank
 
 G = 9.81
 COULOMB = {"law": "modified-coulomb", "static": 0.2, "dynamic": 0.2, "v_static": 1e-3, "v_dynamic": 2e-3}
@@ -132,8 +133,8 @@ def speed(name: str) -> np.ndarray:
 
 def test_a_block_slides_down_a_slope_and_creeps_where_it_would_stick() -> None:
     t, a = made().time.values, G * (np.sin(STEEP) - 0.2 * np.cos(STEEP))
-    # the start, on which friction sets in over v_static/a = 0.35 ms, leaves less than v_static
-    assert speed("slide") == pytest.approx(a * t, abs=COULOMB["v_static"])
+    # at the start, until it slides at v_static, friction is less: that leaves less than twice this speed
+    assert speed("slide") == pytest.approx(a * t, abs=2.0 * COULOMB["v_static"])
     assert np.diff(speed("slide"))[2:] == pytest.approx(a * np.diff(t)[2:], rel=1e-8)  # rtol 1e-10, many mechanisms
     load = made().joint_bearing_load.sel(rubbing="slide").values
     assert load == pytest.approx(MASS * G * np.cos(STEEP), rel=1e-12)  # rounding
@@ -277,39 +278,8 @@ def test_joints_that_cannot_rub_so_are_refused(kind: str, friction: Table, words
         Scene.model_validate(table)
 
 
-def crank() -> Table:
-    """A slider-crank with friction in all of its joints, let go with a turning crank."""
-    given = Crank()
-    place = given.places()
-    bodies: Table = {
-        "ground": {"type": "ground", "frames": {"O": {}, "rail": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}}}
-    }
-    frames = {
-        "crank": {"O": {}, "A": {"position": [SIZES.crank, 0.0, 0.0]}},
-        "rod": {"A": {}, "B": {"position": [SIZES.rod, 0.0, 0.0]}},
-        "slider": {"B": {}, "rail": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}},
-    }
-    for name, (mass, inertia, centre) in SIZES.bodies.items():
-        x, y, angle = place[name]
-        pose = {"position": [x, y, 0.0], "rotation_vector": [0.0, 0.0, angle]}
-        bodies[name] = {"type": "rigid", "mass": mass, "com": [centre, 0.0, 0.0], "inertia": [inertia] * 3}
-        bodies[name] |= {"pose": pose, "frames": frames[name]}
-    joints = {
-        "O": joint("revolute", "ground.O", "crank.O"),
-        "A": joint("revolute", "crank.A", "rod.A"),
-        "B": joint("revolute", "rod.B", "slider.B"),
-        "P": joint("prismatic", "ground.rail", "slider.rail"),
-    }
-    law = {"law": "modified-coulomb", **LAWS}
-    for name, table in joints.items():
-        table["friction"] = law | ({"length": SIZES.guide} if name == "P" else {"radius": SIZES.radii[name]})
-    gravity = {"gravity": {"type": "gravity", "acceleration": [0.0, -G, 0.0]}}
-    start = {"joint": {"O": {"velocity": given.omega}}}
-    return scene(bodies, joints, end=0.12, rtol=1e-10, load=gravity, start=start)
-
-
 def test_a_slider_crank_with_friction_in_every_joint_moves_as_derived_in_other_coordinates() -> None:
-    dataset = simulate(crank())
+    dataset = run("checks/rubbing_slider_crank")
     known = Crank().run(dataset.time.values)
     # both integrate to 1e-9 or better; friction changes the angle by half a radian
     angle = dataset["joint_position"].sel(coordinate="O").values
@@ -321,3 +291,19 @@ def test_a_slider_crank_with_friction_in_every_joint_moves_as_derived_in_other_c
     assert dataset.dissipated.values[-1] == pytest.approx(known.lost, rel=1e-6)
     assert known.lost > 0.1
     assert "friction of O, A, B, P follows reactions" in dataset.attrs["warnings"]
+
+
+@pytest.mark.slow
+def test_bearings_on_a_flexible_rod_carry_what_the_record_says() -> None:
+    """Modes take part in what the links beyond a joint need, and a joint of the tree lies on the rod."""
+    law = tuple({**COULOMB, "radius": 0.005}.items())
+    names = ("main", "crank_pin", "slider_pin")
+    edits = (*((f"joint.{name}.friction", law) for name in names), ("time.end", 2e-3))
+    dataset = run("checks/flexible_slider_crank", edits)
+    assert dataset.sizes["mode"] > 0
+    force = dataset["joint_force"].sel(joint=list(names)).values
+    known = np.linalg.norm(force[..., :2], axis=-1) + np.abs(force[..., 2])  # z is the axis of all pins
+    load = dataset["joint_bearing_load"].sel(rubbing=list(names)).values
+    assert load == pytest.approx(known, rel=1e-9)  # rounding of sums over stiff modes
+    # rtol 1e-10 at some hundred steps
+    assert np.abs(dataset.energy_error.values).max() < 1e-7 * dataset.dissipated.values[-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene, with_numbers
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import tabulate
@@ -26,13 +28,17 @@ CASES: list[tuple[str, dict[str, Any], bool]] = [
     ("checks/oscillator", {"load.spring.stiffness": 150.0, "load.spring.damping": 1.0}, True),
     ("checks/pendulum", {"load.gravity.acceleration.1": -1.62}, True),
     ("checks/clearance_slider_crank", {"joint.pin.friction.static": 0.2}, True),
+    ("checks/oscillator", {"body.mass.mass": 2.0}, True),
+    ("checks/oscillator", {"body.mass.frames.centre.position.2": "1 mm"}, False),
+    ("sps4/ideal", {"body.platform.mass": 0.4, "body.platform.com.2": "1 mm"}, True),
+    ("sps4/csj", {"body.rod1.inertia.0.0": 0.000998, "body.socket_A2.mass": 0.2, "joint.A1.clearance": "0.3 mm"}, True),
     # what is another structure, start or kernel
     ("sps4/csj", {"joint.A1.clearance": "2 m"}, False),
     ("sps4/csj", {"drive.P3.law.value": "1 mm"}, False),
     ("sps4/csj", {"drive.P3.law": STROKE}, False),
     ("sps4/csj", {"joint.A1.friction": {"law": "ambrosio", "dynamic": 0.1, "v0": 1e-4, "v1": 1e-3}}, False),
     ("checks/pendulum", {"body.bob.mass": 2.0}, False),
-    ("checks/pendulum", {"body.bob.com.0": -0.5}, False),
+    ("checks/oscillator", {"body.mass.inertia.0.0": 0.0}, False),
 ]
 
 
@@ -60,3 +66,9 @@ def test_a_quick_edit_refuses_what_a_whole_one_does(root: Path, change: dict[str
             edit(scene, change)
         said.append(str(refused.value))
     assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("edit", [edited, with_numbers, lambda scene, change: load_scene(scene.path, change)])
+def test_a_recipe_in_an_edit_is_looked_for_where_the_scene_is(root: Path, edit: Callable[..., Scene]):
+    scene = edit(load_scene(root / "scenes/sps4/far_cb.toml"), {"body.rod1.mesh": "meshes/rods/steel.toml"})
+    assert Path(scene.recipes()["rod1"]).resolve() == (root / "meshes/rods/steel.toml").resolve()

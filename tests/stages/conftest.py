@@ -11,11 +11,14 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from flexclear.stages import sweep_engine
 
 #: a process that is silent for so long hangs, however slow or busy the machine is [s]
 PATIENCE = 600.0
@@ -191,3 +194,24 @@ def add_scene(project: Project) -> Callable[[str, str], None]:
         (project.folder / "scenes" / "tiny" / f"{name}.toml").write_text(text)
 
     return add
+
+
+@pytest.fixture
+def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder of results."""
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    return tmp_path / "results"
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Keys of the points that are run."""
+    keys: list[str] = []
+    plain = sweep_engine.Engine.run
+
+    def watched(engine: Any, jobs: Sequence[sweep_engine.Job], *rest: Any) -> None:
+        keys.extend(job.key for job in jobs)
+        plain(engine, jobs, *rest)
+
+    monkeypatch.setattr(sweep_engine.Engine, "run", watched)
+    return keys

@@ -1,20 +1,15 @@
-"""Sweeps: their points have known answers, do not depend on who runs them, and none is run twice."""
+"""Sweeps: their points have known answers, and none is run twice."""
 
 from __future__ import annotations
 
-import os
 import runpy
-import signal
 import subprocess
 import sys
-import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from scipy.special import ellipk
 
 from flexclear import pipeline
@@ -25,63 +20,11 @@ from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.pipeline.post.sweep import figures
-from flexclear.stages import run, sweep, sweep_engine, sweep_plan
+from flexclear.stages import sweep, sweep_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.s4_simulate import modules
-from tests.stages.conftest import interruptible
 
 GRAVITY = 9.81
-#: a process that is silent for so long hangs, however busy the machine is [s]
-PATIENCE = 600.0
-PENDULUM = """
-scene = "checks/pendulum"
-keep = ["bob.velocity.largest", "bob.position.final"]
-set = { "time.end" = "0.5 s" }
-vary."body.bob.com.0" = { from = "-0.5 m", to = "-2 m", count = COUNT }
-"""
-
-
-@pytest.fixture
-def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder of results."""
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
-    return tmp_path / "results"
-
-
-@pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Keys of the points that are run."""
-    keys: list[str] = []
-    plain = sweep_engine.Engine.run
-
-    def watched(engine: Any, jobs: Sequence[sweep_engine.Job], *rest: Any) -> None:
-        keys.extend(job.key for job in jobs)
-        plain(engine, jobs, *rest)
-
-    monkeypatch.setattr(sweep_engine.Engine, "run", watched)
-    return keys
-
-
-def pendulum(folder: Path, count: int, name: str = "lengths") -> Path:
-    """A sweep file over the length of the pendulum."""
-    path = folder / f"{name}.toml"
-    path.write_text(PENDULUM.replace("COUNT", str(count)))
-    return path
-
-
-def flexclear(*arguments: str, cwd: Path, results: Path) -> subprocess.Popen[str]:
-    """The command in a process of its own."""
-    environment = os.environ | {"FLEXCLEAR_RESULTS": str(results), "PYTHONPATH": str(cwd)}
-    command = [sys.executable, "-m", "flexclear", *arguments]
-    return subprocess.Popen(
-        command,
-        cwd=cwd,
-        env=environment,
-        text=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        preexec_fn=interruptible,
-    )
 
 
 def test_a_pendulum_is_back_after_its_period_whatever_its_length(root: Path):
@@ -150,6 +93,20 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
         assert here["evaluations"] == one.attrs["evaluations"]
 
 
+def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
+    """What `flexclear sections` finds without a neighbour is what a point keeps, to the last bit."""
+    path, count = root / "scenes/checks/driven_pendulum.toml", {"sections.transient": 2, "sections.periods": 20}
+    keep = ["bob.position.sections", "bob.angular_velocity.sections"]
+    vary = {"load.torque.force.amplitude": [0.9, 1.5]}
+    found = pipeline.sweep(path, vary, keep, set=count, workers=1)
+    whole, _ = pipeline.sections(pipeline.load_scene(path, count | {"sections.exponent_periods": 20}))
+    here = found.isel({"load.torque.force.amplitude": 1})
+    assert here["bob.position.sections"].dims == ("section", "axis")
+    assert np.array_equal(here["bob.position.sections"].values, whole["position"].sel(body="bob").values)
+    assert np.array_equal(here["bob.angular_velocity.sections"], whole["angular_velocity"].sel(body="bob"))
+    assert (found["evaluations"] > 0).all()
+
+
 def test_the_error_that_is_told_is_the_error(root: Path):
     """The oscillator's closed form says how far off a value is; the difference from the tighter run says the same."""
     keep = ["mass.position.final"]
@@ -169,67 +126,6 @@ def test_the_error_that_is_told_is_the_error(root: Path):
     # the tighter run is not exact: it leaves a hundredth, and where errors cancel more
     assert told == pytest.approx(off, rel=0.5)
     assert (off > 1e-12).all()
-
-
-def test_bytes_are_the_same_whoever_runs_the_points(root: Path, tmp_path: Path):
-    files = []
-    for count in (1, 2):
-        target = tmp_path / f"{count}.nc"
-        done = flexclear(
-            "sweep",
-            str(pendulum(tmp_path, 30)),
-            f"--workers={count}",
-            f"--out={target}",
-            cwd=root,
-            results=tmp_path / f"results{count}",
-        )
-        out, err = done.communicate(timeout=PATIENCE)
-        assert done.returncode == 0, err
-        assert "30 points, 0 refused" in out
-        files.append(target.read_bytes())
-    assert files[0] == files[1]
-
-
-def _begun(process: subprocess.Popen[str], results: Path) -> None:
-    """Wait until a batch is in the store."""
-    end = time.monotonic() + PATIENCE
-    while not list((results / "cache" / "sweep").glob("*/*.json")):
-        assert process.poll() is None, process.communicate()[1]
-        assert time.monotonic() < end
-        time.sleep(0.02)
-
-
-def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path, fresh: Path, asked: list[str]):
-    path = pendulum(tmp_path, 400)
-    process = flexclear("sweep", str(path), "--workers=1", cwd=root, results=fresh)
-    _begun(process, fresh)
-    process.send_signal(signal.SIGKILL)
-    process.communicate()
-    plan = sweep_plan.prepare(sweep_plan.plan(*sweep.read(path), str(path)), run.workplace())
-    stored = {key for family in plan.families for key in family.find(run.workplace().store, plan.kept)}
-    assert main(["sweep", str(path), "--workers=1"]) == 0
-    assert stored
-    assert set(asked) == {job.key for job in plan.jobs} - stored
-    assert len(asked) < 400
-    asked.clear()
-    assert main(["sweep", str(path), "--workers=1"]) == 0
-    assert asked == []
-
-
-def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path):
-    results = tmp_path / "results"
-    process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--workers=2", cwd=root, results=results)
-    _begun(process, results)
-    process.send_signal(signal.SIGINT)
-    _, err = process.communicate(timeout=PATIENCE)
-    assert process.returncode == 130, err
-    with xr.open_dataset(results / "sweeps" / "lengths" / "sweep.nc") as left:
-        assert left.attrs["complete"] == 0
-        done = left["status"].values == 0
-        assert 0 < done.sum() < 20_000
-        assert (left["status"].values[~done] == 2).all()
-        assert np.isfinite(left["bob.velocity.largest"].values[done]).all()
-        assert np.isnan(left["bob.velocity.largest"].values[~done]).all()
 
 
 def test_more_values_take_the_finished_points_over(root: Path, fresh: Path, asked: list[str]):
@@ -295,6 +191,9 @@ def test_members_give_mean_and_deviation(root: Path):
         ({"keep": ["bob.velocity"]}, "keep", "bob.velocity.largest"),
         ({"keep": ["bop.velocity.largest"]}, "keep", "bob"),
         ({"keep": ["bob.orientation.mean"]}, "keep", "final"),
+        ({"keep": ["bob.velocity.sections", "bob.velocity.final"]}, "keep", "two sweeps"),
+        ({"keep": ["bob.velocity.sections"], "error": True}, "keep", "estimated error"),
+        ({"keep": ["hinge.force.sections"]}, "keep", "has no 'sections'"),
         ({"set": {"time.end": "1 kg"}}, "set", "mass"),
         ({"members": 3}, "members", "no clearance joint"),
         ({"sample": {"method": "sobol", "points": 4}}, "sweep", "without count"),
@@ -312,33 +211,6 @@ def test_what_cannot_be_is_refused_before_anything_runs(
     assert words in str(refused.value)
     assert refused.value.exit_code == 2
     assert asked == []
-
-
-def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
-    assert main(["sweep", str(pendulum(tmp_path, 2)), "--scheduler", "tcp://127.0.0.1:9"]) == 2
-    said = capsys.readouterr().err
-    assert "--scheduler tcp://127.0.0.1:9" in said
-    assert "not installed" in said or "no scheduler answers" in said
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore")  # of a library that is not ours, in whatever version there is
-def test_a_cluster_gives_the_same_bytes(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    distributed = pytest.importorskip("distributed")
-    found = []
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
-        for name, address in (("here", None), ("cluster", cluster.scheduler_address)):
-            monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / name))
-            found.append(
-                pipeline.sweep(
-                    root / "scenes/checks/pendulum.toml",
-                    {"body.bob.com.0": np.linspace(-2.0, -1.0, 12)},
-                    ["bob.velocity.largest"],
-                    workers=1,
-                    scheduler=address,
-                )
-            )
-    assert found[0].identical(found[1])
 
 
 def test_a_latin_hypercube_has_one_point_in_every_row_and_column():
@@ -392,6 +264,18 @@ def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
     example = runpy.run_path(str(root / "docs/examples/optimise.py"))
     # the velocity is right to 1e-8 or so, and changes by 0.01 m/s per N/m; measured 1e-6
     assert example["best"]() == pytest.approx(2.0 * ((np.pi / 0.5) ** 2 + 1.0), abs=1e-4)
+
+
+def test_the_example_of_a_sensitivity_has_shares_of_a_whole(root: Path, tmp_path: Path):
+    pytest.importorskip("SALib")
+    example = runpy.run_path(str(root / "docs/examples/sensitivity.py"))
+    error, found = example["study"](4, workers=1)
+    assert error.shape == (40,)
+    assert (np.abs(error) < 5e-3).all()
+    # nothing goes along with less than nothing; what is estimated from four points is anything but a share
+    assert (found["ST"] >= 0.0).all()
+    example["figure"](found, tmp_path / "shares.png")
+    assert (tmp_path / "shares.png").stat().st_size > 10_000
 
 
 #: runs one point in a fresh process and prints the own modules that it loaded

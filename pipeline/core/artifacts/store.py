@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 MAIN = "nc"
 #: attributes of the main file that a command tells, without opening the file
 TOLD = ("warnings", "accuracy_verdict")
+#: bytes of a dataset from which on room on the disk counts for more than time
+COMPRESSED = 1 << 26
 #: lies beside what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
@@ -259,13 +261,16 @@ def _attributes(product: Product) -> Mapping[str, object]:
 def write_dataset(path: Path, dataset: xr.Dataset) -> str:
     """Write NetCDF-4 atomically, read back and compared before it takes its name; returns its sha256.
 
-    Equal datasets give equal bytes: fixed compression, no times or names of this machine. Numeric
-    arrays are compressed and carry fletcher32 sums, so that other programs notice damage too.
+    Equal datasets give equal bytes: no times or names of this machine.  Numeric arrays carry fletcher32 sums, so that
+    other programs notice damage too; they are compressed from `COMPRESSED` bytes on, since what a run records has few
+    digits to spare: deflating it takes longer than making it, and leaves half of it.
     """
     import netCDF4  # noqa: F401 - what `engine` names: its version is a fact of every key
     import xarray as xr
 
-    packed = {"zlib": True, "complevel": 1, "shuffle": True, "fletcher32": True}
+    packed: dict[str, object] = {"fletcher32": True}
+    if dataset.nbytes >= COMPRESSED:
+        packed |= {"zlib": True, "complevel": 1, "shuffle": True}
     encoding = {str(n): packed for n, v in dataset.variables.items() if v.ndim and v.size and v.dtype.kind in "fiu"}
     with temporary(path) as made:
         try:

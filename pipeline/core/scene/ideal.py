@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from flexclear.pipeline.core.errors import InputError
@@ -38,7 +39,9 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
             f"has nothing to take away: no {' and no '.join(effects)}",
             "compare it with another scene: flexclear compare A B",
         )
-    return edited(scene, changes | _without_owners(scene, effects))
+    if "flexibility" in effects and scene.output.stress is not None:
+        changes["output"] = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
+    return edited(scene, changes | owned(scene, tuple(loose(scene)) if "clearance" in effects else ()))
 
 
 def loose(scene: Scene) -> dict[str, Clearance]:
@@ -46,14 +49,14 @@ def loose(scene: Scene) -> dict[str, Clearance]:
     return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
 
 
-def _without_owners(scene: Scene, effects: tuple[str, ...]) -> dict[str, Any]:
-    """Edits of what is asked for, where what it is asked of is taken away."""
+def owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
+    """Edits of what is asked for, where the joints with clearance, or the stops, of these names are taken away."""
     found: dict[str, Any] = {}
     owners = scene.owners()
-    if "clearance" in effects and loose(scene):
-        left = tuple(name for name in owners["contact"] if name not in loose(scene))
-        owners = {**owners, "contact": left}
-        if not left:
+    if left:
+        contacts = tuple(name for name in owners["contact"] if name.partition(".")[0] not in left)
+        owners = {**owners, "contact": contacts}
+        if not contacts:
             found["ensemble"] = None
         if scene.accuracy is not None:
             wanted = {
@@ -67,8 +70,6 @@ def _without_owners(scene: Scene, effects: tuple[str, ...]) -> dict[str, Any]:
             if not watched:
                 found["view"] = None
                 del found["view.watch"]
-    if "flexibility" in effects and scene.output.stress is not None:
-        found["output"] = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
     return found
 
 

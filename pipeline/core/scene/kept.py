@@ -19,6 +19,7 @@ SERIES = {
     "mean": "mean over the time",
     "final": "value at the end",
     "series": "values at the regular output times",
+    "sections": "values once in each period of the laws",
 }
 #: the same of what contacts do
 OF_CONTACTS = {
@@ -32,6 +33,8 @@ OF_CONTACTS = {
 }
 #: reductions that need the quantity at all output times, and those whose value has no direction
 THROUGHOUT, MAGNITUDES = ("largest", "rms", "mean", "series"), ("largest", "rms")
+#: quantities that are looked at once in each period: a contact that happens to be open then tells nothing by its force
+OF_SECTIONS = ("position", "orientation", "velocity", "angular_velocity")
 #: quantities with one component
 SCALARS = ("drive_force",)
 
@@ -61,7 +64,7 @@ class Kept:
     @property
     def dims(self) -> tuple[str, ...]:
         """Dimensions of its value at one point."""
-        time = ("time",) if self.reduction == "series" else ()
+        time = {"series": ("time",), "sections": ("section",)}.get(self.reduction, ())
         kind = self.quantity.kind
         if kind in OF_CONTACTS or kind in SCALARS or self.reduction in MAGNITUDES:
             return time
@@ -77,8 +80,9 @@ def reductions(kind: str) -> dict[str, str]:
     """The reductions that a kind of quantity has, and what they say."""
     if kind == "orientation":
         # a mean of quaternions is no rotation, and their magnitude is one
-        return {name: SERIES[name] for name in ("final", "series")}
-    return OF_CONTACTS.get(kind, SERIES)
+        return {name: SERIES[name] for name in ("final", "series", "sections")}
+    without = {name: text for name, text in SERIES.items() if name != "sections" or kind in OF_SECTIONS}
+    return OF_CONTACTS.get(kind, without)
 
 
 def parse_kept(text: str, owners: Mapping[str, Collection[str]]) -> Kept:

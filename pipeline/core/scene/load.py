@@ -27,6 +27,8 @@ SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accura
 LARGEST = 4 << 20
 #: a key of more parts than a scene has levels; the reader of TOML takes their number squared
 DEEP = re.compile(r"(?<![\w-])(?:[\w-]{1,100}\s{0,9}\.\s{0,9}){50}")
+#: keys of parts that name files, which are looked for where the scene is
+FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
 
 
@@ -41,6 +43,7 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     table = compose(path)
     for place, value in (override or {}).items():
         _put(table, place, value, f"override of {path}")
+    _absolute_files(table, path)
     check_parts(table, path, FAMILIES)
     try:
         scene = Scene.model_validate(table)
@@ -81,6 +84,7 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
             _put(table, place, value, f"edit of {scene.name}")
         elif place in table:
             del table[place]
+    _absolute_files(table, scene._path or Path.cwd() / "scene")
     try:
         result = Scene.model_validate(table)
     except ValidationError as error:
@@ -98,7 +102,8 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
     for place, value in override.items():
         family, _, rest = place.partition(".")
         name, _, key = rest.partition(".") if family in FAMILIES else ("", "", rest)
-        if value is None or not key or (family not in FAMILIES and family not in SETTINGS):
+        names_file = key.rpartition(".")[2] in FILES or any(_tables(value))
+        if value is None or not key or names_file or (family not in FAMILIES and family not in SETTINGS):
             return edited(scene, override)
         changed.setdefault((family, name), {})[key] = value
     result = scene

@@ -108,15 +108,17 @@ class Accuracy(Part):
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
     quantities: a file writes them without this key.
     allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
+    by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 
     quantities: dict[str, Wanted] = Field(default_factory=dict)
     allow_missed: bool = False
+    by_need: bool | None = None
 
     @model_validator(mode="before")
     @classmethod
     def _flat(cls, table: Any) -> Any:
-        plain = {"allow_missed", "source"}
+        plain = {"allow_missed", "by_need", "source"}
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
         wanted = {name: value for name, value in table.items() if name not in plain}
@@ -253,6 +255,15 @@ class Scene(Part):
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _method_by_need(cls, table: Any) -> Any:
+        """Note whether the integrator is left open, before it gets its default."""
+        accuracy, solver = (table.get(key) for key in ("accuracy", "solver")) if isinstance(table, dict) else (0, 0)
+        if not isinstance(accuracy, dict) or "by_need" in accuracy or not isinstance(solver, dict | None):
+            return table
+        return {**table, "accuracy": {**accuracy, "by_need": not {"integrator", "step"} & set(solver or ())}}
+
     @model_validator(mode="after")
     def _fits_together(self) -> Scene:
         self.check()
@@ -264,6 +275,10 @@ class Scene(Part):
         self._samples_can_be_made()
         self._quantities_are_there()
         self._stressed_bodies_are_flexible()
+
+    def by_need(self) -> bool:
+        """Whether the integrator is chosen for the accuracy that is asked for."""
+        return bool(self.accuracy is not None and self.accuracy.quantities and self.accuracy.by_need)
 
     def owners(self) -> dict[str, tuple[str, ...]]:
         """Names of the parts that may own a quantity, by what they are."""

@@ -19,7 +19,7 @@ MOST_POINTS = 1_000_000
 
 Value = float | str
 #: dimensions that results have besides the parameters
-RESERVED = ("point", "time", "axis", "quat")
+RESERVED = ("point", "time", "section", "axis", "quat")
 #: ways to say the values of a parameter, each by its keys
 WAYS = (("values",), ("from", "to"), ("mean", "deviation"))
 

@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import TypeVar
+
+from flexclear.pipeline.core.errors import StoppedError
+from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.system import cores
 
-__all__ = ["cores", "free", "tell"]
+__all__ = ["cores", "free", "side_by_side", "tell"]
+
+Result = TypeVar("Result")
+#: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
+BESIDE = 4
 
 _told: bool | None = None
 
@@ -21,3 +30,33 @@ def free() -> bool:
 
     idle = multiprocessing.parent_process() is None if _told is None else _told
     return idle and cores() > 1
+
+
+def side_by_side(work: Callable[[int, Progress], Result], count: int, done: Callable[[int], None]) -> list[Result]:
+    """Results of work(0) .. work(count - 1), made in threads: for what is mostly compiled code, which lets others run.
+
+    work: is given a progress to call now and then, which ends it when another one has failed or Ctrl-C was pressed.
+    done: told how many are finished.  Raises what the first one that failed raised.
+    """
+    from concurrent.futures import CancelledError, ThreadPoolExecutor
+    from threading import Event
+
+    given_up = Event()
+
+    def progress(fraction: float | None, text: str) -> None:
+        if given_up.is_set():
+            raise CancelledError
+
+    width = cores() if free() else min(cores(), BESIDE)
+    with ThreadPoolExecutor(min(width, count)) as pool:
+        waiting, results = [pool.submit(work, k, progress) for k in range(count)], list[Result]()
+        try:
+            for future in waiting:
+                results.append(future.result())
+                done(len(results))
+        except BaseException as error:
+            if not isinstance(error, StoppedError):  # of that all hear, and leave their work in good order
+                given_up.set()
+            pool.shutdown(cancel_futures=True)
+            raise
+    return results

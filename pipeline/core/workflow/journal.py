@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.disk import publish, sha256
@@ -40,7 +41,7 @@ class State:
 
 @dataclass
 class Journal:
-    """The pieces of one task.
+    """The pieces of one task, whose threads may all ask.
 
     folder, key: where they lie, and what their names begin with.
     restored: processor time [s] that pieces took in earlier attempts.  aside: what keeping them has taken of this one.
@@ -57,11 +58,13 @@ class Journal:
     _covered: set[str] = field(default_factory=set)
     _written: float = field(default_factory=time.monotonic)
     _took: float = 0.0
+    _lock: RLock = field(default_factory=RLock)
 
     def name(self, digest: str) -> str:
         """Name of the piece that is asked for next with this digest of all that decides it: work may be repeated."""
-        count = self._asked.get(digest, 0)
-        self._asked[digest] = count + 1
+        with self._lock:
+            count = self._asked.get(digest, 0)
+            self._asked[digest] = count + 1
         return f"{digest[:24]}-{count}"
 
     def find(self, name: str) -> State | None:
@@ -78,8 +81,9 @@ class Journal:
             if more is None:
                 return None
             rows.append(more[0]["rows"])
-        self._chunks[name] = chunks
-        self.restored += float(notes["seconds"])
+        with self._lock:
+            self._chunks[name] = chunks
+            self.restored += float(notes["seconds"])
         return State(arrays, notes["notes"], np.concatenate(rows), float(notes["seconds"]))
 
     def due(self) -> bool:
@@ -88,30 +92,33 @@ class Journal:
 
     def finish(self, name: str, state: State) -> None:
         """A piece is done; it is written with what is written next."""
-        self._waiting[name] = state
-        if self.due():
-            self.write()
+        with self._lock:
+            self._waiting[name] = state
+            if self.due():
+                self.write()
 
     def cover(self, name: str, state: Callable[[], State]) -> None:
         """From this state on, which is asked for when it is written, the work needs none of the pieces so far."""
-        self._covered |= {*self._waiting, *self._chunks} - {name}
-        self._waiting = {name: state}
-        if self.due():
-            self.write()
+        with self._lock:
+            self._covered |= {*self._waiting, *self._chunks} - {name}
+            self._waiting = {name: state}
+            if self.due():
+                self.write()
 
     def write(self, name: str | None = None, state: State | None = None) -> None:
         """Write what waits, and this piece; where the disk is full, nothing is lost but that."""
-        begun = self.clock()
-        waiting = self._waiting | ({} if name is None or state is None else {name: state})
-        with contextlib.suppress(OSError):
-            self.folder.mkdir(parents=True, exist_ok=True)
-            for piece, content in waiting.items():
-                self._put(piece, content() if callable(content) else content)
-            self._waiting = {}
-            for piece in self._covered:
-                self._drop(piece)
-            self._covered = set()
-        self._written, self._took = self.clock(), self.clock() - begun
+        with self._lock:
+            begun = self.clock()
+            waiting = self._waiting | ({} if name is None or state is None else {name: state})
+            with contextlib.suppress(OSError):
+                self.folder.mkdir(parents=True, exist_ok=True)
+                for piece, content in waiting.items():
+                    self._put(piece, content() if callable(content) else content)
+                self._waiting = {}
+                for piece in self._covered:
+                    self._drop(piece)
+                self._covered = set()
+            self._written, self._took = self.clock(), self.clock() - begun
 
     @contextlib.contextmanager
     def uncounted(self) -> Iterator[None]:

@@ -20,6 +20,7 @@ INTERRUPTED = "interrupted"
 
 _why = ""
 _heeded = 0
+_counting = threading.Lock()
 _busy = False
 _deadlines: list[tuple[float, str]] = []
 
@@ -52,11 +53,13 @@ def heeds() -> bool:
 def heeded() -> Iterator[None]:
     """Meanwhile requests are looked for."""
     global _heeded
-    _heeded += 1
+    with _counting:  # threads of one task may all integrate
+        _heeded += 1
     try:
         yield
     finally:
-        _heeded -= 1
+        with _counting:
+            _heeded -= 1
 
 
 @contextmanager

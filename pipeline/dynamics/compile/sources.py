@@ -96,6 +96,9 @@ def _project(parts: Parts) -> str:
     given, imports = _joints(parts)
     given = {"evaluate": "calls.evaluate", **given}
     given["closures"] = _closures(imports, parts)
+    if parts.flexible:
+        stiffen = _import(imports, f"{DYNAMICS}.equations.projection", "make_stiffen")
+        given["stiffen"] = f"{stiffen}({given['closures']})"
     maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
     return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
 
@@ -121,7 +124,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     imports: Imports = []
     given = {
-        "evaluate": "calls.rates",
+        "evaluate": "calls.evaluate" if integrators.INTEGRATORS[scheme.integrator].reads_all else "calls.rates",
         "project": _projection(imports, parts),
         "retract": "calls.retract",
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),

@@ -48,6 +48,19 @@ def factor(h, e, w, a, n, threshold):
 
 
 @kernel
+def multiply(h, e, w, a, n):
+    """Overwrite a factor L with the matrix L L^T that it is of."""
+    for i in range(n - 1, -1, -1):
+        first, row = h[e + 2 * i], base(h, e, a, i)
+        for j in range(i, first - 1, -1):
+            other = base(h, e, a, j)
+            total = 1.0 / w[row + i] ** 2 if j == i else w[row + j] / w[other + j]
+            for k in range(max(first, h[e + 2 * j]), j):
+                total += w[row + k] * w[other + k]
+            w[row + j] = total
+
+
+@kernel
 def forward(h, e, w, a, n, b):
     """L^-1 applied to the vector in w from place b."""
     for i in range(n):

@@ -56,9 +56,10 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_symmetric,
 )
 
-#: Newton's iterations for the loads, the change of a load, as share of the largest, at which they end, and in how many
-#: strides friction is turned on where they do not
-ITERATIONS, CONVERGED, STRIDES = 30, 1e-13, 32
+#: Newton's iterations for the loads; the change of a load, as share of the largest, at which they end, and below which
+#: they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on where
+#: they do not
+ITERATIONS, CONVERGED, ROUNDED, STRIDES = 30, 1e-13, 1e-9, 32
 #: below this share of their diagonal pivots of the slopes count as zero
 SINGULAR_SLOPES = 1e-12
 
@@ -224,31 +225,32 @@ def reaction(h, w, j, acceleration, bearing):
 
 
 @kernel
-def _growth(v, dv):
-    """Magnitude of v, and its rate where v changes at dv."""
+def _sized(v):
+    """Magnitude of v, and the unit vector along it, zero where v is."""
     size = np.sqrt(dot(v, v))
-    return size, dot(v, dv) / size if size > 0.0 else 0.0
+    return size, scale(1.0 / size if size > 0.0 else 0.0, v)
 
 
 @kernel
-def load(h, f, w, e, M, F, dM, dF):
-    """Normal force of bearing e for what its joint carries, and its rate where that changes at dM, dF."""
+def load(h, f, w, e, M, F):
+    """Normal force of bearing e for what its joint carries, and its gradients by M and F."""
     o = m.BEARING_NUMBERS.row(h, e)
     preload = f[o + m.BEARING_NUMBERS.preload]
     if m.BEARINGS.kind(h, e) == BALL:
-        size, rate = _growth(F, dF)
-        return size + preload, rate
+        size, along_F = _sized(F)
+        return size + preload, ZERO, along_F
     n, lever = bearing_axis(h, w, e), f[o + m.BEARING_NUMBERS.lever]
-    half, tilt = scale(0.5, sub(F, scale(dot(n, F), n))), scale(lever, cross(n, M))
-    d_half, d_tilt = scale(0.5, sub(dF, scale(dot(n, dF), n))), scale(lever, cross(n, dM))
-    near, d_near = _growth(sub(half, tilt), sub(d_half, d_tilt))
-    far, d_far = _growth(add(half, tilt), add(d_half, d_tilt))
     along, about = dot(n, F), dot(n, M)
+    half, tilt = scale(0.5, sub(F, scale(along, n))), scale(lever, cross(n, M))
+    near, at_near = _sized(sub(half, tilt))
+    far, at_far = _sized(add(half, tilt))
     axial, torsion = f[o + m.BEARING_NUMBERS.axial], f[o + m.BEARING_NUMBERS.torsion]
     size = near + far + axial * abs(along) + torsion * abs(about) + preload
-    d_axial = axial * dot(n, dF) * (1.0 if along >= 0.0 else -1.0)
-    d_torsion = torsion * dot(n, dM) * (1.0 if about >= 0.0 else -1.0)
-    return size, d_near + d_far + d_axial + d_torsion
+    by_M = scale(lever, cross(sub(at_far, at_near), n))
+    by_M = add(by_M, scale(torsion if about >= 0.0 else -torsion, n))
+    # both ends' forces lie across the axis
+    by_F = add(scale(0.5, add(at_near, at_far)), scale(axial if along >= 0.0 else -axial, n))
+    return size, by_M, by_F
 
 
 @kernel
@@ -261,11 +263,11 @@ def balance(h, f, w, share):
         for k in range(bearings):
             o, size = first + 6 * (1 + k), share * w[m.BEARING.row(h, k)]
             M, F = add(M, scale(size, at(w, o))), add(F, scale(size, at(w, o + 3)))
-        value, row = 0.0, h[m.BEARING_SLOPES] + bearings * e
+        value, by_M, by_F = load(h, f, w, e, M, F)
+        row = h[m.BEARING_SLOPES] + bearings * e
         for k in range(bearings):
             o = first + 6 * (1 + k)
-            value, rate = load(h, f, w, e, M, F, at(w, o), at(w, o + 3))
-            w[row + k] = -share * rate
+            w[row + k] = -share * (dot(by_M, at(w, o)) + dot(by_F, at(w, o + 3)))
         w[row + e] += 1.0
         w[h[m.BEARING_RESIDUALS] + e] = w[m.BEARING.row(h, e)] - value
 
@@ -304,7 +306,7 @@ def eliminate(w, A, b, size):
 @kernel
 def iterate(h, f, w, share):
     """Newton's method for the loads from those that are there; whether it finds the solution that friction grows to."""
-    size, A, b = h[m.N_BEARINGS], h[m.BEARING_SLOPES], h[m.BEARING_RESIDUALS]
+    size, A, b, before = h[m.N_BEARINGS], h[m.BEARING_SLOPES], h[m.BEARING_RESIDUALS], np.inf
     for _ in range(ITERATIONS):
         balance(h, f, w, share)
         sign = eliminate(w, A, b, size)
@@ -316,8 +318,9 @@ def iterate(h, f, w, share):
             change, largest = max(change, abs(w[b + e])), max(largest, abs(w[m.BEARING.row(h, e)]))
         if not largest < np.inf:
             return False
-        if change <= CONVERGED * largest:
+        if change <= CONVERGED * largest or (change <= ROUNDED * largest and change > 0.5 * before):
             return sign > 0.0
+        before = change
     return False
 
 
@@ -327,7 +330,7 @@ def without_feedback(h, f, w):
     bearings = h[m.N_BEARINGS]
     for e in range(bearings):
         o = m.REACTIONS.row(h, m.BEARINGS.joint(h, e) * (1 + bearings))
-        value, _ = load(h, f, w, e, at(w, o), at(w, o + 3), ZERO, ZERO)
+        value, _, _ = load(h, f, w, e, at(w, o), at(w, o + 3))
         w[m.BEARING.row(h, e)] = value
 
 

@@ -1,4 +1,8 @@
-"""Back onto the closures: positions and speeds, by the least change in the metric of the mass."""
+"""Back onto the closures: positions and speeds, by the least change in the metric of the mass.
+
+Flexible bodies give way as slowly loaded ones do: in that metric alone their light modes would take up most of a gap,
+and ring.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.envelope import base, factor, multiply
 from flexclear.pipeline.dynamics.equations.retraction import make_position_rates
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -17,6 +22,8 @@ ROUNDING = 1e3
 #: rows that are not solved for may open by this share of the mechanism's size: joints whose axes miss each other by
 #: less than `model.rates.ZERO` count as redundant, and on the way they part by that much times some turns
 APART = 1e-6
+#: a gap is closed as if over this time [s]: modes with shorter periods follow by their stiffness, not by their mass
+SLOWLY = 0.1
 
 
 @kernel
@@ -59,10 +66,40 @@ def keep_scales(h, w):
         w[o] = max(w[o], w[o + h[m.N_CLOSURE_ROWS]])
 
 
-def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) -> Callable:
+@kernel
+def rigid_bodies(h, f, w, n):
+    """No mode."""
+
+
+def make_stiffen(closures: Any) -> Callable:
+    """The kernel stiffen(h, f, w, n): the factors of an evaluation, with the modal stiffness beside the mass.
+
+    closures: the module of that name.
+    """
+
+    @kernel
+    def stiffen(h, f, w, n):
+        rows, matrix, size = h[m.ENVELOPE.place], h[m.MASS], h[m.NV]
+        multiply(h, rows, w, matrix, size)
+        for k in range(h[m.N_FLEX]):
+            modes = m.FLEXES.n_modes(h, k)
+            stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + (12 + modes) * modes
+            for j in range(modes):
+                i = m.FLEXES.c0(h, k) + j
+                w[base(h, rows, matrix, i) + i] += SLOWLY**2 * f[stiffness + j]
+        factor(h, rows, w, matrix, size, 0.0)
+        closures.complete(h, w, n)
+
+    return stiffen
+
+
+def make_projection(
+    evaluate: Callable, joints: tuple[Any, ...], closures: Any, stiffen: Callable = rigid_bodies
+) -> Callable:
     """The kernel project(h, f, w, n, t, y, dy, tolerance).
 
     evaluate: the right-hand side.  joints: modules of the joint types.  closures: the module of that name.
+    stiffen: of `make_stiffen`, where bodies are flexible.
     """
     position_rates, correction = make_position_rates(joints), closures.correction
 
@@ -92,6 +129,9 @@ def make_projection(evaluate: Callable, joints: tuple[Any, ...], closures: Any) 
                 return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
             if n[m.ABRIDGED]:
                 evaluate(h, f, w, n, t, y, dy)  # for its factors
+            stiffen(h, f, w, n)
+            if n[m.EVALUATION] != m.OK:
+                return -1
             correction(h, w, h[m.RESIDUAL_RATE], step)
             for k in range(h[m.NV]):
                 w[y + h[m.NQ] + k] += w[step + k]

@@ -107,12 +107,12 @@ def make_step_control(
     def next_step(h, w, n, step, norm):
         """Length of the step after the one that has just been accepted."""
         c = h[m.CONTROL]
-        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
-            w[c + m.TOUCHED_STEP] = step
-        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
         norm = max(norm, LEAST_NORM)
         growth = SAFETY * norm**remembering * w[c + m.LAST_NORM] ** MEMORY
         growth = min(w[c + m.MOST_GROWTH], max(SHRINK, growth))
+        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
+            w[c + m.TOUCHED_STEP] = step * growth
+        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
         w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 

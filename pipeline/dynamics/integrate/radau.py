@@ -170,8 +170,8 @@ def keep(h, f, w, n, step):
 
 @kernel
 def begin(h, f, w, n):
-    """Neither a Jacobian nor a polynomial is known."""
-    w[h[m.MEMORY] + JACOBIAN_HOLDS] = w[h[m.MEMORY] + LAST_STEP] = 0.0
+    """No polynomial is known; the Jacobian holds until the iteration says otherwise, whatever the contacts' modes."""
+    w[h[m.MEMORY] + LAST_STEP] = 0.0
 
 
 # Newton's iteration --------------------------------------------------------------------------------------------------
@@ -256,11 +256,17 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
 
     @kernel
     def jacobian(h, f, w, n):
-        """Change of all rates with all variables, at the start of the step."""
+        """Change of all rates with all variables, at the start of the step; works and losses change none."""
         size, near = h[m.NY], slope(h, 1)
+        works = h[m.NQ] + h[m.NV]
+        states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * h[m.N_CONTACTS]
         for c in range(size):
             w[h[m.Y_STAGE] + c] = w[h[m.Y] + c]
         for k in range(size):
+            if works <= k < states:
+                for i in range(size):
+                    w[jacobian_entry(h, i, k)] = 0.0
+                continue
             y = w[h[m.Y] + k]
             w[h[m.Y_STAGE] + k] = y + PERTURBATION * (f[m.FLOORS.row(h, m.GROUPS.group(h, k))] + abs(y))
             change = w[h[m.Y_STAGE] + k] - y

@@ -88,7 +88,7 @@ def hold(
     arrays = replace(model.arrays, h=model.arrays.h.copy(), f=model.arrays.f.copy())
     engine = prepare(replace(model, arrays=arrays), progress)
     start = initial.start_state(model)
-    engine.select_pieces(engine.start)
+    engine.select_pieces_after(engine.start)
     singular.select_rows(engine, start, engine.start)
     at = engine.start if time is None else time
     first, last = drive_state(engine, engine.start), drive_state(engine, at)
@@ -111,7 +111,7 @@ def hold(
 
 def drive_state(engine: Engine, time: float) -> np.ndarray:
     """Position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
-    engine.select_pieces(time)
+    engine.select_pieces_after(time)
     # the laws say so on their way to any evaluation; the pose does not matter
     engine.evaluate(initial.start_state(engine.model), time)
     return np.stack([engine.view(m.X)[engine.model.nq :], engine.view(m.U)[engine.model.nv :]], axis=1)
@@ -125,7 +125,7 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
         straight["start"], straight["coefficients"][:, :2] = bench.time, (position, speed)
         arrays.table(m.PIECES)[first : first + count] = straight
         arrays.table(m.PIECE_HARMONICS, bench.engine.h)["n_harmonics"][first : first + count] = 0
-    bench.engine.select_pieces(bench.time)
+    bench.engine.select_pieces_after(bench.time)
 
 
 def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:

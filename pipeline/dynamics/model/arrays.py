@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,12 +38,15 @@ class Arrays:
 
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
         """A view of a wiring or number table with named fields, shape (rows,); of the wiring in another h if given."""
-        wiring = table in m.TABLES["h"]
+        wiring, after = _neighbours()[table.place]
         array = (self.h if h is None else h) if wiring else self.f
-        tables = m.TABLES["h" if wiring else "f"]
-        k = tables.index(table)
-        end = self.h[tables[k + 1].place] if k + 1 < len(tables) else len(array)
+        end = len(array) if after is None else self.h[after]
         return m.named(table, array[self.h[table.place] : end])
+
+    def rows(self, table: Any) -> np.ndarray:
+        """A wiring or number table as `pack` takes it, shape (rows, size)."""
+        stretch = self.table(table)
+        return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
 
     def work_space(self, room: Callable[[int, int, int], m.Room]) -> WorkSpace:
         """A work space with a copy of h, the ground in place and all else zero.
@@ -60,6 +64,16 @@ class Arrays:
         w[axes : axes + 9] = np.eye(3).ravel()
         n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + laws
         return WorkSpace(h, w, n, lengths)
+
+
+@cache
+def _neighbours() -> dict[int, tuple[bool, int | None]]:
+    """Of each wiring or number table, by its place: whether it is wiring, and the place of the one after it."""
+    found: dict[int, tuple[bool, int | None]] = {}
+    for array in ("h", "f"):
+        places = [table.place for table in m.TABLES[array]]
+        found |= {place: (array == "h", after) for place, after in zip(places, [*places[1:], None], strict=True)}
+    return found
 
 
 def rows(table: Any, entries: Any) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import lookup, suggestion
+from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.effects import JOINTS
@@ -49,7 +50,7 @@ def coordinate_of(scene: Scene, joint: str, name: str | None, place: str) -> tup
     if joint not in scene.joint:
         raise InputError(f"{place[:-1]}.joint]", f"there is no joint '{joint}'", suggestion(joint, scene.joint))
     kind = scene.joint[joint].type
-    if joint in scene.contacts() or kind == "fixed":
+    if isinstance(scene.joint[joint], CONTACTS) or kind == "fixed":
         raise InputError(
             f"{place[:-1]}.joint]", f"the {kind} joint '{joint}' has no coordinate", "name a joint with a free motion"
         )

@@ -218,7 +218,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
         return _site(frames, links, link_of, frame)
 
     closures = [Closure(e, at(e.frame_a), at(e.frame_b)) for e in closing]
-    length = _length(scene, links, frames)
+    length = size_of(scene, links, frames)
     touching: list[tuple[str, Clearance | End]] = [*scene.contacts().items(), *ends(scene, length)]
     contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in touching]
     deformation = {link_of[name]: q for name, q in given_modes(scene, bundles).items()}
@@ -245,8 +245,9 @@ class _Body:
         if self.bundle is not None:
             places = dict(self.group.places)
             return Link(branch, self.group, places, self.start, joint, inboard, bundle=self.bundle)
-        inertia, outward = rigid_inertia(self.scene, self.group, own), own.inverse()
+        outward = own.inverse()
         places = {n: outward.of(p) for n, p in self.group.places.items()}
+        inertia = rigid_inertia(self.scene, places)
         return Link(branch, self.group, places, self.start.of(own), joint, inboard, inertia)
 
 
@@ -256,7 +257,7 @@ def _unjoined(body: _Body, branch: Branch) -> Link:
         places = {n: body.start.of(p) for n, p in body.group.places.items()}
         return Link(branch, body.group, places, Placement(), InboardJoint("fixed"), None)
     rigid = body.bundle is None
-    own = Placement(rigid_inertia(body.scene, body.group, Placement()).com) if rigid else Placement()
+    own = Placement(rigid_inertia(body.scene, body.group.places).com) if rigid else Placement()
     return body.link(branch, own, Site(0, Placement(), None), InboardJoint("free"))
 
 
@@ -290,14 +291,16 @@ def _joined(
     return [*between, body.link(placed, own, site, joint)]
 
 
-def _length(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
+def size_of(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
     """Size of the mechanism [m], or of the clearance it moves in: what a length tolerance is relative to."""
-    points = []
+    points, of_body = list[np.ndarray](), dict[str, list[np.ndarray]]()
+    for frame in frames.values():
+        of_body.setdefault(frame.body, []).append(frame.place.p)
     for link in links:
         for name, place in link.places.items():
-            points += [link.start.of(place.of(f.place)).p for f in frames.values() if f.body == name]
+            points += [link.start.point(place.point(p)) for p in of_body.get(name, [])]
             if link.inertia is not None:
-                points.append(link.start.of(Placement(link.inertia.com)).p)
+                points.append(link.start.point(link.inertia.com))
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)

@@ -29,6 +29,10 @@ class Placement:
         """`inner`, given in this frame, in this frame's parent."""
         return Placement(self.p + self.R @ inner.p, self.R @ inner.R)
 
+    def point(self, p: np.ndarray) -> np.ndarray:
+        """A point, given in this frame, in this frame's parent."""
+        return np.asarray(self.p + self.R @ p)
+
     def inverse(self) -> Placement:
         """The parent, seen from this frame."""
         return Placement(-self.R.T @ self.p, self.R.T)
@@ -153,16 +157,14 @@ def _flexible(scene: Scene, body: str) -> bool:
     return isinstance(scene.body[body], FlexibleBody)
 
 
-def rigid_inertia(scene: Scene, group: Group, link: Placement) -> RigidInertia:
-    """Of a group of rigid bodies, in the frame `link` (given in the host's)."""
-    inward = link.inverse()
+def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia:
+    """Of rigid bodies that move as one, at these places in the frame in which it is wanted."""
     mass, first = 0.0, np.zeros(3)
     parts = []
-    for name, place in group.places.items():
+    for name, here in places.items():
         body = scene.body[name]
         if not isinstance(body, RigidBody):
             continue
-        here = inward.of(place)
         c = here.p + here.R @ np.array(body.com)
         parts.append((body.mass, c, here.R @ np.array(body.inertia) @ here.R.T))
         mass += body.mass

@@ -84,13 +84,25 @@ def tabulate(mechanism: Mechanism, given: Mapping[str, Pieces] = laws.NONE) -> M
     return filled(mechanism, number(mechanism), given)
 
 
-def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Pieces] = laws.NONE) -> Model:
-    """The model of an assembled mechanism; `given` as of `tabulate`."""
+def filled(
+    mechanism: Mechanism,
+    numbering: Numbering,
+    given: Mapping[str, Pieces] = laws.NONE,
+    like: Model | None = None,
+) -> Model:
+    """The model of an assembled mechanism; `given` as of `tabulate`.
+
+    like: a model with the same links, joints, frames and flexible bodies, whose wiring is this one's, too.
+    """
     normals = contacting.resolve(mechanism)
     site_pairs = [(e.kind, numbering.site(a), numbering.site(b)) for e, a, b in mechanism.closures]
     touching = [(numbering.site(c.outer), numbering.site(c.inner)) for c in mechanism.contacts]
     coupled, gauges = couplings(mechanism), Gauges()
-    closures, order = wiring.closures(numbering, site_pairs, coupled)
+    if like is None:
+        looped, order = wiring.closures(numbering, site_pairs, coupled)
+        ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
+    else:
+        looped, ordered = {}, like.closures
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
@@ -101,7 +113,6 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
     wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
-    ordered = tuple([*mechanism.closures, *coupled][k] for k in order)
     rubbing = _rubbing(numbering, parts, ordered, contact_ledger + ledger)
     groups, floors = _error_groups(numbering, ledger, gauges.internal)
     arrays = pack(
@@ -118,13 +129,8 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
-            m.LINKS: _links(numbering, parts),
             m.LINK_NUMBERS: [_link_numbers(link) for link in mechanism.links],
-            m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
-            m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
-            **flexible_bodies.fill(numbering),
-            **wiring.mass_entries(numbering),
-            **closures,
+            **(_wired(numbering, parts) | looped if like is None else {t: like.arrays.rows(t) for t in WIRED}),
             **contacts,
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
@@ -157,6 +163,25 @@ def filled(mechanism: Mechanism, numbering: Numbering, given: Mapping[str, Piece
         numbering.nv,
         len(groups),
     )
+
+
+#: tables that follow from links, joints, frames and flexible bodies alone
+WIRED = (
+    *(m.LINKS, m.SITES, m.SITE_NUMBERS, m.FLEXES, m.MOMENTS, m.PORTS, m.PAIRS, m.KNOWN_PAIRS, m.ENVELOPE),
+    *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
+    *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
+)
+
+
+def _wired(numbering: Numbering, parts: Parts) -> dict[Any, Any]:
+    """Those of the tables `WIRED` that are not of the closures."""
+    return {
+        m.LINKS: _links(numbering, parts),
+        m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
+        m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
+        **flexible_bodies.fill(numbering),
+        **wiring.mass_entries(numbering),
+    }
 
 
 def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:

@@ -1,7 +1,8 @@
-"""The model of an edited scene from that of another one, where only numbers of contacts, loads and laws differ.
+"""The model of an edited scene from that of another one, where only numbers of contacts, loads, laws or masses differ.
 
 Placing the links, finding the tree and judging the mobility take most of the time in which a model is made, and none
-of it depends on a clearance, a contact law, a load, the tolerance or the length of the run.
+of it depends on a clearance, a contact law, a load, the tolerance, the length of the run, or a mass of rigid bodies
+whose poses fit as they are given.
 """
 
 from __future__ import annotations
@@ -13,11 +14,18 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.loads import Gravity
+from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
+from flexclear.pipeline.dynamics.model.closing import EXACT
 from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, size_of
+from flexclear.pipeline.dynamics.model.merge import rigid_inertia
 from flexclear.pipeline.dynamics.model.model import Model, filled
+
+#: least principal moment as share of the largest with which no motion of a link can be without inertia
+SLENDER = 1e-6
 
 
 def refilled(model: Model, scene: Scene) -> Model | None:
@@ -29,17 +37,21 @@ def refilled(model: Model, scene: Scene) -> Model | None:
         return None
     clearances = scene.contacts()
     contacts = [c._replace(joint=clearances[c.name]) if c.name in clearances else c for c in model.contacts]
-    mechanism = replace(model.mechanism, scene=scene, contacts=contacts)
+    mechanism = replace(model.mechanism, contacts=contacts)
+    weighed = _weighed(mechanism, scene) if scene.body != model.scene.body else mechanism
+    if weighed is None:
+        return None
+    mechanism = replace(weighed, scene=scene)
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
-    made = filled(mechanism, numbering)
+    made = filled(mechanism, numbering, like=model)
     # other kinds of laws are other kernels, and a drive that begins to move may contradict another one
     return made if made.parts == model.parts and _moving(made) == _moving(model) else None
 
 
 def _same_structure(model: Model, scene: Scene) -> bool:
     old = model.scene
-    if scene.body != old.body or scene.time.start != old.time.start:
+    if not _same_bodies(model, scene) or scene.time.start != old.time.start:
         return False
     if (scene.stop, scene.gear, scene.start) != (old.stop, old.gear, old.start):
         return False
@@ -61,6 +73,49 @@ def _same_structure(model: Model, scene: Scene) -> bool:
         return False
     drives = zip(scene.drive.values(), old.drive.values(), strict=True)
     return all(new is was or _drives_alike(new, was) for new, was in drives)
+
+
+def _same_bodies(model: Model, scene: Scene) -> bool:
+    """Whether no body differs in more than its mass, centre and inertia, which decide but the links' numbers."""
+    old = model.scene.body
+    if [*scene.body] != [*old]:
+        return False
+    changed = [(new, was) for new, was in zip(scene.body.values(), old.values(), strict=True) if new is not was]
+    return all(new == was or _shape(new) == _shape(was) for new, was in changed)
+
+
+def _shape(body: Any) -> Any:
+    """What a rigid body is besides its mass, centre and inertia; of any other body nothing that equals another's."""
+    if not isinstance(body, RigidBody):
+        return object()
+    return [value for name, value in body if name not in ("mass", "com", "inertia", "source")]
+
+
+def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
+    """The mechanism with the masses of a scene; None where they decide more than numbers.
+
+    They do so where a link has its frame at its centre of mass, where closing moves it, and where it has hardly any
+    inertia: then a motion may be without mass.
+    """
+    old = mechanism.scene.body
+    changed = {name for name, body in scene.body.items() if body is not old[name]}
+    links = list(mechanism.links)
+    for i, link in enumerate(links):
+        if link.inertia is not None and changed & link.places.keys():
+            now = rigid_inertia(scene, link.places)
+            if link.branch.edge is None and not np.array_equal(now.com, link.inertia.com):
+                return None
+            links[i] = replace(link, inertia=now)
+    principal = np.linalg.eigvalsh(np.array([link.inertia.moments for link in links if link.inertia is not None]))
+    if not np.all(principal[:, 0] > SLENDER * principal[:, -1]):
+        return None
+    placed = [replace(link, start=start) for link, start in zip(links, mechanism.placed, strict=True)]
+    length = size_of(scene, placed, mechanism.frames)
+    if not mechanism.start_residual < 0.5 * EXACT * min(1.0, length) or mechanism.choice or mechanism.has_paths:
+        return None
+    if any(joint.clearance >= length for joint in scene.contacts().values()) or not mechanism.all_rigid:
+        return None
+    return replace(mechanism, links=links, length=length)
 
 
 def _held(joint: Any) -> tuple[str, tuple[str, str]]:

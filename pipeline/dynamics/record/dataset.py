@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from importlib import import_module
-from importlib.metadata import version
 
 import numpy as np
 import xarray as xr
@@ -15,6 +14,7 @@ from flexclear.pipeline.core.artifacts.schema import RUN, conform
 from flexclear.pipeline.core.citations import cited
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
 from flexclear.pipeline.dynamics.effects import RECORDS
 from flexclear.pipeline.dynamics.equations.observation import Observed
@@ -109,7 +109,7 @@ def attributes(scene: Scene) -> dict[str, str]:
         "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
         "sources": json.dumps(scene.sources(), sort_keys=True),
         "references": references(scene),
-        "versions": " ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
+        "versions": " ".join(f"{name} {library_version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
     }
 
 

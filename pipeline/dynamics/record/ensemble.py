@@ -7,6 +7,7 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from threading import Lock
 
 import numpy as np
 import xarray as xr
@@ -14,16 +15,19 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.artifacts.schema import ENSEMBLE, conform
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
+from flexclear.pipeline.core.workflow.cores import side_by_side
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions, quaternions
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.singular import select_rows
+from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
@@ -40,15 +44,26 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     engine, other = engines(scene, bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
-    engine.straight.wanted = True
+    select_rows(engine, start, engine.start)
+    specialise(engine, progress)
     jacobian = offset_jacobian(engine, start)
-    members, reasons = [], []
-    for k, offsets in enumerate(ball_offsets(engine.model, wanted, wanted.members)):
-        moved = perturbed(engine, start, jacobian, offsets)
-        last, trajectory, switched = follow(engine, moved, silent, other)
-        members.append(_member(last, trajectory, names))
-        reasons += [switched] if switched else []
-        progress((k + 1) / wanted.members, f"member {k + 1} of {wanted.members}")
+    offsets = ball_offsets(engine.model, wanted, wanted.members)
+    starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
+    making = Lock()
+
+    def heir(name: str) -> Engine:
+        with making:
+            return another(other(name))
+
+    def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
+        """On an engine of its own, so that it does not depend on who ran before."""
+        last, trajectory, switched = follow(another(engine), starts[k], alive, heir)
+        return _member(last, trajectory, names), switched
+
+    found = side_by_side(
+        member, wanted.members, lambda k: progress(k / wanted.members, f"member {k} of {wanted.members}")
+    )
+    members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
     told |= attributes(scene) | {"title": f"{wanted.members} motions of {subject(scene)}"}

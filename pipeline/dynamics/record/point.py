@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
@@ -15,15 +15,17 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.kept import OF_CONTACTS, Kept
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.schema import Ensemble, Scene
+from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
 from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
+from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -65,8 +67,11 @@ class Runner:
     def _values(self, scene: Scene) -> tuple[Values, Values, int]:
         engine, other = engines_alike(self.engine, scene, self.bundles)
         self.engine = self.engine or engine
-        found, count = list[Values](), 0
         engine.straight.wanted = True
+        if in_sections(self.kept):
+            values, count = _sections(engine, self.kept)
+            return values, {}, count
+        found, count = list[Values](), 0
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, silent, other)
             found.append(_kept(last, trajectory, self.kept))
@@ -86,8 +91,16 @@ class Runner:
         return [perturbed(engine, start, jacobian, moved) for moved in offsets]
 
 
+def in_sections(kept: Sequence[Kept]) -> bool:
+    """Whether points are motions that their laws repeat, looked at once in each period."""
+    return any(one.reduction == "sections" for one in kept)
+
+
 def thinned(scene: Scene, kept: Sequence[Kept]) -> Scene:
     """The scene with no more regular outputs than what is kept needs."""
+    if in_sections(kept):
+        # only the states between the stretches of a period are looked at
+        return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
     if any(one.throughout for one in kept):
         return scene
     interval = max(scene.output.interval, (scene.time.end - scene.time.start) / LOOKS)
@@ -114,6 +127,26 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Value
             value = reduced(trajectory.time, found, one.reduction)
         values[one.name] = value if "axis" in one.dims or "quat" in one.dims else value.reshape(value.shape[:1])
     return values
+
+
+def _sections(engine: Engine, kept: Sequence[Kept]) -> tuple[Values, int]:
+    """What is kept once in each period, after the transient, and the evaluations that all periods took."""
+    scene = engine.model.scene
+    wanted, period = scene.sections or Sections(), section_period(scene)
+    start, parts = consistent_start(engine), stretches(engine, period, wanted.phase)
+    require_periodic(parts, start)
+    looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + wanted.phase)
+    values, evaluations = dict[str, list[np.ndarray]](), 0
+    for done in periods(parts, start, range(0), Cursor()):
+        evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
+        if done.number >= wanted.transient:
+            here = done.parts[looked_at]
+            motions = Motions(engine.model, observed(parts[looked_at], replace(here, rows=here.rows[:1])))
+            for one in kept:
+                values.setdefault(one.name, []).append(_series(motions, {}, one)[0])
+        if done.number + 1 == wanted.transient + wanted.periods:
+            break
+    return {name: np.array(rows) for name, rows in values.items()}, evaluations
 
 
 def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Kept) -> np.ndarray:

@@ -47,9 +47,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
                 "a controller that samples counts its periods from the run's start, which sections repeat",
                 "use a continuous 'pid' here",
             )
-    span = scene.time.end - scene.time.start
-    period = wanted.period or span
-    _require_inside(wanted, period, span)
+    period = section_period(scene)
     # between waypoints only their states are wanted
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[sections.bodies]")
@@ -86,7 +84,10 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     return conform(made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
 
 
-def _require_inside(wanted: Sections, period: float, span: float) -> None:
+def section_period(scene: Scene) -> float:
+    """Period of the sections [s], the run's length where the scene gives none; InputError where it does not fit in."""
+    wanted, span = scene.sections or Sections(), scene.time.end - scene.time.start
+    period = wanted.period or span
     if period > span * (1.0 + 1e-12):
         raise InputError(
             "[sections.period]",
@@ -99,6 +100,7 @@ def _require_inside(wanted: Sections, period: float, span: float) -> None:
             f"{wanted.phase:.6g} s is no time within the period of {period:.6g} s",
             "give a time from 0 to below the period",
         )
+    return period
 
 
 @dataclass

@@ -18,6 +18,9 @@ Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 #: singular values of the kept closure rows below this share of the largest count as zero in the rank
 ZERO = 1e-9
+#: condition numbers below which no row's rank is in doubt, in whatever units, and with which eigenvalues of J J^T, the
+#: squares of the singular values, still have ten of their digits: their roundings are 1e-16 of the largest one
+WELL = 1e3
 
 
 def topology(run: Run) -> tuple[Variables, dict[str, object]]:
@@ -26,16 +29,18 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.nv
-    values = _singular_values(engine, trajectory, seen, singular.natural)
-    rank = np.zeros(rows, dtype=np.int32)
-    if values.shape[1]:
-        rank = np.sum(values > ZERO * values[:, :1], axis=1).astype(np.int32)
-        told = _singular_values(engine, trajectory, seen, singular.scaled)
+    told = _singular_values(engine, trajectory, seen, singular.scaled)
+    rank = np.full(rows, told.shape[1], dtype=np.int32)
+    if told.shape[1]:
         least = np.maximum(told[:, -1], told[:, 0] / INFINITE)
-        variables["condition"] = (("time",), np.minimum(told[:, 0] / least, INFINITE))
+        condition = variables["condition"] = (("time",), np.minimum(told[:, 0] / least, INFINITE))
+        near = condition[1] > WELL
+        if near.any():
+            values = _singular_values(engine, trajectory, seen, singular.natural)[near]
+            rank[near] = np.sum(values > ZERO * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
-    if not values.shape[1]:
+    if not told.shape[1]:
         return variables, {}
     passes = trajectory.passes
     variables |= {
@@ -56,4 +61,10 @@ def _singular_values(
         J = selection.dense(engine.model, engine.h, seen.jacobian[part])
         parts.append(scale(engine.model, engine.h, J))
     J = np.concatenate(parts)
-    return np.linalg.svd(J, compute_uv=False) if J.size else np.zeros((len(J), 0))
+    if not J.size:
+        return np.zeros((len(J), 0))
+    squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]
+    values = np.sqrt(np.maximum(squares, 0.0))
+    poor = ~(values[:, -1] * WELL > values[:, 0])
+    values[poor] = np.linalg.svd(J[poor], compute_uv=False)
+    return values

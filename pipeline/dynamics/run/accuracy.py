@@ -1,5 +1,7 @@
 """A run whose time integration is as accurate as the scene asks: tolerances are tried, errors estimated.
 
+Where the scene names no integrator, each run is made with the one that is foreseen to be cheapest (`suited`).
+
 The error of a run is estimated by the same run at a hundred times tighter tolerance: an adaptive method
 whose tolerance is proportional to its error (tolerance proportionality) then overestimates its distance to the
 exact solution by about one per cent. Errors of the model (modes, mesh, contact law) are not part of it.
@@ -12,6 +14,7 @@ import json
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -23,6 +26,12 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import Quantity, parse
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.pace import Judge
+    from flexclear.pipeline.dynamics.run.suited import Suit
+
+#: by integrator, who looks whether another one shall go on, and which
+Judges = Mapping[str, "tuple[Judge, str]"]
 #: the estimate compares with a run at this share of the tolerance
 FINER = 1e-2
 #: tolerances that are tried lie between these; below, rounding decides
@@ -53,14 +62,23 @@ class Search:
     """Runs made so far by tolerance, and what is wanted of them."""
 
     scene: Scene
-    once: Callable[[Scene], xr.Dataset]
+    once: Callable[[Scene, Judges], xr.Dataset]
+    suit: Suit | None = None
     runs: dict[float, xr.Dataset] = field(default_factory=dict)
 
     def run(self, rtol: float) -> xr.Dataset:
         """The run at a tolerance, made once."""
         if rtol not in self.runs:
-            self.runs[rtol] = self.once(edited(self.scene, {"solver.rtol": rtol}))
+            self.runs[rtol] = self._made(rtol)
         return self.runs[rtol]
+
+    def _made(self, rtol: float) -> xr.Dataset:
+        if self.suit is None:
+            return self.once(edited(self.scene, {"solver.rtol": rtol}), {})
+        name, why = self.suit.best(rtol), self.suit.why(rtol)
+        run = self.once(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.suit.judges())
+        self.suit.learn(rtol, name, run)
+        return run.assign_attrs(method_reason=why)
 
     def attempt(self, rtol: float) -> Attempt:
         """The run at a tolerance and its estimated errors."""
@@ -94,17 +112,22 @@ class Search:
         return wanted
 
 
-def deliver(scene: Scene, once: Callable[[Scene], xr.Dataset], progress: Progress) -> xr.Dataset:
+def deliver(
+    scene: Scene, once: Callable[[Scene, Judges], xr.Dataset], progress: Progress, suit: Suit | None = None
+) -> xr.Dataset:
     """The cheapest run found whose estimated errors are what the scene wants; or the best, and a word on it.
 
-    once: makes the run of a scene.  The dataset's attributes say what was wanted, estimated and met.
+    once: makes the run of a scene, under judges of its integrators.  suit: by what its integrator is chosen; None where
+    the scene names one.  The dataset's attributes say what was wanted, estimated and met, and why by which integrator.
     """
-    search = Search(scene, once)
+    search = Search(scene, once, suit)
     best = _search(search, progress)
     wanted = {q.name: w for q, w in search.wanted(best.run).items()}
     met = best.share <= ENOUGH
     verdict = "met" if met else _missed(search, best, wanted)
     progress(None, f"accuracy {'met' if met else 'missed: ' + verdict} (relative tolerance {best.rtol:.1e})")
+    if "method_reason" in best.run.attrs:
+        progress(None, str(best.run.attrs["method_reason"]))
     return best.run.assign_attrs(
         accuracy_wanted=json.dumps({name: f"{w:.3g}" for name, w in wanted.items()}, sort_keys=True),
         accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),

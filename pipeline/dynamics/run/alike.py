@@ -7,7 +7,6 @@ from functools import cache
 
 import xarray as xr
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
@@ -20,7 +19,7 @@ from flexclear.pipeline.dynamics.run.run import engine_of, engines
 
 def engines_alike(
     known: Engine | None, scene: Scene, bundles: Mapping[str, xr.Dataset]
-) -> tuple[Engine, Callable[[], Engine]]:
+) -> tuple[Engine, Callable[[str], Engine]]:
     """What `engines` gives, to the last bit, at less cost where an engine of a similar scene is `known`.
 
     known: with the same bundles; it is not changed.  Errors as of `engines`.
@@ -28,8 +27,7 @@ def engines_alike(
     model = None if known is None or not _may_serve(known, scene) else refilled(known.model, scene)
     if known is None or model is None:
         return engines(scene, bundles, silent)
-    heir = INTEGRATORS[scene.solver.integrator].hands_over_to
-    other = cache(lambda: engine_of(edited(scene, {"solver.integrator": heir}), bundles, silent))
+    other = cache(lambda name: engine_of(edited(scene, {"solver.integrator": name}), bundles, silent))
     return assemble(model, known.entry, known.method, known.mobility), other
 
 

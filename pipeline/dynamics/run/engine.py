@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,7 +65,7 @@ class Engine:
     rtol: float
     straight: Straight
 
-    @property
+    @cached_property
     def breaks(self) -> np.ndarray:
         """Start, breaks of drives and loads and samples in between, end [s]; what only rounding sets apart is one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
@@ -79,15 +80,25 @@ class Engine:
                 times.append(t)
         return np.array([*times, self.end])
 
-    def select_pieces(self, inside: float) -> None:
-        """Put the pieces of the laws in force that hold at `inside`, which is no break."""
-        first = self.n[m.ACTIVE]
-        self.n[first : first + self.model.arrays.size(m.N_LAWS)] = pieces_at(self.model, inside)
+    @cached_property
+    def pieces(self) -> np.ndarray:
+        """Piece of every law between each break and the next, shape (breaks - 1, laws)."""
+        starts, laws = self.model.arrays.table(m.PIECES)["start"], self.model.arrays.table(m.LAWS)
+        middles, found = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
+        for k, (first, count) in enumerate(laws):
+            passed = np.searchsorted(starts[first : first + count], middles, side="right")
+            found[:, k] = first + np.maximum(passed - 1, 0)
+        return found
+
+    def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
+        """Number of the segment between breaks that holds each time; on a break, that before it or that `after` it."""
+        found = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
+        return np.asarray(np.minimum(np.maximum(found, 0), len(self.breaks) - 2))
 
     def select_pieces_after(self, t: float) -> None:
         """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""
-        k = int(np.clip(np.searchsorted(self.breaks, t, side="right"), 1, len(self.breaks) - 1))
-        self.select_pieces(0.5 * (self.breaks[k - 1] + self.breaks[k]))
+        first = self.n[m.ACTIVE]
+        self.n[first : first + self.model.arrays.size(m.N_LAWS)] = self.pieces[self.segments(t, after=True)]
 
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
@@ -168,14 +179,6 @@ class Engine:
         return selection.dense(self.model, self.h, self.view(stored))
 
 
-def pieces_at(model: Model, inside: float) -> np.ndarray:
-    """Piece of every law that holds at a time which is no break."""
-    starts, pieces = model.arrays.table(m.PIECES)["start"], []
-    for first, count in model.arrays.table(m.LAWS):
-        pieces.append(first + max(int(np.searchsorted(starts[first : first + count], inside, side="right")) - 1, 0))
-    return np.array(pieces, dtype=np.int64)
-
-
 def prepare(model: Model, progress: Progress) -> Engine:
     """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot go on."""
     solver, mobility = model.scene.solver, analyse(model)
@@ -195,6 +198,13 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol, Straight())
     engine.control[m.LENGTH] = model.length
     return engine
+
+
+def another(engine: Engine) -> Engine:
+    """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
+    made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
+    made.straight.wanted, made.straight.addresses = engine.straight.wanted, engine.straight.addresses.copy()
+    return made
 
 
 def may_start_singular(model: Model) -> bool:

@@ -242,7 +242,7 @@ def _least(
     own = [names.index(name) for name in alone]
     least = []
     for t, state, force in zip(time, seen.state, forces, strict=True):
-        engine.select_pieces(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
+        engine.select_pieces_after(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
         engine.evaluate(state, float(t))
         free = null_space(_closure_jacobian(engine), rcond=RANK)
         rates = np.array([_rate(engine, scene, name) @ free for name in names])

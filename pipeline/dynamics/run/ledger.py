@@ -20,6 +20,8 @@ ROUNDING = 1e-12
 #: off by 1e-6, unless something is wrong; what damps by its order is not told from a fault that soon. Fixed steps are
 #: for comparison: their error is to be seen, unless it is as large as everything
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 1.0
+#: steps of many vibrations leave up to half of this in the work of forces that swing while the drives' speeds change
+LONG, LONG_PER_RTOL = 2e-2, 50.0
 
 
 def series(model: Model, seen: Observed) -> Variables:
@@ -69,7 +71,8 @@ def usual(solver: Solver) -> float:
         return FIXED
     if INTEGRATORS[solver.integrator].dissipative:
         return CHOSEN
-    return max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
+    usual = max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
+    return max(usual, min(LONG, LONG_PER_RTOL * solver.rtol)) if INTEGRATORS[solver.integrator].long_steps else usual
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None:

@@ -9,13 +9,15 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.run.engine import Engine, pieces_at
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation
 
-#: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding
-RECORD_SHARE, ROUNDING = 1e-3, 1e-14
+#: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding; to more of
+#: a loose rtol, up to the second share, as it grows by so many times rtol: what a run left open itself need not cost
+#: an evaluation in every row
+RECORD_SHARE, MOST_SHARE, LOOSER, ROUNDING = 1e-3, 0.1, 1e3, 1e-14
 #: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
 #: 1e-14, and six, with which a row must do in whose own pose they hold nothing
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
@@ -36,12 +38,9 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 
 def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np.ndarray:
     """The same as the kernel writes it, shape (rows, columns); see `equations.observation.by_name`."""
-    segments = engine.breaks
-    sides = np.clip(np.searchsorted(segments, rows[:, 0], side="right" if after else "left"), 1, len(segments) - 1)
-    middles = 0.5 * (segments[sides - 1] + segments[sides])
-    per_segment = {x: pieces_at(engine.model, x) for x in set(middles.tolist())}
-    pieces = np.array([per_segment[x] for x in middles.tolist()], dtype=np.int64)
-    return observe_with(engine, rows, pieces, max(RECORD_SHARE * engine.rtol, ROUNDING))
+    pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
+    share = min(MOST_SHARE, max(RECORD_SHARE, LOOSER * engine.rtol))
+    return observe_with(engine, rows, pieces, max(share * engine.rtol, ROUNDING))
 
 
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> np.ndarray:
@@ -77,7 +76,7 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -
     between them.
     clear: pivot ratio of the closures that the sides must have.
     """
-    pieces = np.tile(pieces_at(engine.model, 0.5 * (motion.start + motion.end)), (len(SIDES), 1))
+    pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
     for k in range(TRIES):
         rows = np.tile(row, (len(SIDES), 1))
         near = m.record(rows, len(engine.model.contacts))

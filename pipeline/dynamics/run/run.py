@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.errors import SolverError, StoppedError
-from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.drives import PathDrive
@@ -29,6 +28,7 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from flexclear.pipeline.dynamics.run.pace import Judge
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
@@ -43,7 +43,7 @@ class Run:
     scene: as the user gave it; the engine may hold another, made for it.
     twin: the run's twin, of scenes with contacts.
     mended: what was changed of the start that the scene gives, in words.
-    switched: from when on and why an implicit integrator took the place of the scene's; empty when none did.
+    switched: from when on and why another integrator took the place of the first; empty when none did.
     """
 
     scene: Scene
@@ -83,30 +83,46 @@ def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
     return found
 
 
-def engines(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, Callable[[], Engine]]:
-    """The engine of a run, and the maker of one that goes on with the implicit method that takes over."""
+def engines(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
+) -> tuple[Engine, Callable[[str], Engine]]:
+    """The engine of a run, and the maker of one that goes on with another integrator, given by its name."""
+    made = _maker(scene, bundles, progress)
+    return made(""), cache(made)
+
+
+def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str], Engine]:
+    """What makes the engine of a run by an integrator's name; that of the scene's own by none."""
     moved, given = driven(begun(scene, bundles, progress), bundles, progress)
 
-    def made(wanted: Scene) -> Engine:
+    def made(name: str) -> Engine:
+        wanted = edited(moved, {"solver.integrator": name}) if name else moved
         return prepare(tabulate(build(wanted, bundles), given), progress)
 
-    heir = INTEGRATORS[scene.solver.integrator].hands_over_to
-    return made(moved), cache(lambda: made(edited(moved, {"solver.integrator": heir})))
+    return made
 
 
-def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Run:
+def integrate(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    judges: Mapping[str, tuple[Judge, str]] | None = None,
+) -> Run:
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 
-    bundles: reduced flexible bodies by name.  Raises InputError for a scene that cannot be built, SolverError when the
-    run cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
+    bundles: reduced flexible bodies by name.  judges: by integrator, who looks whether another one shall go on, and
+    which; without them the explicit ones hand over where they would crawl.  Raises InputError for a scene that cannot
+    be built, SolverError when the run cannot go on, StoppedError with the run so far as `partial` when it is asked to
+    stop.
     """
-    engine, other = engines(scene, bundles, progress)
+    made = _maker(scene, bundles, progress)
+    engine = made("")
     start = consistent_start(engine)
     mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
     for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
     try:
-        engine, trajectory, switched = follow(engine, start, progress, other)
+        engine, trajectory, switched = follow(engine, start, progress, made, judges)
     except StoppedError as stopped:
         if stopped.partial is not None:
             last, there = stopped.partial
@@ -124,19 +140,27 @@ def integrate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
 
 def follow(
-    engine: Engine, y: np.ndarray, progress: Progress, other: Callable[[], Engine]
+    engine: Engine,
+    y: np.ndarray,
+    progress: Progress,
+    other: Callable[[str], Engine],
+    judges: Mapping[str, tuple[Judge, str]] | None = None,
 ) -> tuple[Engine, Trajectory, str]:
     """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
 
-    other: gives the engine that takes over, asked only when it is needed.
+    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`.
     """
-    try:
-        return engine, stepping.integrate(engine, y, progress), ""
-    except StiffError as stiff:
-        progress(None, f"{stiff}; going on with {engine.method.traits.hands_over_to}")
-        second = other()
-        second.straight.wanted = engine.straight.wanted
-        return second, stepping.integrate(second, y, progress, left=stiff.handover), str(stiff)
+    left, reasons = None, list[str]()
+    while True:
+        traits = engine.method.traits
+        judge, heir = (judges or {}).get(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
+        try:
+            return engine, stepping.integrate(engine, y, progress, left=left, judge=judge), "\n".join(reasons)
+        except StiffError as stiff:
+            progress(None, f"{stiff}; going on with {heir}")
+            reasons.append(str(stiff))
+            wanted, engine, left = engine.straight.wanted, other(heir), stiff.handover
+            engine.straight.wanted = wanted
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
@@ -196,7 +220,7 @@ def _near_singular(
 ) -> Iterator[tuple[int, Collocation]]:
     """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
-        engine.select_pieces(0.5 * (motion.start + motion.end))
+        engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):
             if blurred(engine, rows[k]):

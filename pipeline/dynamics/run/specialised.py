@@ -9,6 +9,8 @@ kernels.
 
 from __future__ import annotations
 
+from threading import Lock
+
 from numba import config
 
 from flexclear.pipeline.core.progress import Progress, silent
@@ -22,6 +24,7 @@ from flexclear.pipeline.dynamics.specialise.wiring import wiring
 MANY = 1_000_000
 #: selections of closure rows for which it is made, of one run
 SELECTIONS = 4
+_making = Lock()
 
 
 def settle(engine: Engine, progress: Progress) -> None:
@@ -44,10 +47,13 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
 def _make(engine: Engine, progress: Progress) -> None:
     """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster."""
     known, kept = engine.straight.addresses, engine.kept.tobytes()
-    if config.DISABLE_JIT or engine.model.parts.joint_frictions or kept in known or len(known) >= SELECTIONS:
+    if config.DISABLE_JIT or engine.model.parts.joint_frictions or engine.method.traits.reads_all:
+        return
+    if kept in known or len(known) >= SELECTIONS:
         return
     wired = wiring(engine.model.arrays, engine.h)
     try:
-        known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
+        with _making:  # members of ensembles run side by side
+            known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
     except UnsuitedError:
         known[kept] = 0

@@ -16,6 +16,7 @@ from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTL
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.pace import Judge, crawls
 from flexclear.pipeline.dynamics.run.pieces import Piece, Tape, piece
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
@@ -30,8 +31,6 @@ EVENT_ROWS = 4096
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
 #: why it stops that a polynomial over a singular pose may mend
 STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
-#: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
-TRIAL, HOPELESS = 400_000, 10_000_000
 #: control floats of a method that another one goes on with
 LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
 
@@ -138,15 +137,18 @@ def integrate(
     stop: Stop = never,
     left: Handover | None = None,
     outputs: np.ndarray | None = None,
+    judge: Judge | None = None,
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
     stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is gone on with from there.
     outputs: times of output [s], the start first; the scene's where there are none.
+    judge: whether another method goes on; by default where this one is explicit and would take far too long.
     Where the task keeps a journal, what an earlier attempt left there is gone on with.  Raises StoppedError, with the
     engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
     """
+    judge = judge or Judge(SLICE, crawls)
     if outputs is None:
         outputs = output_times(engine.breaks, engine.model.scene.output.interval)
     mine = piece(engine, y, outputs, left)
@@ -158,11 +160,11 @@ def integrate(
     with stopping.heeded():
         if mine is None or mine.tape is None:
             tape = _begun(engine, y, left, outputs)
-            _advance(engine, tape, progress, stop, left, mine, resumed=False)
+            _advance(engine, tape, progress, stop, left, mine, judge, resumed=False)
         else:
             tape = mine.tape
             if not mine.done:
-                _advance(engine, tape, progress, stop, left, mine, resumed=True)
+                _advance(engine, tape, progress, stop, left, mine, judge, resumed=True)
     if mine is not None:
         mine.finish(tape)
     return _collect(engine, tape)
@@ -185,6 +187,7 @@ def _advance(
     stop: Stop,
     left: Handover | None,
     mine: Piece | None,
+    judge: Judge,
     *,
     resumed: bool,
 ) -> None:
@@ -197,10 +200,10 @@ def _advance(
         if not resumed:
             if a > (engine.start if left is None else left.time):
                 engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-            engine.select_pieces(0.5 * (a + b))
+            engine.select_pieces_after(0.5 * (a + b))
             control[m.END], engine.n[m.FRESH] = b, 1
         resumed = False
-        if _segment(engine, tape, progress, stop, mine):
+        if _segment(engine, tape, progress, stop, mine, judge):
             break
 
 
@@ -250,6 +253,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     control[m.RTOL], control[m.LENGTH] = engine.rtol, model.length
     control[m.PASS_TIME] = control[m.MOST_REACH] = NEVER
     engine.view(m.INDEPENDENCE)[:] = 0.0
+    engine.view(m.MEMORY)[:] = 0.0  # what a method knows of another run would change this one's last bits
     control[m.FIXED], control[m.PARAMETER] = solver.step or 0.0, engine.method.parameter(solver)
     n[m.STATUS : m.INTEGERS] = 0
     n[m.CAP] = solver.evaluations
@@ -295,12 +299,12 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
         n[m.N_EVENTS] += 1
 
 
-def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: Piece | None) -> bool:
+def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: Piece | None, judge: Judge) -> bool:
     """To the end of the segment; True when it was stopped before."""
     n, control = engine.n, engine.control
     while True:
         if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
-            n[m.BUDGET] = n[m.EVALUATIONS] + SLICE
+            n[m.BUDGET] = n[m.EVALUATIONS] + judge.every
         engine.entry.advance(engine.h, engine.model.arrays.f, engine.w, n, tape.outputs, tape.rows, tape.events)
         t = float(control[m.TIME])
         progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
@@ -320,8 +324,8 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
         elif status != m.PAUSED:
             if not _rescued(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
-        elif _crawls(engine):
-            raise StiffError(f"at t = {t:.6g} s: {refusal.stiffness(n, control)}", _hand_over(engine, tape))
+        elif reason := judge.verdict(engine):
+            raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
         else:
             settle(engine, progress)
             _warn(engine, tape, progress)
@@ -378,16 +382,6 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
         return False
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
     return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
-
-
-def _crawls(engine: Engine) -> bool:
-    """Whether stability limits the steps so much that the run would take far too long."""
-    n, control = engine.n, engine.control
-    if not engine.method.traits.hands_over_to or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
-        return False
-    done = max((control[m.TIME] - engine.start) / control[m.SPAN], 1e-12)
-    too_many = min(HOPELESS, n[m.CAP])
-    return bool(n[m.STIFF_STEPS] > refusal.STIFF_SHARE * n[m.STEPS] and n[m.EVALUATIONS] / done > too_many)
 
 
 def _hand_over(engine: Engine, tape: Tape) -> Handover:

@@ -13,12 +13,27 @@ from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import Curve, curves, has, scaled
 from flexclear.pipeline.post.overview.figures import CENTRE, CONTACTS, orbit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.series import derive
+from flexclear.pipeline.post.series import derive, parameters
 
 #: of the runs, the reference first: told apart by colour-blind readers, too
 COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+#: of models of one mechanism, by what they have beside the ideal one; the same as in the figures about the paper
+IDEAL, CLEARANCE = "#111111", "#E69F00"
+MODES = {"free-free": "#0072B2", "fixed-fixed": "#D55E00", "craig-bampton": "#009E73"}
 #: opacity of a curve beyond the horizon of its run
 PALE = 0.35
+
+
+def colors(runs: Mapping[str, xr.Dataset]) -> list[str]:
+    """A colour for each run: that of its model, where it is the first with that; else one that none has."""
+    found: list[str] = []
+    for run in runs.values():
+        told = parameters(run)
+        flexible = [body["modes"]["reference"] for body in told.get("body", {}).values() if body["type"] == "flexible"]
+        own = MODES.get(flexible[0], COLORS[4]) if flexible else CLEARANCE if "contact" in run.sizes else IDEAL
+        free = [color for color in COLORS if color not in found] or list(COLORS)
+        found.append(own if own not in found else free[0])
+    return found
 
 
 def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> dict[str, bytes]:
@@ -49,10 +64,11 @@ def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[
 def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[Curve | None]) -> None:
     there = [curve for curve in found if curve is not None]
     factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in there), there[0].unit)
+    own = colors(runs)
     for k, ((label, run), curve) in enumerate(zip(runs.items(), found, strict=True)):
         if curve is None:
             continue
-        color, last = COLORS[k % len(COLORS)], _horizon(run)
+        color, last = own[k], _horizon(run)
         firm = curve.time <= last
         look: dict[str, Any] = {"color": color, "lw": 1.8 if k == 0 else 1.0, "zorder": 1.5 if k == 0 else 2.0}
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
@@ -78,8 +94,9 @@ def _apart(axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity,
         return
     unit = next(curve.unit for curve in found if curve is not None)
     factor, written = scaled(max(float(values.max(initial=0.0)) for _, _, values in lines), unit)
+    own = colors(runs)
     for k, time, values in lines:
-        axes.plot(1e3 * time, factor * values, color=COLORS[k % len(COLORS)], lw=0.9)
+        axes.plot(1e3 * time, factor * values, color=own[k], lw=0.9)
     time = lines[0][1]
     axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)")
     axes.set_ylim(bottom=0.0)

@@ -157,8 +157,9 @@
       gl.viewport(0, 0, width, height); gl.clearColor(0, 0, 0, 0); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       const back = minus(this.eye, this.focus), far = Math.hypot(...back), z = unit(back), x = unit(cross(this.up, z)), y = cross(z, x);
       const view = [x[0], y[0], z[0], 0, x[1], y[1], z[1], 0, x[2], y[2], z[2], 0, -dot(x, this.eye), -dot(y, this.eye), -dot(z, this.eye), 1];
-      // a narrow picture shows as much across as a wide one
-      const f = Math.min(1, (width / height) / this.told.aspect) / Math.tan(this.told.angle * Math.PI / 360), near = 0.02 * far, end = 6 * far;
+      // all that is shown fits, whether the picture is narrow or wide
+      const [across, upright] = this.told.reach, near = 0.02 * far, end = 6 * far;
+      const f = 0.93 * Math.min(1 / upright, width / height / across);
       const lens = [f * height / width, 0, 0, 0, 0, f, 0, 0, 0, 0, (end + near) / (near - end), -1, 0, 0, 2 * end * near / (near - end), 0];
       gl.uniformMatrix4fv(this.in.view, false, view); gl.uniformMatrix4fv(this.in.lens, false, lens);
       for (const mesh of this.meshes) {

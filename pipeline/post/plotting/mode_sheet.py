@@ -14,11 +14,14 @@ from matplotlib.figure import Figure
 
 from flexclear.pipeline.post.body_shape import faces, is_rod, scale_to, surface
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.plotting.drawing import View, skin, view
+from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
+from flexclear.pipeline.post.rod_shape import AROUND
 
 #: modes beside each other, and drawn size of the largest displacement as a share of the body's length
 COLUMNS, SHARE = 3, 0.14
+#: of the points around a rod every so many are drawn: a sheet shows its modes small
+EVERY = 2
 #: pictures of one vibration in a film
 FRAMES = 16
 
@@ -85,9 +88,13 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, share: f
     moved = size if size.max() > 1e-9 * np.ptp(rest) else np.linalg.norm(points - rest, axis=1)
     largest = float(scale_to_size(bundle, q, factor, rest))
     index = faces(bundle)
-    if index.shape[1] >= 3:
+    share_of = np.clip(moved / largest, 0.0, 1.0)
+    if is_rod(bundle):
+        rings = points.reshape(-1, AROUND + 1, 3)[:, ::EVERY]
+        shell(panel, seen, rings, share_of.reshape(-1, AROUND + 1)[:, 0], zorder=2)
+    elif index.shape[1] >= 3:
         triangles = index if index.shape[1] == 3 else np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
-        skin(panel, seen, points, triangles, np.clip(moved / largest, 0.0, 1.0), zorder=2)
+        skin(panel, seen, points, triangles, share_of, zorder=2)
     else:
         x, y = seen.project(points).T
         panel.scatter(x, y, c=moved / largest, cmap="viridis", vmin=0.0, vmax=1.0, s=9)

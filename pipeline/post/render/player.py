@@ -17,10 +17,10 @@ from flexclear.pipeline.core.algebra import matrix_to_quaternion
 from flexclear.pipeline.post.body_shape import box, faces, scale_to, surface
 from flexclear.pipeline.post.render import pace, surfaces
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, Part, part_pose, pose
-from flexclear.pipeline.post.render.view import ANGLE, View, eye
+from flexclear.pipeline.post.render.view import View, eye
 
-#: frames of a motion, and width over height of the narrowest picture that shows all
-FRAMES, ASPECT = 240, 1.1
+#: frames of a motion, and width over height of a picture that is neither wide nor narrow
+FRAMES, ASPECT = 240, 1.2
 #: drawn size of the largest displacement of a mode, as a share of the body's or the mechanism's length
 SHARE = 0.12
 #: a small step of a coordinate, in which a skin moves linearly
@@ -251,8 +251,13 @@ def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
 
 
 def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
-    place, focus = eye(seen, cloud, ASPECT, zoom)
-    return {"eye": place.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "angle": ANGLE, "aspect": ASPECT}
+    """Where the eye is, and how far what it sees reaches across and upright, over the distance."""
+    place, focus = eye(seen, cloud, ASPECT)
+    back = (place - focus) / np.linalg.norm(place - focus)
+    right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
+    local = (cloud - place) @ np.array([right, np.cross(back, right), -back]).T
+    reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
+    return {"eye": place.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
 
 
 def _floats(values: np.ndarray) -> str:

@@ -1,0 +1,212 @@
+"""Plans of a family of scenes: does the planned run stay within what is wanted, what does it save, what does it cost?
+
+The full scene, the planned one and the planning are timed alike: processor time of setting up, integrating and
+observing, code and reduced bodies being there. The true error is the difference of the planned run from the full one,
+over members that start a hair apart; what the members' spread explains is told beside it.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Measured, Record
+from benchmarks.page import Columns, short, table
+from benchmarks.plan_scenes import drawn
+from flexclear.pipeline.core import influence
+from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.wanted import parse
+
+SEED, SCENES = 1, 60
+#: starts of runs with contacts
+MEMBERS = 3
+#: a miss by more than this is wrong, and so much may planning cost: of the full run, or a second
+WORST, SHARE, SECOND = 3.0, 0.2, 1.0
+#: what a run is warmed up over, as a share of its time
+WARM = 0.002
+
+
+def cases(seed: int = SEED, scenes: int = SCENES) -> list[Case]:
+    """Scenes of a seed by number."""
+    return [Case(f"seed {seed} scene {k}", (seed, k)) for k in range(scenes)]
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """One scene after the other, since their times are the subject."""
+    with tempfile.TemporaryDirectory() as folder:
+        for case in cases:
+            seed, number = case.of
+            yield case, [_measured(seed, number, Path(folder))]
+
+
+def _measured(seed: int, number: int, folder: Path) -> Record:
+    from flexclear.stages import plan, run, s8_plan
+
+    made = drawn(seed, number, folder / "recipes")
+    scene, told = made.scene, dict(made.told)
+    place = run.workplace()
+    try:
+        task = s8_plan.task(scene)
+        outcome = place.bring(list(task.inputs.values()), 1)
+        run.check(outcome)
+        inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
+        params = {**task.params, **task.context}
+        decided, planning = _planned(params, inputs)
+        if planning > SECOND:  # that may have fetched code
+            decided, planning = _planned(params, inputs)
+    except FlexclearError as error:
+        return {**told, "verdict": REFUSED, "reason": str(error)}
+    from flexclear.pipeline.post.plan import dataset
+
+    planned = plan.of(scene, dataset(decided, scene.title))
+    full = edited(scene, {"accuracy": None})
+    chosen = [parse(name, scene.owners()) for name in made.told["wanted"]]
+    one, full_cpu = _run(full, inputs, chosen)
+    two, planned_cpu = _run(planned, _reduced(inputs, decided.modes), chosen)
+    if one.refused or two.refused:
+        return {**told, "verdict": WRONG if two.refused else REFUSED, "reason": one.refused or two.refused}
+    shares, chances = {}, {}
+    for q in chosen:
+        apart = influence.influence(two, one, q, MEMBERS)
+        asked = made.told["wanted"][q.name]
+        wanted = asked["absolute"] if "absolute" in asked else asked["relative"] * influence.size(one, q)
+        shares[q.name], chances[q.name] = apart.difference / wanted, apart.uncertainty / wanted
+    worst = max(shares.values())
+    return {
+        **told,
+        "share": worst,
+        "chance": max(chances.values()),
+        "kept": [d.effect.name for d in decided.decisions if d.kept],
+        "gone": [d.effect.name for d in decided.decisions if not d.kept],
+        "modes": dict(decided.modes),
+        "solver": f"{decided.integrator} {decided.rtol:.0e}",
+        "full_s": full_cpu,
+        "planned_s": planned_cpu,
+        "plan_s": planning,
+        "saving": full_cpu / planned_cpu,
+        "verdict": FINISHED if worst <= WORST else WRONG,
+        **({} if worst <= 1.0 else {"reason": f"misses what is wanted {worst:.2g} times"}),
+    }
+
+
+def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:
+    """A plan, and the processor time that it took [s]."""
+    from flexclear.stages import s8_plan
+
+    begun = time.process_time()
+    found = s8_plan.decided(params, inputs, _silent)
+    return found, time.process_time() - begun
+
+
+def _silent(share: float | None, text: str) -> None:
+    """Says nothing."""
+
+
+def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
+    """Inputs with the bundles of fewer modes where the plan takes them."""
+    return inputs | {f"bundle/{body}": inputs[f"fewer/{body}"] for body in modes}
+
+
+def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any]) -> tuple[Any, float]:
+    """What is watched of a scene, and the processor time of one run [s]."""
+    from flexclear.stages import s4_simulate, s4_watched
+
+    plain = s4_watched.plain(scene)
+    rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed()}
+    filled = s4_simulate.rebuild(s4_simulate.params(plain), rigid)
+    bundles = {name: data for name, data in s4_simulate.bundles(inputs).items() if name in filled.flexible()}
+    end = filled.time.start + WARM * (filled.time.end - filled.time.start)
+    s4_watched.watch(edited(filled, {"time.end": end}), bundles, chosen, 0)
+    begun = time.process_time()
+    found = s4_watched.watch(filled, bundles, chosen, MEMBERS)
+    spent = time.process_time() - begun
+    loose = bool(filled.contacts() or filled.stop)
+    return found, spent / (MEMBERS if loose else 1)
+
+
+def show(records: list[Record]) -> dict[str, str]:
+    """The summary, and all misses."""
+    done = [r for r in records if "share" in r]
+    if not done:
+        return {"summary": "Not measured.", "misses": ""}
+    within = [r for r in done if r["share"] <= 1.0]
+    saved = [r["saving"] for r in done]
+    cheap = [r for r in done if r["plan_s"] <= max(SECOND, SHARE * r["full_s"])]
+    unsure = [r for r in within if r["chance"] > 1.0]
+    text = (
+        f"{len(done)} scenes: {len(within)} ({len(within) / len(done):.0%}) within what is wanted, worst miss "
+        f"{max(r['share'] for r in done):.2g} times; median saving {np.median(saved):.3g} times "
+        f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half); planning within a "
+        f"fifth of the full run or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s. "
+        f"In {len(unsure)} of those within, members part by more than what is wanted: there, no smaller difference "
+        "can be told."
+    )
+    by_mechanism: Columns = {
+        "mechanism": lambda r: r["mechanism"],
+        "scenes": lambda r: str(r["scenes"]),
+        "within": lambda r: str(r["within"]),
+        "worst": lambda r: short(r["worst"]),
+        "median saving": lambda r: short(r["saving"]),
+        "all dropped": lambda r: str(r["bare"]),
+        "clearance kept": lambda r: str(r["loose"]),
+        "flexibility kept": lambda r: str(r["soft"]),
+    }
+    rows = [_of_mechanism(name, [r for r in done if r["mechanism"] == name]) for name in _names(done)]
+    missed: Columns = {
+        "case": lambda r: r["case"],
+        "mechanism": lambda r: r["mechanism"],
+        "clearance [um]": lambda r: short(1e6 * r["clearance"]),
+        "speed": lambda r: short(r["speed"]),
+        "rod": lambda r: r["rod"],
+        "wanted": lambda r: ", ".join(f"{n} {_asked(of)}" for n, of in r["wanted"].items()),
+        "kept": lambda r: ", ".join(r["kept"]) or "nothing",
+        "error / wanted": lambda r: f"{short(r['share'])} ± {short(r['chance'])}",
+    }
+    misses = [r for r in done if r["share"] > 1.0]
+    other = [f"{r['case']}: {r['reason']}" for r in records if "share" not in r]
+    told = table(misses, missed) if misses else "None."
+    return {
+        "summary": f"{text}\n\n{table(rows, by_mechanism)}",
+        "misses": "\n\n".join([told, *(["Not run: " + "; ".join(other)] if other else [])]),
+    }
+
+
+def _asked(of: dict[str, float]) -> str:
+    """An accuracy as a scene has it, absolute ones in SI."""
+    return f"{of['absolute']:.2g}" if "absolute" in of else f"{100 * of['relative']:.2g} %"
+
+
+def _names(done: list[Record]) -> list[str]:
+    return list(dict.fromkeys(str(r["mechanism"]) for r in done))
+
+
+def _of_mechanism(name: str, mine: list[Record]) -> Record:
+    kept = [" ".join(r["kept"]) for r in mine]
+    return {
+        "mechanism": name,
+        "scenes": len(mine),
+        "within": sum(r["share"] <= 1.0 for r in mine),
+        "worst": max(r["share"] for r in mine),
+        "saving": float(np.median([r["saving"] for r in mine])),
+        "bare": sum(".clearance" not in k and ".modes" not in k for k in kept),
+        "loose": sum(".clearance" in k for k in kept),
+        "soft": sum(".modes" in k for k in kept),
+    }
+
+
+FAMILY = Family(
+    what="plans: are planned runs within what is wanted, and what do they save",
+    takes="40 min",
+    page="plan.md",
+    cases=cases,
+    measure=measure,
+    show=show,
+    settings={"seed": SEED, "scenes": SCENES},
+)

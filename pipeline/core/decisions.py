@@ -1,0 +1,54 @@
+"""What a plan decides: of each effect whether it is kept, by what evidence, and how the planned scene is integrated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from flexclear.pipeline.core.scene.variants import Effect
+
+#: evidence, cheapest first
+BOUND, RESPONSE, PILOT, NONE = "bound", "response", "pilot", "none"
+#: what each says, in words
+EVIDENCE = {
+    BOUND: "a bound from the ideal motion",
+    RESPONSE: "the first-order response along the ideal motion",
+    PILOT: "short runs with and without it",
+    NONE: "not looked into",
+}
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What becomes of one effect. estimate, uncertainty: of its influence by quantity, SI; infinite where unknown."""
+
+    effect: Effect
+    kept: bool
+    evidence: str
+    reason: str
+    estimate: Mapping[str, float] = field(default_factory=dict)
+    uncertainty: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All decisions. wanted: by quantity [SI].  integrator, rtol: of the planned run.
+
+    modes: elastic coordinates of kept flexible bodies that need fewer than they have.
+    integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
+    the plan has run.  runs: how many.
+    """
+
+    decisions: tuple[Decision, ...]
+    wanted: Mapping[str, float]
+    integrator: str
+    rtol: float
+    integration: Mapping[str, float]
+    modes: Mapping[str, int]
+    evaluations: int
+    runs: int
+
+    @property
+    def gone(self) -> tuple[Effect, ...]:
+        """The effects that are dropped."""
+        return tuple(d.effect for d in self.decisions if not d.kept)

@@ -1,0 +1,197 @@
+"""Variants of a scene: which of its effects can be taken away, the scene without some of them, and that as a file.
+
+An effect is named by the place that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
+``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts
+replaced and removed only, so that it can be written as a file that extends the scene's.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.ideal import KEPT, WITHOUT_CLEARANCE, loose, owned
+from flexclear.pipeline.core.scene.load import FAMILIES, edited
+from flexclear.pipeline.core.scene.schema import Scene
+
+#: loads that are effects of the world on a mechanism, not what moves it
+OF_THE_WORLD = ("gravity", "joint-friction")
+#: kinds of effects, as they are told
+CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
+BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One effect of a scene. name: the place that goes with it.  kind: what it is.  within: the effect without which
+    it is nothing, as friction is without its clearance; else empty."""
+
+    name: str
+    kind: str
+    within: str = ""
+
+    @property
+    def owner(self) -> str:
+        """Name of the part."""
+        return self.name.split(".")[1]
+
+    @property
+    def words(self) -> str:
+        """In words."""
+        return self.owner if self.kind == "gravity" else f"{self.kind} of {self.owner}"
+
+
+def effects(scene: Scene) -> tuple[Effect, ...]:
+    """The effects of a scene that can be taken away, flexible bodies first, what lies within one right after it."""
+    found = list[Effect]()
+    for name, body in scene.flexible().items():
+        whole = Effect(f"body.{name}.modes", FLEXIBILITY)
+        found.append(whole)
+        for key in ("damping", "stiffening"):
+            if getattr(body, key) is not None:
+                found.append(Effect(f"body.{name}.{key}", key, whole.name))
+    for name, joint in scene.contacts().items():
+        there = name in loose(scene)
+        if there:
+            found.append(Effect(f"joint.{name}.clearance", CLEARANCE))
+        if joint.friction is not None:
+            found.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
+    for name, load in scene.load.items():
+        if load.type in OF_THE_WORLD:
+            found.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
+    found += [Effect(f"stop.{name}", "stop") for name in scene.stop]
+    return tuple(found)
+
+
+def named(scene: Scene, names: Iterable[str], place: str) -> tuple[Effect, ...]:
+    """The effects of these names; InputError, with the nearest one, for a name that is none."""
+    known = {effect.name: effect for effect in effects(scene)}
+    for name in names:
+        if name not in known:
+            raise InputError(f"{place} {name}", "is no effect of this scene", suggestion(name, known))
+    return tuple(known[name] for name in names)
+
+
+def without(scene: Scene, gone: Collection[Effect]) -> Scene:
+    """The scene without some of its effects; quantities that it then no longer has are not asked for.
+
+    Its name says what is missing.  The scene itself when nothing is.
+    """
+    if not gone:
+        return scene
+    changes = dict(_changes(scene, gone))
+    removed = [place for place, value in changes.items() if value is None]
+    table = {place: value for place, value in changes.items() if value is not None}
+    for family in dict.fromkeys(place.split(".")[0] for place in removed):
+        left = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
+        table[family] = {n: p for n, p in left.items() if f"{family}.{n}" not in removed}
+    result = edited(scene, table | _settings(scene, gone) | owned(scene, _left(gone)))
+    result._name = f"{scene.name} without {', '.join(sorted(effect.name for effect in gone))}"
+    return result
+
+
+def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
+    """Edits of settings that speak of flexible bodies which are gone: stresses asked for, deformations at the start."""
+    rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
+    found: dict[str, Any] = {}
+    if scene.output.stress is not None and rigid & set(scene.output.stress):
+        output = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
+        left = [name for name in scene.output.stress if name not in rigid]
+        found["output"] = output | ({"stress": left} if left else {})
+    if scene.start is not None and rigid & set(scene.start.modal):
+        start = scene.start.model_dump(mode="json", exclude_none=True)
+        found["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}
+    return found
+
+
+def _left(gone: Collection[Effect]) -> frozenset[str]:
+    """Owners of quantities that go: loosened joints by name, ends of stops by their stop's."""
+    return frozenset(effect.owner for effect in gone if effect.kind in (CLEARANCE, "stop"))
+
+
+def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
+    """Place -> what stands there instead, or None for what is removed."""
+    found: dict[str, Any] = {}
+    places = {effect.name for effect in gone}
+    for effect in gone:
+        if effect.within in places:
+            continue
+        family, name = effect.name.split(".")[:2]
+        part = getattr(scene, family)[name]
+        if effect.kind == CLEARANCE:
+            found[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
+        elif effect.kind == FLEXIBILITY:
+            kept = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            found[f"body.{name}"] = {"type": "rigid", **kept}
+        elif effect.name.count(".") == 1:
+            found[effect.name] = None
+        else:
+            key = effect.name.split(".")[2]
+            table = found.get(f"{family}.{name}") or part.model_dump(mode="json", exclude_none=True)
+            found[f"{family}.{name}"] = {k: v for k, v in table.items() if k != key}
+    return found
+
+
+def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
+    """The scene with other numbers of elastic coordinates, by flexible body."""
+    changes: dict[str, Any] = {}
+    for name, count in counts.items():
+        body = scene.flexible()[name]
+        modes = body.modes.model_dump(mode="json", exclude_none=True, exclude={"count", "up_to", "compliance", "mass"})
+        changes[f"body.{name}.modes"] = {**modes, "count": count}
+    return edited(scene, changes) if changes else scene
+
+
+def text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:
+    """The file of a variant: it extends the scene's, and says of parts and settings only what differs.
+
+    Parts are replaced or removed; of a setting that differs the whole table stands.  comments: lines at its head.
+    """
+    lines = [f"# {line}" for line in comments]
+    lines += [f"extends = {json.dumps(extends)}", f"title = {json.dumps(planned.title, ensure_ascii=False)}"]
+    was, now = (s.model_dump(mode="json", exclude_none=True) for s in (scene, planned))
+    removed = [f"{f}.{name}" for f in FAMILIES for name in was.get(f, {}) if name not in now.get(f, {})]
+    settings = [key for key in was if key not in (*FAMILIES, "title", "description")]
+    removed += [key for key in settings if key not in now]
+    if removed:
+        lines.append(f"remove = {_value(removed)}")
+    for key in now:
+        if key in FAMILIES or key in ("title", "description") or was.get(key) == now[key]:
+            continue
+        lines += ["", f"[{key}]", *(f"{_key(k)} = {_value(v)}" for k, v in now[key].items())]
+    for family in FAMILIES:
+        for name, part in now.get(family, {}).items():
+            if part != was[family][name]:
+                lines += [
+                    "",
+                    f"[replace.{family}.{_key(name)}]",
+                    *(f"{_key(k)} = {_value(v)}" for k, v in part.items()),
+                ]
+    return "\n".join(lines) + "\n"
+
+
+def _key(name: str) -> str:
+    return name if BARE_KEY.fullmatch(name) else json.dumps(name, ensure_ascii=False)
+
+
+def _value(value: Any) -> str:
+    """A value as TOML has it, tables inline."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    return ("true" if value else "false") if isinstance(value, bool) else repr(value)
+
+
+def relative(target: Path, base: Path) -> str:
+    """How a file names another one that it extends: from its own folder on."""
+    return Path(os.path.relpath(base.resolve(), target.resolve().parent)).as_posix()

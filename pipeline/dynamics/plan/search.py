@@ -1,0 +1,388 @@
+"""The decisions of a plan: the error that is wanted is a budget, and what is dropped spends it.
+
+Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.play`), which cost one
+run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without, which are cheap;
+then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
+What is not shown to be small is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core import influence
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Decision, Plan
+from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.influence import Influence
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
+from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
+from flexclear.pipeline.dynamics.linear.play import OF_POSE, Bounds, bounds
+from flexclear.pipeline.dynamics.plan.pilots import RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.tolerance import chosen_solver
+from flexclear.pipeline.dynamics.run.run import integrate
+
+#: share of what is wanted that dropped effects may use up together; the rest is for what is not estimated
+BUDGET = 0.75
+#: what bounds of clearances, which hold whatever happens, may use up of it
+BY_BOUND = 0.9
+#: a bent body vibrates about its quasi-static deflection, by as much again after a sudden load; and half of that more
+#: for what the response leaves out: turning, and loads that follow the vibration
+VIBRATION = 3.0
+#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a share of that
+OF_IMPACTS = 0.5
+#: what an influence measured with pilots' tolerance may be wrong by, as a share of it
+OF_PILOT = 0.15
+#: a loose run of the whole scene is only made where the clearance does no more than this many times what is wanted:
+#: bodies that bend change the time of impacts, and then all that these do
+WORTH_A_LOOK = 1.5
+#: tolerance and share of the time of runs with clearance and bending; and what the rest of the time may add, as a share
+LOOSE, PART, WHOLE = 1e-5, 0.25, 1.0
+#: peaks of forces between flexible bodies are at least this share of those between rigid ones
+SOFTER = 0.5
+#: effects that cost nothing to keep are dropped below this share of what is wanted
+NEGLIGIBLE = 0.02
+
+
+@dataclass
+class Search:
+    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
+
+    pilots: Pilots
+    wanted: dict[str, float]
+    used: dict[str, float] = field(default_factory=dict)
+    decisions: dict[str, Decision] = field(default_factory=dict)
+
+    @property
+    def gone(self) -> list[Effect]:
+        """What has been dropped."""
+        return [d.effect for d in self.decisions.values() if not d.kept]
+
+    def fits(self, most: Mapping[str, float], budget: float = BUDGET) -> bool:
+        """Whether influences of at most this much fit into what is left of the budget, for all quantities."""
+        return all(
+            self.used.get(name, 0.0) + most.get(name, np.inf) / self.wanted[name] <= budget for name in self.wanted
+        )
+
+    def spend(self, most: Mapping[str, float]) -> None:
+        """Take influences out of the budget."""
+        for name in self.wanted:
+            self.used[name] = self.used.get(name, 0.0) + most[name] / self.wanted[name]
+
+    def decide(
+        self,
+        effect: Effect,
+        kept: bool,
+        evidence: str,
+        reason: str,
+        estimate: Mapping[str, float] | None = None,
+        uncertainty: Mapping[str, float] | None = None,
+    ) -> None:
+        """Write down what becomes of an effect."""
+        self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
+
+
+def plan(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    fewer: Mapping[str, xr.Dataset],
+    filled: Callable[[Scene], Scene],
+    progress: Progress,
+) -> Plan:
+    """The decisions for a scene with `[accuracy]`.
+
+    bundles: reduced flexible bodies.  fewer: the same of fewer modes, of those that have a choice.  filled: a variant
+    with the rigid bodies that recipes describe filled in.
+    Raises InputError where nothing is wanted, or the motion itself is below it; SolverError where the scene, or what is
+    left of it, cannot be run.
+    """
+    assert scene.accuracy is not None
+    quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
+    pilots = Pilots(_plain(scene), bundles, fewer, filled, quantities, progress)
+    every = effects(scene)
+    loose = [effect for effect in every if effect.kind == CLEARANCE]
+    soft = [effect for effect in every if effect.kind == FLEXIBILITY]
+    inner = [effect for effect in every if effect.within]
+    within_bodies = [e for e in inner if e.within.startswith("body.")]
+    ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
+    search = Search(pilots, _wanted(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
+    found = _bounds(search, [*loose, *soft, *inner]) if loose or soft else Bounds({}, {}, {})
+    _clearances(search, loose, [*soft, *inner], found, ideal)
+    _flexibilities(search, soft, loose, inner, found)
+    _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
+    return _finished(search, every)
+
+
+def _plain(scene: Scene) -> Scene:
+    from flexclear.pipeline.core.scene.load import edited
+
+    return edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
+
+
+def _wanted(scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]) -> dict[str, float]:
+    """What is wanted by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with rigid
+    bodies, half of it where bodies are flexible.
+
+    rigid: runs the scene with clearance and rigid bodies.
+    """
+    found, sizes = {}, {}
+    where = f"{scene.path or scene.name} [accuracy]"
+    assert scene.accuracy is not None
+    for q in quantities:
+        of_contact = KINDS[q.kind].owner == "contact"
+        point = rigid() if of_contact else ideal
+        if point.refused:
+            raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
+        sizes[q.name] = influence.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
+        want = scene.accuracy.quantities[q.name]
+        found[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
+        if not found[q.name] > 0.0:
+            raise InputError(
+                f"{where} {q.name}",
+                "a relative accuracy of a quantity that never changes in the ideal mechanism",
+                "give an absolute one, with a unit",
+            )
+    if all(found[name] >= most for name, most in sizes.items()):
+        # forces and rates may come from impacts alone
+        more = rigid() if scene.contacts() or scene.stop else ideal
+        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else influence.size(more, q)) for q in quantities}
+    if all(found[name] >= most for name, most in sizes.items()):
+        q = quantities[0]
+        raise InputError(
+            f"{where} {q.name}",
+            f"{found[q.name]:.3g} {q.unit} is more than it changes at all ({sizes[q.name]:.3g} {q.unit}), and so it is "
+            "with all that is asked for: the plan would drop everything, the motion too",
+            "ask for an accuracy below what the quantity does",
+        )
+    return found
+
+
+def _bounds(search: Search, gone: Sequence[Effect]) -> Bounds:
+    scene = search.pilots.variant(gone)
+    if not any(q.kind in OF_POSE for q in search.pilots.chosen):
+        return Bounds({}, {}, {})
+    run = integrate(scene, {}, silent)
+    search.pilots.evaluations += int(run.trajectory.counters["evaluations"])
+    return bounds(search.pilots.scene, run, search.pilots.bundles, search.pilots.chosen)
+
+
+def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], found: Bounds, ideal: Point) -> None:
+    """Which joints stay loose: by bounds where only the pose is asked for, else by runs of rigid bodies."""
+    asked = {q.owner for q in search.pilots.chosen if KINDS[q.kind].owner == "contact"}
+    for effect in loose:
+        if effect.owner in asked:
+            search.decide(effect, True, NONE, "a quantity of this contact is asked for")
+    free = [effect for effect in loose if effect.owner not in asked]
+    if not free:
+        return
+    reach = {effect.name: found.clearance.get(effect.owner, {}) for effect in free}
+    total = _sum(reach.values(), search.wanted)
+    if search.fits(total, BY_BOUND):
+        search.spend(total)
+        for effect in free:
+            search.decide(effect, False, BOUND, "its play cannot move what is asked for by more", reach[effect.name])
+        return
+    there = search.pilots.point([e for e in soft if e.kind == FLEXIBILITY or e.within.startswith("body.")])
+    dropped: list[Effect] = []
+    for effect in sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf)):
+        trial = [*dropped, effect]
+        variant = _rigid_without(search, trial, soft)
+        apart = _with_doubt(search, search.pilots.between(variant, there), bool(soft))
+        most = {name: i.most for name, i in apart.items()}
+        for name, bound in _sum((reach[e.name] for e in trial), search.wanted).items():
+            most[name] = min(most[name], bound)
+        small = search.fits(most)
+        estimate = {name: i.difference for name, i in apart.items()}
+        doubt = {name: i.uncertainty for name, i in apart.items()}
+        reason = "its impacts change what is asked for by less" if small else _too_much(most, search.wanted)
+        search.decide(effect, not small, PILOT, reason, estimate, doubt)
+        if small:
+            dropped = trial
+            left = most
+    if dropped:
+        search.spend(left)
+
+
+def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effect]) -> Point:
+    names = {effect.name for effect in trial}
+    inner = [e for e in soft if e.within in names or e.kind == FLEXIBILITY or e.within.startswith("body.")]
+    return search.pilots.point([*trial, *inner])
+
+
+def _with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
+    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a share `more`."""
+    kinds = {q.name: q.kind for q in search.pilots.chosen}
+    found = {}
+    for name, i in apart.items():
+        share = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
+        found[name] = Influence(i.difference, i.uncertainty + share * i.difference)
+    return found
+
+
+def _sum(parts: object, wanted: Mapping[str, float]) -> dict[str, float]:
+    return {name: sum(part.get(name, np.inf) for part in list(parts)) for name in wanted}  # type: ignore[call-overload]
+
+
+def _too_much(most: Mapping[str, float], wanted: Mapping[str, float]) -> str:
+    name = max(wanted, key=lambda n: most[n] / wanted[n])
+    if not np.isfinite(most[name]):
+        return f"without it {name} cannot be told, or has other events"
+    return f"it may change {name} by {most[name]:.2g}, {most[name] / wanted[name]:.2g} times what is wanted"
+
+
+def _flexibilities(
+    search: Search, soft: Sequence[Effect], loose: Sequence[Effect], inner: Sequence[Effect], found: Bounds
+) -> None:
+    """Which bodies stay flexible."""
+    if not soft:
+        return
+    kept_loose = [e for e in loose if e.name in search.decisions and search.decisions[e.name].kept]
+    bent = {e.name: {n: VIBRATION * v for n, v in found.bending.get(e.owner, {}).items()} for e in soft}
+    if kept_loose:
+        _beside_impacts(search, soft, loose, kept_loose)
+        return
+    total = _sum(bent.values(), search.wanted)
+    if search.fits(total):
+        search.spend(total)
+        for effect in soft:
+            search.decide(
+                effect, False, RESPONSE, "it bends too little to matter, vibration included", bent[effect.name]
+            )
+        return
+    gone = [*search.gone, *(e for e in inner if e.within.startswith("joint."))]
+    there = search.pilots.point(gone)
+    dropped: list[Effect] = []
+    for effect in sorted(soft, key=lambda e: max(bent[e.name].values(), default=np.inf)):
+        trial = [*dropped, effect]
+        names = {e.name for e in trial}
+        variant = search.pilots.point([*gone, *trial, *(e for e in inner if e.within in names)])
+        apart = _with_doubt(search, search.pilots.between(variant, there), False)
+        most = {name: i.most for name, i in apart.items()}
+        small = search.fits(most)
+        reason = "its deformation changes what is asked for by less" if small else _too_much(most, search.wanted)
+        search.decide(
+            effect,
+            not small,
+            PILOT,
+            reason,
+            {name: i.difference for name, i in apart.items()},
+            {name: i.uncertainty for name, i in apart.items()},
+        )
+        if small:
+            dropped, left = trial, most
+    if dropped:
+        search.spend(left)
+
+
+def _beside_impacts(
+    search: Search, soft: Sequence[Effect], loose: Sequence[Effect], kept_loose: Sequence[Effect]
+) -> None:
+    """Flexible bodies in a mechanism that stays loose: what they bend changes the impacts, and these everything."""
+    pilots = search.pilots
+    gone = search.gone
+    inner = [e for e in effects(pilots.scene) if e.within in {g.name for g in gone}]
+    softs = [*soft, *(e for e in effects(pilots.scene) if e.within in {s.name for s in soft})]
+    rigid = pilots.point([*gone, *inner, *softs])
+    tight = {e.name for e in loose}
+    held = [e for e in effects(pilots.scene) if e.name in tight or e.within in tight]
+    play = pilots.between(rigid, pilots.point([*held, *softs], rtol=RTOL))
+    worth = all(
+        search.wanted[name] * WORTH_A_LOOK >= (i.difference if np.isfinite(i.difference) else np.inf)
+        for name, i in play.items()
+    )
+    if not worth:
+        for effect in soft:
+            reason = f"{kept_loose[0].owner} stays loose, and bodies that bend change the times of its impacts"
+            search.decide(effect, True, NONE, reason)
+        return
+    whole = pilots.point([*gone, *inner], rtol=LOOSE, share=PART)
+    part = pilots.point([*gone, *inner, *softs], share=PART)
+    apart = _with_doubt(search, pilots.between(part, whole), False, WHOLE)
+    most = {name: i.most for name, i in apart.items()}
+    small = search.fits(most)
+    if small:
+        search.spend(most)
+    for effect in soft:
+        search.decide(
+            effect,
+            not small,
+            PILOT,
+            "with or without bending the loose joints do the same" if small else _too_much(most, search.wanted),
+            {name: i.difference for name, i in apart.items()},
+            {name: i.uncertainty for name, i in apart.items()},
+        )
+
+
+def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
+    """Gravity, friction, damping, stiffening, stops: kept unless a cheap run shows that they do next to nothing."""
+    kept = {d.effect.name for d in search.decisions.values() if d.kept}
+    gone = list(search.gone)
+    dear = any(d.kept and d.effect.kind == FLEXIBILITY for d in search.decisions.values()) and any(
+        d.kept and d.effect.kind == CLEARANCE for d in search.decisions.values()
+    )
+    for effect in others:
+        if effect.within and effect.within not in kept:
+            owner = next(e for e in every if e.name == effect.within)
+            search.decide(effect, False, search.decisions[owner.name].evidence, f"goes with the {owner.words}")
+            gone.append(effect)
+    for effect in others:
+        if effect.name in search.decisions:
+            continue
+        if dear:
+            search.decide(effect, True, NONE, "to leave it out would save no time worth the look")
+            continue
+        there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
+        apart = search.pilots.between(lost, there)
+        most = {name: i.most for name, i in apart.items()}
+        small = search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)) and search.fits(most)
+        if small:
+            search.spend(most)
+            gone.append(effect)
+        search.decide(
+            effect,
+            not small,
+            PILOT,
+            "it does next to nothing" if small else _too_much(most, search.wanted),
+            {name: i.difference for name, i in apart.items()},
+            {name: i.uncertainty for name, i in apart.items()},
+        )
+
+
+def _modes(search: Search) -> dict[str, int]:
+    """Bodies that stay flexible and need fewer modes, and how many, all of them together."""
+    pilots, gone = search.pilots, search.gone
+    kept = [n for n in pilots.fewer if not any(e.owner == n and e.kind == FLEXIBILITY for e in gone)]
+    if not kept:
+        return {}
+    if pilots.variant(gone).contacts() or pilots.scene.stop:
+        return {}  # impacts shake modes of any frequency, and these change the impacts
+    apart = _with_doubt(search, pilots.between(pilots.point(gone, fewer=True), pilots.point(gone)), False)
+    most = {name: i.most for name, i in apart.items()}
+    if not search.fits(most):
+        return {}
+    search.spend(most)
+    return {name: int(pilots.fewer[name].sizes["mode"]) for name in kept}
+
+
+def _finished(search: Search, every: Sequence[Effect]) -> Plan:
+    order = {effect.name: k for k, effect in enumerate(every)}
+    modes = _modes(search)
+    integrator, rtol, error = chosen_solver(search.pilots, search.gone, search.wanted, fewer=bool(modes))
+    decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
+    pilots = search.pilots
+    return Plan(
+        tuple(decisions),
+        dict(search.wanted),
+        integrator,
+        rtol,
+        error,
+        modes,
+        pilots.evaluations,
+        len(pilots.points),
+    )

@@ -1,0 +1,150 @@
+"""A plan as a dataset, a table, words and a page: what was decided, why, and what it rests on."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.decisions import EVIDENCE, Plan
+from flexclear.pipeline.post.influences import written
+from flexclear.pipeline.post.plotting.table import Table
+
+
+def dataset(plan: Plan, title: str) -> xr.Dataset:
+    """Influences over (effect, quantity), decisions and evidence over effects, what is wanted over quantities; SI.
+
+    nan where nothing was estimated, infinite where nothing bounds it or the events differ.
+    """
+    names = list(plan.wanted)
+    units = {name: _unit(name) for name in names}
+    shape = (len(plan.decisions), len(names))
+    estimate, doubt = (np.full(shape, np.nan) for _ in range(2))
+    for i, decision in enumerate(plan.decisions):
+        for k, name in enumerate(names):
+            estimate[i, k] = decision.estimate.get(name, np.nan)
+            doubt[i, k] = decision.uncertainty.get(name, 0.0 if name in decision.estimate else np.nan)
+    planned = {
+        "gone": [effect.name for effect in plan.gone],
+        "modes": dict(plan.modes),
+        "integrator": plan.integrator,
+        "rtol": plan.rtol,
+    }
+    found = xr.Dataset(
+        {
+            "influence": (("effect", "quantity"), estimate),
+            "uncertainty": (("effect", "quantity"), doubt),
+            "kept": (("effect",), np.array([int(d.kept) for d in plan.decisions], dtype=np.int8)),
+            "evidence": (("effect",), np.array([d.evidence for d in plan.decisions], dtype=object)),
+            "reason": (("effect",), np.array([d.reason for d in plan.decisions], dtype=object)),
+            "wanted": (("quantity",), np.array([plan.wanted[name] for name in names])),
+            "integration": (("quantity",), np.array([plan.integration.get(name, np.nan) for name in names])),
+        },
+        coords={
+            "effect": np.array([d.effect.name for d in plan.decisions], dtype=object),
+            "words": ("effect", np.array([d.effect.words for d in plan.decisions], dtype=object)),
+            "quantity": np.array(names, dtype=object),
+            "unit": ("quantity", np.array([units[name] for name in names], dtype=object)),
+        },
+        attrs={
+            "Conventions": "CF-1.11",
+            "title": title,
+            "planned": json.dumps(planned, sort_keys=True),
+            "evaluations": plan.evaluations,
+            "runs": plan.runs,
+        },
+    )
+    meanings = {
+        "influence": "estimated influence of the effect on the quantity, in the quantity's unit",
+        "uncertainty": "what the estimate may be wrong by",
+        "kept": "1: the planned scene has the effect",
+        "evidence": "what the decision rests on",
+        "reason": "the decision in words",
+        "wanted": "accuracy that the scene asks for",
+        "integration": "estimated error of the planned run's integration",
+    }
+    for name, text in meanings.items():
+        found[name].attrs = {"long_name": text}
+    return found
+
+
+def _unit(name: str) -> str:
+    from flexclear.pipeline.core.scene.wanted import KINDS
+
+    return KINDS[name.rpartition(".")[2]].unit
+
+
+def drawn(found: xr.Dataset) -> xr.Dataset:
+    """What the chart of influences takes of a plan."""
+    return xr.Dataset(
+        {"dropped": found["influence"] + found["uncertainty"].fillna(0.0)},
+        coords={"effect": found["effect"], "quantity": found["quantity"], "unit": found["unit"]},
+    )
+
+
+def table(found: xr.Dataset) -> Table:
+    """Decision, evidence and reason of each effect, and its estimated influence on each quantity."""
+    names = [str(name) for name in found["quantity"].values]
+    units = [str(unit) for unit in found["unit"].values]
+    rows = []
+    for i, effect in enumerate(found["words"].values):
+        part = found.isel(effect=i)
+        cells = [
+            written(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
+            for k, unit in enumerate(units)
+        ]
+        decision = "keep" if int(part["kept"]) else "drop"
+        rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
+    wanted = [written(float(value), 0.0, unit) for value, unit in zip(found["wanted"].values, units, strict=True)]
+    rows.append(("wanted", "", *wanted, "", ""))
+    told = json.loads(found.attrs["planned"])
+    notes = [words(found)]
+    notes += [f"{name} keeps {count} modes: its static ones do the same." for name, count in told["modes"].items()]
+    notes.append(
+        f"The planned run is integrated by {told['integrator']} at a relative tolerance of {told['rtol']:.0e}. "
+        f"The plan rests on {found.attrs['runs']} short runs, {found.attrs['evaluations']:,} evaluations."
+    )
+    return Table(
+        "What the wanted accuracy calls for",
+        ("effect", "decision", *names, "evidence", "why"),
+        tuple(rows),
+        tuple(notes),
+    )
+
+
+def words(found: xr.Dataset) -> str:
+    """The plan in a sentence or two, for a designer."""
+    kept = [str(w) for w, k in zip(found["words"].values, found["kept"].values, strict=True) if k]
+    gone = [str(w) for w, k in zip(found["words"].values, found["kept"].values, strict=True) if not k]
+    asked = " and ".join(str(name) for name in found["quantity"].values)
+    if not kept:
+        return f"For {asked} as wanted nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
+    if not gone:
+        return f"For {asked} as wanted all effects are needed: {listed(kept)}."
+    return f"For {asked} as wanted {listed(kept)} must be kept; {listed(gone)} may be left out."
+
+
+def listed(names: list[str]) -> str:
+    """Names with commas and an `and`."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" and {names[-1]}"
+
+
+def verified(found: xr.Dataset) -> Table:
+    """The true distance of the planned run from the full one, beside what is wanted."""
+    rows = []
+    for k, name in enumerate(found["quantity"].values):
+        unit = str(found["unit"].values[k])
+        error, chance = float(found["error"][k]), float(found["chance"][k])
+        wanted = float(found["wanted"][k])
+        share = error / wanted
+        verdict = "met" if share <= 1.0 else f"missed, {share:.2g} times"
+        rows.append((str(name), written(wanted, 0.0, unit), written(error, chance, unit), verdict))
+    notes = [
+        f"Evaluations of the equations of motion: {int(found.attrs['full_evaluations']):,} in full, "
+        f"{int(found.attrs['planned_evaluations']):,} as planned, of all members together.",
+        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
+    ]
+    return Table(
+        "The plan beside the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+    )

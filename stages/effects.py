@@ -1,0 +1,73 @@
+"""``flexclear effects``: what each part of a scene does to each quantity, taken away and put in, alone and in pairs."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import run, s4_watched, s8_effects
+from flexclear.stages.run import Workplace, check
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    run.scene_arguments(parser)
+    parser.add_argument(
+        "--members",
+        type=int,
+        default=s4_watched.MEMBERS,
+        metavar="N",
+        help=f"starts of each variant with contacts (default {s4_watched.MEMBERS}); more tell smaller differences",
+    )
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring the tables up to date, print them and say where they are."""
+    place = run.workplace(options)
+    for graph in run.graphs(options.scenes, options.set):
+        done, record = bring(graph.scene, place, options.members)
+        folder = place.store.root / done.folder
+        print(place.store.path(done.stage, record.key, "effects.md").read_text())
+        run.told(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
+
+
+def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> tuple[Task, Record]:
+    """All variants, and their differences.  InputError for a scene without effects, or that watches nothing."""
+    if members < 2:
+        raise InputError("--members", f"must be at least 2 (got {members})", "a single start tells nothing of chance")
+    there, chosen = variants.effects(scene), scene.watched()
+    if not there:
+        raise InputError(
+            str(scene.path or scene.name),
+            "has no effect that could be taken away: no clearance, flexible body, friction, gravity or stop",
+            "compare it with another scene: flexclear compare A B",
+        )
+    if not chosen:
+        raise InputError(str(scene.path or scene.name), "nothing in it is watched", "name quantities in [view] watch")
+    by_name = {effect.name: effect for effect in there}
+    wanted = s8_effects.variants_of(there)
+    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in wanted}
+    tasks = {gone: s4_watched.task(variant, chosen, members) for gone, variant in scenes.items()}
+    done = s8_effects.task(scene, there, chosen, tasks, members)
+    outcome = place.bring([done])
+    check(outcome)
+    record = outcome.records[id(done)]
+    picture = place.store.path(done.stage, record.key, "effects.png").read_bytes()
+    words = place.store.path(done.stage, record.key, "effects.md").read_text()
+    publish(place.store.root / done.folder / "index.html", s8_effects.page(scene, words, picture))
+    return done, record
+
+
+def dataset(scene: Scene, place: Workplace) -> xr.Dataset:
+    """The influences, over (effect, other, quantity)."""
+    _, record = bring(scene, place)
+    return place.store.load(record)

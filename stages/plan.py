@@ -1,0 +1,224 @@
+"""``flexclear plan``: which effects, modes and tolerance a scene's wanted accuracy calls for, and by what evidence."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import run, s4_watched, s8_plan
+from flexclear.stages.run import Workplace, check
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+
+#: how a planned scene's file is called, after its scene's
+SUFFIX = ".planned.toml"
+#: starts that `--verify` runs of scenes with contacts
+MEMBERS = 4
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    run.scene_arguments(parser)
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
+    parser.add_argument("--verify", action="store_true", help="run the full scene and tell the plan's true error")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Plan scenes, print the decisions and say where the planned scenes are; with `--verify` their true errors."""
+    if options.out is not None:
+        if len(options.scenes) > 1:
+            raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
+        run.check_target(options.out)
+    place = run.workplace(options)
+    missed = list[str]()
+    for graph in run.graphs(options.scenes, options.set):
+        found = bring(graph.scene, place)
+        print(found.text())
+        if options.out is not None:
+            publish(options.out, found.file(options.out))
+        if options.verify:
+            missed += verify(found, place)
+        found.tell()
+    if missed:
+        raise run.MissedAccuracyError("\n".join(missed))
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A plan that is up to date. scene: the full one.  planned: what the plan makes of it."""
+
+    scene: Scene
+    planned: Scene
+    task: Task
+    record: Record
+    place: Workplace
+
+    @property
+    def folder(self) -> Path:
+        """Where its files are shown."""
+        return self.place.store.root / self.task.folder
+
+    @property
+    def target(self) -> Path:
+        """The planned scene's file."""
+        return self.folder / f"{self.scene.name.rpartition('/')[2]}{SUFFIX}"
+
+    def dataset(self) -> xr.Dataset:
+        """Influences, decisions and evidence (`pipeline.post.plan.dataset`)."""
+        return self.place.store.load(self.record)
+
+    def kept(self, name: str) -> Path:
+        """One of its files, in the store."""
+        return self.place.store.path(self.task.stage, self.record.key, name)
+
+    def text(self) -> str:
+        """The table of decisions."""
+        return self.kept("plan.md").read_text()
+
+    def file(self, target: Path) -> bytes:
+        """The planned scene's file as it stands at a place; it extends the full scene's."""
+        assert self.scene.path is not None
+        head = ("written by flexclear plan", "what the accuracy wanted of the full scene does not call for is left out")
+        base = load_scene(self.scene.path)
+        return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
+
+    def tell(self) -> None:
+        """One line on what was written where."""
+        files = {"index.html": "the page", self.target.name: "the planned scene", "plan.nc": "all influences"}
+        run.told(self.folder, files)
+
+
+def bring(scene: Scene, place: Workplace) -> Planned:
+    """The plan of a scene, brought up to date; the planned scene's file and the page beside it.
+
+    Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy nothing meets or everything does,
+    and what its runs raise.
+    """
+    where = f"{scene.path or scene.name}"
+    if scene.accuracy is None or not scene.accuracy.quantities:
+        raise InputError(
+            f"{where} [accuracy]", "nothing is wanted", 'say what is, such as platform.position = "10 um" in [accuracy]'
+        )
+    if not variants.effects(scene):
+        raise InputError(
+            where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
+        )
+    task = s8_plan.task(scene)
+    outcome = place.bring([task])
+    check(outcome)
+    record = outcome.records[id(task)]
+    found = Planned(scene, of(scene, place.store.load(record)), task, record, place)
+    if scene.path is not None:
+        publish(found.target, found.file(found.target))
+        publish(found.folder / "index.html", page(found))
+    return found
+
+
+def of(scene: Scene, plan: xr.Dataset) -> Scene:
+    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities told."""
+    told = s8_plan.from_dataset(plan)
+    bare = variants.without(scene, variants.named(scene, told["gone"], f"{scene.name} [plan]"))
+    fewer = variants.with_modes(bare, told["modes"])
+    owners = fewer.owners()
+    there = {name for names in owners.values() for name in names}
+    watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
+    view = fewer.view.model_dump(mode="json", exclude_none=True) if fewer.view is not None else {}
+    solver = {"integrator": told["integrator"], "rtol": told["rtol"]}
+    result = edited(
+        fewer,
+        {
+            "title": f"{scene.title}, as planned",
+            "accuracy": None,
+            "ensemble": None,
+            "solver": solver,
+            "view": view | {"watch": watch},
+        },
+    )
+    result._name, result._path = f"{scene.name}-planned", None
+    return result
+
+
+def _kinds(owners: dict[str, tuple[str, ...]], name: str) -> set[str]:
+    """Kinds of quantities that a part of this name may own."""
+    from flexclear.pipeline.core.scene.wanted import KINDS
+
+    return {kind for kind, of_kind in KINDS.items() if name in owners[of_kind.owner]}
+
+
+def page(found: Planned) -> bytes:
+    """The page of a plan: in words, the chart, the table, the planned scene."""
+    import html
+
+    from flexclear.pipeline.post.overview.page import Part, media
+    from flexclear.pipeline.post.overview.page import page as made
+    from flexclear.pipeline.post.plan import words
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    picture = media("plan.png", found.kept("plan.png").read_bytes(), "Estimated influence of each effect, at most")
+    text = html.escape(found.file(found.target).decode())
+    parts = [
+        Part("chart", "Influences", picture),
+        Part("decisions", "Decisions", as_html(from_markdown(found.text()))),
+        Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
+    ]
+    return made(f"Plan: {found.scene.title}", words(found.dataset()), parts)
+
+
+def verify(found: Planned, place: Workplace) -> list[str]:
+    """Run the full and the planned scene, print how far they are apart, and return what was missed, in words."""
+    from flexclear.pipeline.post.plan import verified
+    from flexclear.pipeline.post.plotting.table import as_markdown
+
+    compared = beside(found, place)
+    print(as_markdown(verified(compared)))
+    wanted = found.scene.accuracy
+    over = [
+        f"{found.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
+        for name, unit, error, most in zip(
+            *(compared[key].values for key in ("quantity", "unit", "error", "wanted")), strict=True
+        )
+        if error > most
+    ]
+    return over if wanted is None or not wanted.allow_missed else []
+
+
+def beside(found: Planned, place: Workplace) -> xr.Dataset:
+    """Distance of the planned run from the full one by quantity, each over members where it has contacts."""
+    from flexclear.pipeline.core import influence
+    from flexclear.pipeline.core.errors import SolverError
+    from flexclear.pipeline.core.scene.wanted import parse
+
+    assert found.scene.accuracy is not None
+    names = list(found.scene.accuracy.quantities)
+    chosen = [parse(name, found.scene.owners()) for name in names]
+    full = edited(found.scene, {"accuracy": None})
+    tasks = [s4_watched.task(scene, chosen, MEMBERS) for scene in (full, found.planned)]
+    outcome = place.bring(tasks)
+    check(outcome)
+    one, two = (
+        s4_watched.point(place.store.load(outcome.records[id(task)]), scene, chosen)
+        for task, scene in zip(tasks, (full, found.planned), strict=True)
+    )
+    for point, what in ((one, "full"), (two, "planned")):
+        if point.refused:
+            raise SolverError(f"{found.scene.name}: the {what} run is refused: {point.refused}")
+    plan = found.dataset()
+    apart = [influence.influence(two, one, q, MEMBERS) for q in chosen]
+    result = plan[["wanted"]].copy()
+    for k, q in enumerate(chosen):
+        want = found.scene.accuracy.quantities[q.name]
+        if want.relative is not None:  # what it is relative to is known now
+            result["wanted"][k] = want.relative * influence.size(one, q)
+    result["error"] = (("quantity",), [i.difference for i in apart])
+    result["chance"] = (("quantity",), [i.uncertainty for i in apart])
+    return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations)

@@ -1,0 +1,82 @@
+"""Beside stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import s4_simulate
+from flexclear.stages.graph import Graph
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.points import Point
+    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.wanted import Quantity
+
+#: settings of a scene that a watched run does not look at
+UNSEEN = ("accuracy", "ensemble", "sections", "view")
+#: starts of a variant with contacts
+MEMBERS = 4
+
+
+def plain(scene: Scene) -> Scene:
+    """The scene without what asks for more than one run of it."""
+    return edited(scene, dict.fromkeys(UNSEEN)) if any(getattr(scene, key) for key in UNSEEN) else scene
+
+
+def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
+    """The task of a variant; its artifact holds one point, see `points.unpacked`."""
+    variant = plain(scene)
+    graph = Graph(variant, shown=False)
+    return Task(
+        stage="watched",
+        scene=scene.name,
+        run="flexclear.stages.s4_watched:run",
+        params={
+            "simulate": s4_simulate.params(variant),
+            "quantities": [[q.owner, q.kind] for q in chosen],
+            "members": _members(variant, members),
+        },
+        inputs=graph.bodies(),
+        modules=s4_simulate.modules(variant),
+        folder="",
+    )
+
+
+def _members(scene: Scene, members: int) -> int:
+    """Members of a scene with contacts; a motion without any needs none."""
+    return members if scene.contacts() or scene.stop else 0
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """One point as a dataset; refusals of the solver are in it, since they, too, say what an effect does."""
+    from flexclear.pipeline.core.artifacts.points import batch
+    from flexclear.pipeline.core.influence import kept
+    from flexclear.pipeline.core.scene.wanted import Quantity
+
+    scene = s4_simulate.rebuild(params["simulate"], inputs)
+    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    progress(None, f"{scene.summary()}")
+    point = watch(scene, s4_simulate.bundles(inputs), chosen, params["members"])
+    return {"nc": batch({"point": point}, kept(scene.owners(), chosen))}
+
+
+def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
+    """The run of a scene, in this process; `members` as told by the caller, none where there is no contact."""
+    from flexclear.pipeline.core.influence import kept, members_apart
+    from flexclear.pipeline.dynamics.record.point import Runner
+
+    return Runner(bundles, kept(scene.owners(), chosen), _members(scene, members)).run(members_apart(scene))
+
+
+def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:
+    """The point in an artifact of `run`."""
+    from flexclear.pipeline.core.artifacts.points import unpacked
+    from flexclear.pipeline.core.influence import kept
+
+    return unpacked(stored, kept(scene.owners(), chosen))["point"]

@@ -1,0 +1,109 @@
+"""Effects of a scene by name, scenes without some of them, and these as files that say only what differs."""
+
+from __future__ import annotations
+
+import tomllib
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.influence import chance, influence
+from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.influences import closed
+from flexclear.pipeline.post.influences import variants as needed
+from flexclear.stages.new import write
+
+
+@pytest.fixture
+def crank(tmp_path: Path) -> Path:
+    return write("slider-crank", tmp_path)[0]
+
+
+def test_effects_are_the_parts_that_can_be_taken_away(crank: Path):
+    found = {effect.name: effect.within for effect in variants.effects(load_scene(crank))}
+    assert found == {
+        "body.rod.modes": "",
+        "body.rod.damping": "body.rod.modes",
+        "joint.pin.clearance": "",
+        "joint.pin.friction": "joint.pin.clearance",
+        "load.gravity": "",
+    }
+
+
+def test_any_variant_is_a_file_that_extends_its_scene_by_parts_replaced_and_removed(crank: Path):
+    scene = load_scene(crank)
+    every = variants.effects(scene)
+    for gone in (few for n in range(len(every) + 1) for few in combinations(every, n)):
+        variant = variants.without(scene, gone)
+        target = crank.parent / "below" / "variant.toml"
+        target.parent.mkdir(exist_ok=True)
+        text = variants.text(scene, variant, variants.relative(target, crank))
+        target.write_text(text)
+        assert load_scene(target).model_dump(mode="json") == variant.model_dump(mode="json")
+        families = set(tomllib.loads(text)) & {"body", "joint", "load", "drive"}
+        assert not families, "parts are replaced or removed, never added"
+
+
+def test_what_lies_within_an_effect_goes_with_it(crank: Path):
+    scene = load_scene(crank)
+    by_name = {effect.name: effect for effect in variants.effects(scene)}
+    rigid = variants.without(scene, [by_name["body.rod.modes"]])
+    assert "body.rod.damping" not in {effect.name for effect in variants.effects(rigid)}
+    assert rigid.output.stress is None
+    tight = variants.without(scene, [by_name["joint.pin.clearance"], by_name["joint.pin.friction"]])
+    assert tight.joint["pin"].type == "revolute"
+    assert tight.view is not None
+    assert "pin.peak_force" not in (tight.view.watch or ())
+
+
+def test_a_name_that_is_no_effect_is_refused_with_the_nearest(crank: Path):
+    with pytest.raises(InputError, match=r"joint\.pin\.clearance"):
+        variants.named(load_scene(crank), ["joint.pin.clearence"], "plan")
+
+
+def test_the_variants_of_two_effects_are_the_square(crank: Path):
+    every = [e for e in variants.effects(load_scene(crank)) if e.name in ("body.rod.modes", "load.gravity")]
+    assert len(needed(every)) == 4
+    three = list(variants.effects(load_scene(crank)))
+    assert all(closed(three, gone) == gone for gone in needed(three))
+
+
+def _point(values: np.ndarray, spread: float = 0.0) -> Point:
+    name = "b.position.series"
+    return Point({name: values}, {}, {name: np.full(values.shape, spread)} if spread else {}, 1)
+
+
+def test_without_spread_an_influence_is_the_largest_distance():
+    path = np.zeros((5, 3))
+    other = path + np.array([0.0, 3e-6, 4e-6])
+    found = influence(_point(path), _point(other), Quantity("b", "position"), 4)
+    # a distance of 5e-6 from sums of squares of such numbers: some roundings of 1e-16
+    assert found.difference == pytest.approx(5e-6, rel=1e-12)
+    assert found.uncertainty == 0.0
+
+
+def test_a_difference_of_means_within_their_standard_errors_is_chance():
+    """Means of 4 members of deviation s along each of three axes: the standard error of a difference is s sqrt(6)/2."""
+    path, spread, k = np.zeros((5, 3)), 1e-6, chance(4)
+    # Student's t of 6 degrees of freedom at 1e-3, both sides, from tables, to their digits
+    assert k == pytest.approx(5.959, abs=5e-4)
+    error = spread * np.sqrt(6.0) / 2.0
+    q = Quantity("b", "position")
+    near = path + np.array([0.9 * k * error, 0.0, 0.0])
+    assert influence(_point(path, spread), _point(near, spread), q, 4).difference == 0.0
+    far = path + np.array([1.25 * k * error, 0.0, 0.0])
+    found = influence(_point(path, spread), _point(far, spread), q, 4)
+    # sqrt(5^2 - 4^2) = 3 quarters of chance are told apart; roundings only
+    assert found.difference == pytest.approx(0.75 * k * error, rel=1e-10)
+    assert found.uncertainty == pytest.approx(k * error, rel=1e-10)
+
+
+def test_a_quantity_that_one_side_lacks_is_infinitely_far():
+    empty = Point({}, {}, {}, 1)
+    assert influence(_point(np.zeros((2, 3))), empty, Quantity("b", "position"), 4).difference == np.inf

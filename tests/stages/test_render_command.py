@@ -1,0 +1,78 @@
+"""``flexclear render``: what is asked for is made, in the form that is asked for, and nothing else is computed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.post.overview.overlay import colors
+from flexclear.stages.__main__ import main
+from flexclear.stages.graph import Graph
+
+SCENE = "checks/clamped_rod"
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    return tmp_path / "results"
+
+
+def test_modes_are_shown_without_a_run(results: Path, capsys: pytest.CaptureFixture[str]):
+    body = next(iter(load_scene(f"scenes/{SCENE}.toml").flexible()))
+    for kind, file in (("png", f"modes_{body}.png"), ("html", f"modes_{body}.html"), ("gltf", f"modes_{body}.glb")):
+        assert main(["render", SCENE, "--what", "modes", "--format", kind, "-q"]) == 0
+        assert file in capsys.readouterr().out
+        assert (results / "runs" / SCENE / file).stat().st_size > 1000
+    assert main(["render", SCENE, "--what", "modes", "--format", "pvd", "-q"]) == 0
+    assert (results / "runs" / SCENE / "paraview" / f"modes_{body}.pvd").is_file()
+    assert not (results / "runs" / SCENE / "run.nc").exists()
+
+
+@pytest.mark.parametrize(
+    "words, told",
+    [
+        (["--what", "joint", "--format", "gltf"], "as png, gif, mp4"),
+        (["--what", "modes", "--format", "png", "--at", "1 ms"], "belongs to --what vibrations"),
+        (["--what", "vibrations", "--at", "1 kg"], "--at 1 kg"),
+    ],
+)
+def test_what_cannot_be_shown_so_is_refused(
+    words: list[str], told: str, results: Path, capsys: pytest.CaptureFixture[str]
+):
+    assert main(["render", SCENE, *words]) == 2
+    assert told in capsys.readouterr().err
+    assert not results.exists()
+
+
+def test_a_scene_without_modes_says_so(results: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["render", "checks/pendulum", "--what", "modes", "--format", "png", "-q"]) == 2
+    assert "no flexible body" in capsys.readouterr().err
+
+
+def test_no_task_of_a_run_sees_what_bodies_look_like():
+    plain = Graph(load_scene("scenes/checks/clearance_slider_crank.toml"))
+    shown = {"body.crank.color": "#009E73", "body.crank.geometry": [], "view": {"zoom": 2.0, "impact_slowdown": 1.0}}
+    drawn = Graph(load_scene("scenes/checks/clearance_slider_crank.toml", override=shown))
+    assert drawn.simulate.params == plain.simulate.params
+    assert drawn.picture("motion", "html").params != plain.picture("motion", "html").params
+    assert drawn.linear().params == plain.linear().params
+
+
+def test_a_model_has_the_same_colour_in_every_figure():
+    def run(contact: int, reference: str | None) -> xr.Dataset:
+        body = {"rod": {"type": "flexible", "modes": {"reference": reference}}} if reference else {}
+        found = xr.Dataset(attrs={"parameters": json.dumps({"body": body})})
+        return found.expand_dims(contact=["A"]) if contact else found
+
+    from flexclear.pipeline.post import models
+
+    both = colors(
+        {"ideal": run(0, None), "csj": run(1, None), "cb": run(0, "craig-bampton"), "free": run(1, "free-free")}
+    )
+    assert both == [models.IDEAL.color, models.CSJ.color, models.FAR_CB.color, models.FAR_CSJ_FREE.color]
+    assert len(set(colors({name: run(1, "craig-bampton") for name in "abcd"}))) == 4

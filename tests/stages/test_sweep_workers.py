@@ -1,0 +1,170 @@
+"""Who runs the points of a sweep does not matter, nor who dies meanwhile."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Future
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.errors import ResourceError
+from flexclear.stages import run, sweep, sweep_engine, sweep_plan
+from flexclear.stages.__main__ import main
+from tests.stages.conftest import PATIENCE
+from tests.stages.sweeps import begun, flexclear, pendulum
+
+
+def test_bytes_are_the_same_whoever_runs_the_points(root: Path, tmp_path: Path):
+    files = []
+    for count in (1, 2):
+        target = tmp_path / f"{count}.nc"
+        done = flexclear(
+            "sweep",
+            str(pendulum(tmp_path, 30)),
+            f"--workers={count}",
+            f"--out={target}",
+            cwd=root,
+            results=tmp_path / f"results{count}",
+        )
+        out, err = done.communicate(timeout=PATIENCE)
+        assert done.returncode == 0, err
+        assert "30 points, 0 refused" in out
+        files.append(target.read_bytes())
+    assert files[0] == files[1]
+
+
+def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path, fresh: Path, asked: list[str]):
+    path = pendulum(tmp_path, 400)
+    process = flexclear("sweep", str(path), "--workers=1", cwd=root, results=fresh)
+    begun(process, fresh)
+    process.send_signal(signal.SIGKILL)
+    process.communicate()
+    plan = sweep_plan.prepare(sweep_plan.plan(*sweep.read(path), str(path)), run.workplace())
+    stored = {key for family in plan.families for key in family.find(run.workplace().store, plan.kept)}
+    assert main(["sweep", str(path), "--workers=1"]) == 0
+    assert stored
+    assert set(asked) == {job.key for job in plan.jobs} - stored
+    assert len(asked) < 400
+    asked.clear()
+    assert main(["sweep", str(path), "--workers=1"]) == 0
+    assert asked == []
+
+
+def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path):
+    results = tmp_path / "results"
+    process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--workers=2", cwd=root, results=results)
+    begun(process, results)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 130, err
+    with xr.open_dataset(results / "sweeps" / "lengths" / "sweep.nc") as left:
+        assert left.attrs["complete"] == 0
+        done = left["status"].values == 0
+        assert 0 < done.sum() < 20_000
+        assert (left["status"].values[~done] == 2).all()
+        assert np.isfinite(left["bob.velocity.largest"].values[done]).all()
+        assert np.isnan(left["bob.velocity.largest"].values[~done]).all()
+
+
+def test_a_scheduler_that_is_not_there_is_told(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["sweep", str(pendulum(tmp_path, 2)), "--scheduler", "tcp://127.0.0.1:9"]) == 2
+    said = capsys.readouterr().err
+    assert "--scheduler tcp://127.0.0.1:9" in said
+    assert "not installed" in said or "no scheduler answers" in said
+
+
+class Mortal:
+    """Stands for a pool of two processes that dies at its third and fourth task, or at all from the third one on."""
+
+    def __init__(self, recovers: bool) -> None:
+        self.recovers, self.given, self.renewed = recovers, 0, 0
+
+    def submit(self, family: str, packed: bytes, points: list[dict[str, Any]], *_: Any) -> Future[Any]:
+        self.given += 1
+        future: Future[Any] = Future()
+        if self.given in (3, 4) or (self.given > 4 and not self.recovers):
+            future.set_exception(BrokenProcessPool())
+        else:
+            future.set_result(([Point({}, {}, {}, point["n"]) for point in points], 0.1 * len(points)))
+        return future
+
+    def renew(self) -> None:
+        self.renewed += 1
+
+    def run(self, told: list[int]) -> None:
+        jobs = [sweep_engine.Job(str(n), "family", {"n": n}, Path(str(n))) for n in range(40)]
+        engine = sweep_engine.Engine(self.submit, lambda: 2, renew=self.renew)
+        engine.run(jobs, {"family": b""}, lambda found, _: told.extend(point.evaluations for _, point in found))
+
+
+def test_points_that_are_lost_with_a_process_are_run_again():
+    told, pool = list[int](), Mortal(recovers=True)
+    pool.run(told)
+    assert sorted(told) == list(range(40))
+    assert pool.renewed == 1
+
+
+def test_processes_that_keep_dying_end_the_sweep_in_words():
+    told, pool = list[int](), Mortal(recovers=False)
+    with pytest.raises(ResourceError, match="memory full"):
+        pool.run(told)
+    assert told
+    assert pool.renewed == sweep_engine.LOSSES
+
+
+def _dask(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
+    """A scheduler or a worker of Dask on this machine."""
+    environment = os.environ | {"PYTHONPATH": str(cwd), "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "5"}
+    command = [sys.executable, "-m", "dask", *arguments]
+    return subprocess.Popen(command, cwd=cwd, env=environment, text=True, stderr=subprocess.DEVNULL)
+
+
+def test_a_cluster_of_which_a_worker_is_killed_gives_the_same_bytes(root: Path, tmp_path: Path):
+    pytest.importorskip("distributed")
+    place, path = tmp_path / "scheduler.json", pendulum(tmp_path, 1500)
+    target, local = tmp_path / "cluster.nc", tmp_path / "local.nc"
+    worker = ("worker", f"--scheduler-file={place}", "--nthreads=1", "--no-nanny", "--no-dashboard")
+    scheduler = ("scheduler", "--port=0", "--host=127.0.0.1", f"--scheduler-file={place}", "--no-dashboard")
+    others = [_dask(*scheduler, cwd=root)]
+    try:
+        others += [_dask(*worker, cwd=root), _dask(*worker, cwd=root)]
+        address = _address(place)
+        arguments = ("sweep", str(path), f"--scheduler={address}", f"--out={target}")
+        process = flexclear(*arguments, cwd=root, results=tmp_path / "results")
+        begun(process, tmp_path / "results")
+        assert process.poll() is None
+        others[1].send_signal(signal.SIGKILL)
+        others.append(_dask(*worker, cwd=root))
+        _, err = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 0, err
+    finally:
+        for other in others:
+            other.kill()
+            other.wait()
+    alone = flexclear("sweep", str(path), "--workers=2", f"--out={local}", cwd=root, results=tmp_path / "local")
+    _, err = alone.communicate(timeout=PATIENCE)
+    assert alone.returncode == 0, err
+    assert target.read_bytes() == local.read_bytes()
+
+
+def _address(place: Path) -> str:
+    """Of a scheduler that has two workers."""
+    from distributed import Client
+
+    end = time.monotonic() + PATIENCE
+    while not place.exists():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    with Client(scheduler_file=str(place), timeout=PATIENCE, set_as_default=False) as client:
+        client.wait_for_workers(2, timeout=PATIENCE)
+        return str(client.scheduler.address)
