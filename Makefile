@@ -1,7 +1,7 @@
 # Targets are names only: what is up to date is decided by content, by the program itself.
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: all help setup check test test-slow bench atlas chaos docs clean
+.PHONY: all help setup check test test-slow interpreters bench atlas chaos docs clean
 
 VENV := .venv
 READY := $(VENV)/.ready
@@ -30,6 +30,20 @@ test: $(READY) ## Tests, except those marked slow
 
 test-slow: $(READY) ## The tests marked slow
 	$(RUN) -m pytest -q -n auto --dist loadfile -m slow
+
+# other Pythons that this machine may have; each gets an environment of its own and runs what `doctor` computes
+OTHERS := python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)
+
+interpreters: $(READY) ## A short run under every other Python there is
+	@for p in $(OTHERS); do \
+		v=$$($$p -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue; \
+		test -e $(VENV)/others/$$v/.ran-$$$$ && continue; \
+		echo "-- Python $$v"; \
+		test -x $(VENV)/others/$$v/bin/flexclear || { $$p -m venv $(VENV)/others/$$v && \
+			$(VENV)/others/$$v/bin/pip install -q -c constraints.txt -e .; } || exit 1; \
+		FLEXCLEAR_RESULTS=$(VENV)/others/$$v/results $(VENV)/others/$$v/bin/python -m flexclear doctor || exit 1; \
+		touch $(VENV)/others/$$v/.ran-$$$$; \
+	done; rm -f $(VENV)/others/*/.ran-$$$$
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation peers runs growth exudyn

@@ -33,7 +33,7 @@ COMMANDS = {
     "cite": "sources of the methods and data that a scene uses",
     "completion": "completion for bash and zsh",
     "cache": "what is kept: size, check, explain, prune",
-    "doctor": "is all here that is needed, and does it compute",
+    "doctor": "is all here that is needed, and does it compute; one file to repeat a failure",
 }
 
 

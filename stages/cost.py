@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import cost_design, cost_peers, kernels, run, s4_simulate
+from flexclear.stages import as_json, cost_design, cost_peers, kernels, run, s4_simulate
 from flexclear.stages.cost_peers import Track
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, bundles, check
@@ -36,7 +36,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     run.scene_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
-    run.json_argument(parser)
+    as_json.json_argument(parser)
     parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
     parser.add_argument(
         "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
@@ -67,7 +67,7 @@ def command(options: argparse.Namespace) -> None:
             )
             print(f"figures and data: {folder}\n")
     if options.json:
-        print(run.as_json({name: found for name, (found, _) in studies.items()}))
+        print(as_json.as_json({name: found for name, (found, _) in studies.items()}))
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
         said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""

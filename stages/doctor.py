@@ -15,6 +15,7 @@ from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
+from flexclear.stages import bundle
 
 LIBRARIES = (
     "numpy",
@@ -26,9 +27,9 @@ LIBRARIES = (
     "skfem",
     "meshio",
     "matplotlib",
-    "pyvista",
-    "vtk",
 )
+#: without these only pictures of shapes are missing
+OPTIONAL = ("pyvista", "vtk", "imageio")
 #: least space that is no reason to worry [B]
 LITTLE_MEMORY, LITTLE_DISK = 1e9, 2e9
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
@@ -65,11 +66,28 @@ class UnwellError(FlexclearError):
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """It takes nothing."""
+    """What it takes: nothing, or what to repeat."""
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument(
+        "--bundle", metavar="SCENE", help="run a scene and write all that is needed to repeat it into one file"
+    )
+    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="run what such a file holds")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of the scene of --bundle")
+    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="where --bundle writes")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print what was found, line by line; UnwellError at the end when something is wrong."""
+    if options.bundle is not None:
+        path = bundle.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
+        print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")
+        return
+    if options.repeat is not None:
+        same, said = bundle.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
+        print(said)
+        if not same:
+            raise UnwellError("it does not end here as it did there")
+        return
     wrong = []
     for name, text, fine in findings():
         print(f"{'ok   ' if fine else 'WRONG'}  {name:<10} {text}", flush=True)
@@ -85,8 +103,9 @@ def findings() -> Iterator[tuple[str, str, bool]]:
         f"{platform.python_version()} on {platform.system()} {platform.machine()}",
         sys.version_info >= (3, 11),
     )
-    versions = {name: library_version(name) for name in LIBRARIES}
-    yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), "absent" not in versions.values()
+    versions = {name: library_version(name) for name in (*LIBRARIES, *OPTIONAL)}
+    missing = [name for name in LIBRARIES if versions[name] == "absent"]
+    yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
     yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
     root = results_root()
     yield (

@@ -36,7 +36,7 @@ def command(options: argparse.Namespace) -> None:
     for graph in run.graphs(options.scenes, options.set):
         done, record = bring(graph.scene, place, options.members)
         folder = place.store.root / done.folder
-        print(place.store.path(done.stage, record.key, "effects.md").read_text())
+        print(place.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8"))
         run.told(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
 
 
@@ -62,7 +62,7 @@ def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> 
     check(outcome)
     record = outcome.records[id(done)]
     picture = place.store.path(done.stage, record.key, "effects.png").read_bytes()
-    words = place.store.path(done.stage, record.key, "effects.md").read_text()
+    words = place.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8")
     publish(place.store.root / done.folder / "index.html", s8_effects.page(scene, words, picture))
     return done, record
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
-from flexclear.stages import run
+from flexclear.stages import as_json, run
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -18,7 +18,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
     parser.add_argument("--moving", action="store_true", help="the drives keep their speed: steady motion")
-    run.json_argument(parser)
+    as_json.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -29,7 +29,7 @@ def command(options: argparse.Namespace) -> None:
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
     found = run.linear(graph.scene, time, moving=options.moving)
-    print(run.as_json(found) if options.json else text(found).rstrip("\n"))
+    print(as_json.as_json(found) if options.json else text(found).rstrip("\n"))
 
 
 def text(linear: xr.Dataset) -> str:

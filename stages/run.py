@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import re
 import time
@@ -13,7 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
@@ -46,9 +45,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset of the run here (one scene)")
-    parser.add_argument(
-        "--planned", action="store_true", help="plan first (flexclear plan), and run what the wanted accuracy calls for"
-    )
+    parser.add_argument("--planned", action="store_true", help="plan first, and run what the wanted accuracy calls for")
     parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
 
 
@@ -62,12 +59,8 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
     wanted = graphs(options.scenes, options.set)
     place = workplace(options)
-    plans = []
-    if options.planned:
-        planning = import_module("flexclear.stages.plan")
-        plans = [planning.bring(graph.scene, place) for graph in wanted]
-        print(*(plan.text() for plan in plans), sep="\n")
-        wanted = [Graph(plan.planned) for plan in plans]
+    plans = import_module("flexclear.stages.plan").told(wanted, place) if options.planned else []
+    wanted = [Graph(plan.planned) for plan in plans] or wanted
     for graph in wanted:
         check_run(graph.scene, place.store.root)
         taken = owner.claim(graph.scene, place.store)
@@ -81,10 +74,8 @@ def command(options: argparse.Namespace) -> None:
         copy_run(wanted[0], place, options.out)
     for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
         told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
-    missed = [text for plan in plans if options.verify for text in planning.verify(plan, place)]
-    conclude(wanted, place, outcome)
-    if missed:
-        raise MissedAccuracyError("\n".join(missed))
+    missed = [text for plan in plans if options.verify for text in plan.missed()]
+    conclude(wanted, place, outcome, missed)
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -128,34 +119,6 @@ def _deadline(options: argparse.Namespace | None) -> tuple[float, str]:
     except ValueError as error:
         raise InputError(f"--limit {text}", f"is no time: {error}", "write --limit 2h, or '90 min'") from None
     return seconds, f"the time that --limit {text} gives is over"
-
-
-def json_argument(parser: argparse.ArgumentParser) -> None:
-    """For scripts: what else is printed, as JSON."""
-    parser.add_argument("--json", action="store_true", help="print the results as JSON")
-
-
-def as_json(found: object) -> str:
-    """A result as JSON; datasets as their variables with dimensions, units and values, and their attributes."""
-    return json.dumps(found, indent=2, default=_plain, allow_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    if hasattr(value, "data_vars"):
-        variables = {
-            str(name): {"dims": list(data.dims), "units": data.attrs.get("units", ""), "values": _finite(data.values)}
-            for name, data in value.variables.items()
-        }
-        return {"attributes": dict(value.attrs), "variables": variables}
-    return _finite(value) if hasattr(value, "tolist") else str(value)
-
-
-def _finite(values: Any) -> Any:
-    """Numbers of an array as lists; those that JSON does not have are null."""
-    plain = values.tolist() if hasattr(values, "tolist") else values
-    if isinstance(plain, list):
-        return [_finite(value) for value in plain]
-    return None if isinstance(plain, float) and not math.isfinite(plain) else plain
 
 
 def told(folder: Path, files: Mapping[str, str]) -> None:
@@ -262,14 +225,6 @@ def graph(scene: Scene) -> Graph:
     return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
 
-def rendered(scene: Scene, place: Workplace | None = None) -> Path:
-    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, wanted = place or workplace(), Graph(scene)
-    require_names(scene)
-    check(place.bring(list(wanted.render.values()), jobs=1))
-    return place.store.root / wanted.simulate.folder
-
-
 def results(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
     import xarray as xr
@@ -342,12 +297,12 @@ def check(outcome: Outcome) -> None:
         raise FailedTasksError(outcome.failures)
 
 
-def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome) -> None:
+def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
     """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
 
-    Raises MissedAccuracyError, after that, for runs that are not as accurate as their scene asks.
+    Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
     """
-    missed = []
+    missed = [*plans]
     for graph in graphs:
         record = outcome.records.get(id(graph.simulate))
         if record is None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.stages import run
+from flexclear.stages import as_json, run
 from flexclear.stages.graph import Graph
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
     run.limit_argument(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
-    run.json_argument(parser)
+    as_json.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -44,7 +44,7 @@ def command(options: argparse.Namespace) -> None:
     kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
     judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
     verdicts = {name: place.store.load(record) for name, record in judged.items()}
-    print(run.as_json(verdicts) if options.json else "\n\n".join(text(*judged) for judged in verdicts.items()))
+    print(as_json.as_json(verdicts) if options.json else "\n\n".join(text(*judged) for judged in verdicts.items()))
     if options.page is not None:
         pictures = {
             name: place.store.path(record.stage, record.key, "sections.png").read_bytes()

@@ -64,6 +64,8 @@ def work(
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
     of a worker that has joined since.
     """
+    from threadpoolctl import threadpool_limits
+
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
     from flexclear.pipeline.core.workflow import cores, journal
@@ -71,6 +73,7 @@ def work(
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
     cores.tell(alone)
+    threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
     scene, runner = _opened(key, packed)
     begun, found = time.process_time(), list[Point]()
     for point, place in zip(points, journals or [None] * len(points), strict=True):

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Mapping, Sequence
 
 from flexclear.pipeline.core.workflow.execute import states
-from flexclear.stages import run
+from flexclear.stages import as_json, run
 from flexclear.stages.graph import STAGES
 
 
@@ -14,7 +14,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     run.scene_arguments(parser)
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
-    run.json_argument(parser)
+    as_json.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -23,7 +23,7 @@ def command(options: argparse.Namespace) -> None:
     for graph in run.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), place.store, place.sources)
         found[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
-    print(run.as_json(found) if options.json else text(found))
+    print(as_json.as_json(found) if options.json else text(found))
 
 
 def text(found: Mapping[str, Mapping[str, Sequence[str]]]) -> str:

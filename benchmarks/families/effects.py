@@ -33,6 +33,8 @@ WATCHED = (
 )
 ROD, PLAY = "body.rod1.modes", "joint.A1.clearance"
 ROUNDS, EVALUATIONS = 8, 20000
+#: share by which the least of repeated times differs from one measurement to the next
+NOISE = 0.02
 #: one effect dominates another one from this ratio on
 DOMINATES = 10.0
 #: tolerance at which numbers of modes are compared, as of planned runs
@@ -139,7 +141,7 @@ def show(records: list[Record]) -> dict[str, str]:
         parts["influences"] += "\n\n" + _answers(influences)
     lines = [
         f"- {r['scene']}: an evaluation takes {r['evaluation_us']:.3g} us while the contact is open; looking at its "
-        f"gap is {100 * r['share']:.1f} % of that."
+        f"gap is {_share(r['share'])} of that."
         for r in records
         if "evaluation_us" in r
     ]
@@ -174,6 +176,11 @@ def _answers(found: dict[str, Record]) -> str:
         f"{_so(together)}",
     ]
     return "\n".join(lines)
+
+
+def _share(value: float) -> str:
+    """A share in words where it is below what repeated measurements differ by."""
+    return f"{100 * value:.0f} %" if value > NOISE else f"less than {100 * NOISE:.0f} %, the noise of this measurement,"
 
 
 def _so(holds: bool) -> str:

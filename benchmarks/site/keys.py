@@ -27,6 +27,7 @@ SI = {
     "mass": "kg",
     "angle": "rad",
     "velocity": "m/s",
+    "force": "N",
     "angular velocity": "rad/s",
     "acceleration": "m/s^2",
     "stiffness": "N/m",

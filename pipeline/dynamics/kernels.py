@@ -4,102 +4,28 @@ sums allowed, NaN and infinity honoured.
 Kernels become code without being optimised: the function that Python calls is, once, with all that it reaches.
 
 Left to itself Numba optimises each function together with copies of all that it calls, and makes machine code of it,
-before it compiles the next one up: what lies n calls deep is optimised n times. But only compiled code calls kernels.
+before it compiles the next one up: what lies n calls deep is optimised n times. But only compiled code calls kernels
+(`lowering`).
 """
 
 from __future__ import annotations
 
 from typing import Any
 
+import numba
 from numba import njit
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager, register_pass
-from numba.core.typed_passes import NativeLowering
+
+#: releases of Numba with which `lowering` has been looked at
+LOOKED_AT = ("0.67.", "0.68.")
 
 
-class Part(JITCodeLibrary):
-    """Unoptimised code of a kernel, and which libraries hold what it calls."""
+def lowering() -> dict[str, Any]:
+    """Options of the decorator: the step of `lowering`, where the release of Numba is known to take it."""
+    if not numba.__version__.startswith(LOOKED_AT):
+        return {}
+    from flexclear.pipeline.dynamics.lowering import KernelCompiler
 
-    _whole: Any = None
-
-    def finalize(self) -> None:
-        """Link, optimise and assemble nothing."""
-        self._raise_if_finalized()
-        for library in self._linking_libraries:
-            self._reload_init.update(library._reload_init)
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """None: there is no machine code to point to."""
-        self._ensure_finalized()
-        return 0
-
-    @property
-    def codegen(self) -> Part:
-        """Who is told where the function's environment is: this, which has nowhere to put it (`set_env`)."""
-        return self
-
-    def set_env(self, env_name: str, env: Any) -> None:
-        """Needed to raise exceptions of Python, which no kernel does."""
-
-    def _get_module_for_linking(self) -> Any:
-        """Code of the kernel and of all that it calls."""
-        if self._whole is None:
-            whole = self._own().clone()
-            for library in self._called():
-                module = library._own() if isinstance(library, Part) else library._get_module_for_linking()
-                whole.link_in(module, preserve=True)
-            self._whole = whole
-        return self._whole
-
-    def _own(self) -> Any:
-        return super()._get_module_for_linking()
-
-    def _called(self) -> list[Any]:
-        """Libraries of what it calls, directly or not, each once and after all that call it.
-
-        The linker takes only what is referred to already: of a kernel that one caller names in code that never runs,
-        and another one below calls, nothing would be there.
-        """
-        found: dict[Any, None] = {}
-        open_calls = [(library, False) for library in self._linking_libraries]
-        while open_calls:
-            library, below_done = open_calls.pop()
-            if below_done:
-                found[library] = None
-            elif library not in found:
-                open_calls.append((library, True))
-                below = library._linking_libraries if isinstance(library, Part) else []
-                open_calls += [(other, False) for other in below if other not in found]
-        return list(reversed(found))
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class PartLowering(NativeLowering):
-    """Lowers a function into a `Part`."""
-
-    _name = "part_lowering"
-
-    def run_pass(self, state: Any) -> bool:
-        """As of any function, but for where its code goes."""
-        state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
-        state.library.enable_object_caching()
-        return bool(super().run_pass(state))
-
-
-class KernelCompiler(CompilerBase):
-    """Numba's pipeline, with `PartLowering`."""
-
-    def define_pipelines(self) -> list[PassManager]:
-        """The only one; there is no object mode to fall back to."""
-        found = PassManager("kernel")
-        found.passes += DefaultPassBuilder.define_untyped_pipeline(self.state).passes
-        found.passes += DefaultPassBuilder.define_typed_pipeline(self.state).passes
-        for step, description in DefaultPassBuilder.define_nopython_lowering_pipeline(self.state).passes:
-            found.add_pass(PartLowering if step is NativeLowering else step, description)
-        found.finalize()
-        return [found]
+    return {"pipeline_class": KernelCompiler}
 
 
 # No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and C
@@ -110,5 +36,5 @@ kernel = njit(
     _nrt=False,
     no_cfunc_wrapper=True,
     no_cpython_wrapper=True,
-    pipeline_class=KernelCompiler,
+    **lowering(),
 )

@@ -8,7 +8,8 @@ import pytest
 from numba import njit
 from numba.core.codegen import CPUCodeLibrary
 
-from flexclear.pipeline.dynamics.kernels import Part, kernel
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.lowering import Part
 
 
 def tower() -> tuple[Callable, Callable, Callable]:

@@ -169,4 +169,4 @@ def test_what_must_pass_is_what_a_user_types(root: Path):
     assert re.findall(r"^\s*make\b(.*)$", text, re.MULTILINE) == [' "$target"']
     run = re.search(r"^for target in (.*); do$", text, re.MULTILINE)
     assert run is not None
-    assert run[1].split() == ["setup", "check", "docs", "test"]
+    assert run[1].split() == ["setup", "check", "docs", "test", "interpreters"]

@@ -18,6 +18,7 @@ from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.stages import run
 from flexclear.stages.__main__ import main
+from flexclear.stages.as_json import as_json
 from flexclear.stages.new import KINDS, TEMPLATES, write
 from tests.stages.typical_mistakes import MISTAKES
 
@@ -229,7 +230,7 @@ def test_results_are_printed_as_json_for_scripts(
 
 def test_datasets_are_told_as_json_with_units_and_without_what_json_lacks():
     data = xr.Dataset({"f": ("k", [1.0, np.nan], {"units": "Hz"})}, coords={"k": ["a", "b"]}, attrs={"n": np.int64(3)})
-    found = json.loads(run.as_json({"scene": data}))["scene"]
+    found = json.loads(as_json({"scene": data}))["scene"]
     assert found["attributes"] == {"n": 3}
     assert found["variables"]["f"] == {"dims": ["k"], "units": "Hz", "values": [1.0, None]}
     assert found["variables"]["k"]["values"] == ["a", "b"]

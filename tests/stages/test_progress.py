@@ -59,9 +59,23 @@ def test_the_rest_is_estimated_from_the_pace_without_compiling():
     assert screen.getvalue().splitlines()[-1].endswith("sps4/csj: simulate compiling")
     clock.now = 30.0
     monitor.update(name, 0.0, "")
+    for now, share in ((33.0, 0.1), (36.0, 0.2)):
+        clock.now = now
+        monitor.update(name, share, "")
+        assert "left" not in screen.getvalue()  # one sample or two say little
     clock.now = 42.0
-    monitor.update(name, 0.25, "t = 0.045 s")
-    assert screen.getvalue().splitlines()[-1].endswith("simulate  25% 36.0 s left t = 0.045 s")
+    monitor.update(name, 0.4, "t = 0.045 s")
+    assert screen.getvalue().splitlines()[-1].endswith("simulate  40% 18.0 s left t = 0.045 s")
+
+
+def test_the_rest_is_estimated_by_the_later_pace_where_that_changes():
+    monitor, screen, clock = watched(terminal=False)
+    name = monitor.begin("sps4/csj", "simulate")
+    for k in range(41):  # the first fifth takes 1 s for each hundredth, what follows 10 s
+        clock.now = min(k, 20) + 10.0 * max(k - 20, 0)
+        monitor.update(name, k / 100, "")
+    # 60 hundredths are left; the mean pace so far is 5.5 s, and 20 samples ago counts for 0.8^20 = 1 % of the last
+    assert " 40% 9 min " in screen.getvalue().splitlines()[-1]
 
 
 def test_a_terminal_keeps_one_line_with_everything_that_runs():

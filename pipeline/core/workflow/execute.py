@@ -50,7 +50,10 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             run = getattr(import_module(module), function)
             data = {name: store.load(above) for name, above in inputs.items()}
             begun = store.path(task.stage, key(_with_files(task, known, store)), "part")
+            from threadpoolctl import threadpool_limits  # here, since what is fresh needs no BLAS
+
             with (
+                threadpool_limits(1),  # whoever loaded NumPy first, with however many threads
                 journal.kept(begun.parent, begun.stem) as kept,
                 opened.watched(task.base, outside=(store.root,)) as read,
             ):

@@ -18,8 +18,10 @@ from flexclear.pipeline.core.log import LOG, write_to
 SPARSE = 10.0
 #: least time between two redraws of the line on a terminal [s]
 REDRAW = 0.1
-#: the rest is estimated once this share has been done; before, the estimate jumps about
-ENOUGH = 0.02
+#: the rest is estimated from so many samples of the pace at least, each of a share of the work or more
+SAMPLES, ENOUGH = 3, 0.01
+#: the pace of the last samples counts most: of each earlier one by this factor less
+FADING = 0.8
 #: what a task says with this begin stays on the screen
 WARNING = "warning: "
 
@@ -30,7 +32,8 @@ class Job:
 
     name: str
     begun: float
-    since: tuple[float, float] | None = None  #: time and done share from which on the pace is known
+    since: tuple[float, float] | None = None  #: time and done share where the last sample of the pace began
+    samples: list[tuple[float, float]] = field(default_factory=list)  #: seconds, and shares done in them
     fraction: float | None = None
     text: str = ""
     said: float = 0.0
@@ -92,8 +95,11 @@ class Monitor:
         if text.startswith(WARNING) and (self.rewrites or self.quiet):
             self.say(f"{job.name}: {text}")  # stays, where the line of progress is rewritten
         # what has no share (compiling, waiting) says nothing about the pace of the rest
-        if fraction is None or job.since is None:
+        if fraction is None or job.since is None or fraction < job.since[1]:  # begun anew, at another tolerance, say
             job.since = None if fraction is None else (self.clock(), fraction)
+        elif fraction - job.since[1] >= ENOUGH:
+            job.samples.append((self.clock() - job.since[0], fraction - job.since[1]))
+            job.since = (self.clock(), fraction)
         job.fraction, job.text = fraction, text
         if self.rewrites or self.verbose or news or self.clock() - job.said >= SPARSE:
             job.said = self.clock()
@@ -127,10 +133,8 @@ class Monitor:
         parts = [job.name]
         if job.fraction is not None:
             parts.append(f"{job.fraction:4.0%}")
-            begun, share = job.since or (self.clock(), job.fraction)
-            if job.fraction - share >= ENOUGH:
-                pace = (self.clock() - begun) / (job.fraction - share)
-                parts.append(f"{duration(pace * (1.0 - job.fraction))} left")
+            if len(job.samples) >= SAMPLES:
+                parts.append(f"{duration(pace(job.samples) * (1.0 - job.fraction))} left")
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _show(self, text: str) -> None:
@@ -146,6 +150,12 @@ class Monitor:
     def _write(self, text: str) -> None:
         self.out.write(text)
         self.out.flush()
+
+
+def pace(samples: list[tuple[float, float]]) -> float:
+    """Seconds per share of the work, of samples (seconds, share), the later ones counting more."""
+    faded = [(FADING**k * spent, FADING**k * share) for k, (spent, share) in enumerate(reversed(samples))]
+    return sum(spent for spent, _ in faded) / sum(share for _, share in faded)
 
 
 def duration(seconds: float) -> str:

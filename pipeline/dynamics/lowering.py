@@ -1,0 +1,99 @@
+"""A step of Numba's compiler in another form: kernels become code without being optimised, so that what is called
+through n kernels is optimised once, and not n times.
+
+It needs parts of Numba that nobody promises to keep, and is taken with releases that it has been looked at with;
+`kernels` says which. With others kernels are compiled as Numba does it: longer, and just as right.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class Part(JITCodeLibrary):
+    """Unoptimised code of a kernel, and which libraries hold what it calls."""
+
+    _whole: Any = None
+
+    def finalize(self) -> None:
+        """Link, optimise and assemble nothing."""
+        self._raise_if_finalized()
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """None: there is no machine code to point to."""
+        self._ensure_finalized()
+        return 0
+
+    @property
+    def codegen(self) -> Part:
+        """Who is told where the function's environment is: this, which has nowhere to put it (`set_env`)."""
+        return self
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Needed to raise exceptions of Python, which no kernel does."""
+
+    def _get_module_for_linking(self) -> Any:
+        """Code of the kernel and of all that it calls."""
+        if self._whole is None:
+            whole = self._own().clone()
+            for library in self._called():
+                module = library._own() if isinstance(library, Part) else library._get_module_for_linking()
+                whole.link_in(module, preserve=True)
+            self._whole = whole
+        return self._whole
+
+    def _own(self) -> Any:
+        return super()._get_module_for_linking()
+
+    def _called(self) -> list[Any]:
+        """Libraries of what it calls, directly or not, each once and after all that call it.
+
+        The linker takes only what is referred to already: of a kernel that one caller names in code that never runs,
+        and another one below calls, nothing would be there.
+        """
+        found: dict[Any, None] = {}
+        open_calls = [(library, False) for library in self._linking_libraries]
+        while open_calls:
+            library, below_done = open_calls.pop()
+            if below_done:
+                found[library] = None
+            elif library not in found:
+                open_calls.append((library, True))
+                below = library._linking_libraries if isinstance(library, Part) else []
+                open_calls += [(other, False) for other in below if other not in found]
+        return list(reversed(found))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class PartLowering(NativeLowering):
+    """Lowers a function into a `Part`."""
+
+    _name = "part_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """As of any function, but for where its code goes."""
+        state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        return bool(super().run_pass(state))
+
+
+class KernelCompiler(CompilerBase):
+    """Numba's pipeline, with `PartLowering`."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only one; there is no object mode to fall back to."""
+        found = PassManager("kernel")
+        found.passes += DefaultPassBuilder.define_untyped_pipeline(self.state).passes
+        found.passes += DefaultPassBuilder.define_typed_pipeline(self.state).passes
+        for step, description in DefaultPassBuilder.define_nopython_lowering_pipeline(self.state).passes:
+            found.add_pass(PartLowering if step is NativeLowering else step, description)
+        found.finalize()
+        return [found]

@@ -1,0 +1,93 @@
+"""One file repeats elsewhere what a scene does here, and tells nothing of this machine."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from flexclear.pipeline.core.errors import InputError
+from flexclear.stages import bundle
+from flexclear.stages.__main__ import main
+
+ROD = """
+title = "A rod"
+time.end = "1 ms"
+[body.ground]
+type = "ground"
+frames.O = {}
+[body.rod]
+type = "flexible"
+mesh = "MESH"
+modes = { reference = "fixed-fixed", count = 2 }
+pose = {}
+"""
+
+
+@pytest.fixture
+def scene(tmp_path: Path, root: Path) -> Path:
+    """A scene with what it extends, and a recipe by its full path; it cannot be run: its rod is held by nothing."""
+    folder = tmp_path / "somebody" / "secret project"
+    (folder / "parts").mkdir(parents=True)
+    shutil.copy(root / "meshes" / "actuated_rod.toml", folder / "parts" / "rod.toml")
+    (folder / "base.toml").write_text(ROD.replace("MESH", str(folder / "parts" / "rod.toml")))
+    (folder / "mine.toml").write_text('extends = "base.toml"\ntitle = "Mine"\n[joint.J]\ntype = "no such joint"\n')
+    return folder / "mine.toml"
+
+
+def test_a_failure_is_repeated_from_one_file_without_a_path_of_this_machine(
+    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "bundle.zip"
+    assert main(["doctor", "--bundle", str(scene), "--set", "time.end='2 ms'", "--out", str(path)]) == 0
+    with zipfile.ZipFile(path) as archive:
+        names = set(archive.namelist())
+        whole = b"".join(archive.read(name) for name in names)
+        facts = json.loads(archive.read("facts.json"))
+    assert names == {"facts.json", "log.txt", "files/mine.toml", "files/base.toml", "files/parts/rod.toml"}
+    assert b"somebody" not in whole
+    assert str(Path.home()).encode() not in whole
+    assert facts["exit_code"] == 2
+    assert facts["settings"] == ["time.end='2 ms'"]
+    shutil.rmtree(scene.parent)
+    capsys.readouterr()
+    assert main(["doctor", "--repeat", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "here it ended with 2, there with 2" in said
+    assert "no such joint" in said
+
+
+def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = bundle.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    facts = json.loads(content["facts.json"])
+    facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
+    path.write_bytes(bundle._packed({**content, "facts.json": json.dumps(facts).encode()}))
+    assert main(["doctor", "--repeat", str(path)]) == 4
+    told = capsys.readouterr()
+    assert "there with 0" in told.out
+    assert "here, 1.0 there" in told.out
+
+
+@pytest.mark.parametrize("name", ["../out.toml", "/out.toml", "files/../../out.toml", "files\\out.toml", "C:/out.toml"])
+def test_a_file_that_leads_out_of_its_folder_is_refused(name: str, tmp_path: Path) -> None:
+    facts = {"scene": "a.toml", "settings": [], "exit_code": 0, "libraries": {}, "python": ""}
+    content = {"facts.json": json.dumps(facts).encode(), "log.txt": b"", name: b"x"}
+    (tmp_path / "a.zip").write_bytes(bundle._packed(content))
+    with pytest.raises(InputError, match="lead out of it"):
+        bundle.repeat(tmp_path / "a.zip", [])
+
+
+def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
+    whole = io.BytesIO()
+    with zipfile.ZipFile(whole, "w") as archive:
+        archive.writestr("facts.json", '{"scene": "../../etc/a.toml", "settings": [], "exit_code": 0, "libraries": {}}')
+    for content in (b"", b"PK\x03\x04", whole.getvalue(), whole.getvalue()[:40]):
+        (tmp_path / "a.zip").write_bytes(content)
+        with pytest.raises(InputError):
+            bundle.repeat(tmp_path / "a.zip", [])
