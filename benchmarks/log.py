@@ -21,7 +21,7 @@ from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, library_version
 
 FOLDER = Path(__file__).parent / "log"
-PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn")
+PACKAGES = ("flexclear", "numpy", "scipy", "numba", "exudyn", "pin", "mujoco")
 #: digits of measured times
 DIGITS = 4
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
+from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.stages.run import bundles, find_scene
@@ -120,7 +122,23 @@ def set_state(engine: Engine, state: State) -> None:
     engine.select_pieces_after(state.t)
 
 
-def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
-    """Processor time of one evaluation of the right-hand side [s], from `repeat` of them in compiled code."""
+def evaluation_time(engine: Engine, state: State, repeat: int, *, straight: bool = False) -> float:
+    """Processor time of one evaluation of the right-hand side [s], from `repeat` of them in compiled code.
+
+    straight: by the code for this wiring alone, as in ensembles, sections, sweeps and long runs.
+    """
     set_state(engine, state)
-    return once(lambda: engine.evaluate(state.y, state.t, repeat)) / repeat
+    with _straight(engine) if straight else nullcontext():
+        return once(lambda: engine.evaluate(state.y, state.t, repeat)) / repeat
+
+
+@contextmanager
+def _straight(engine: Engine) -> Iterator[None]:
+    """Let evaluations that Python asks for be those of the steps."""
+    specialise(engine)
+    before = engine.h[m.EVALUATE]
+    engine.h[m.EVALUATE] = engine.h[m.RATES]
+    try:
+        yield
+    finally:
+        engine.h[m.EVALUATE] = before

@@ -231,7 +231,7 @@ def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
 
 def render(scene: Scene | str | Path) -> Path:
     """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
-    return _stages("run").rendered(_loaded(scene))
+    return _stages("render").rendered(_loaded(scene))
 
 
 def report(scene: Scene | str | Path) -> Path:

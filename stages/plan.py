@@ -13,6 +13,7 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_plan
+from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, check
 
 if TYPE_CHECKING:
@@ -53,6 +54,13 @@ def command(options: argparse.Namespace) -> None:
         raise run.MissedAccuracyError("\n".join(missed))
 
 
+def told(wanted: list[Graph], place: Workplace) -> list[Planned]:
+    """The plans of scenes, brought up to date and printed."""
+    plans = [bring(graph.scene, place) for graph in wanted]
+    print(*(plan.text() for plan in plans), sep="\n")
+    return plans
+
+
 @dataclass(frozen=True)
 class Planned:
     """A plan that is up to date. scene: the full one.  planned: what the plan makes of it."""
@@ -91,6 +99,10 @@ class Planned:
         head = ("written by flexclear plan", "what the accuracy wanted of the full scene does not call for is left out")
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
+
+    def missed(self) -> list[str]:
+        """Verify the plan; see `verify`."""
+        return verify(self, self.place)
 
     def tell(self) -> None:
         """One line on what was written where."""

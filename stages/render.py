@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.schema import Scene
 
 #: what is made where nothing is asked for
 USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))
@@ -79,3 +84,11 @@ def _tell(place: run.Workplace, folder: str, files: list[str]) -> None:
     shown = [name for name in sorted(files) if not name.endswith(".vtp")]
     rest = len(files) - len(shown)
     print(f"{run.near(place.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
+
+
+def rendered(scene: Scene, place: run.Workplace | None = None) -> Path:
+    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
+    place, wanted = place or run.workplace(), Graph(scene)
+    run.require_names(scene)
+    run.check(place.bring(list(wanted.render.values()), jobs=1))
+    return place.store.root / wanted.simulate.folder

@@ -44,9 +44,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset of the run here (one scene)")
-    parser.add_argument(
-        "--planned", action="store_true", help="plan first (flexclear plan), and run what the wanted accuracy calls for"
-    )
+    parser.add_argument("--planned", action="store_true", help="plan first, and run what the wanted accuracy calls for")
     parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
 
 
@@ -60,12 +58,8 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
     wanted = graphs(options.scenes, options.set)
     place = workplace(options)
-    plans = []
-    if options.planned:
-        planning = import_module("flexclear.stages.plan")
-        plans = [planning.bring(graph.scene, place) for graph in wanted]
-        print(*(plan.text() for plan in plans), sep="\n")
-        wanted = [Graph(plan.planned) for plan in plans]
+    plans = import_module("flexclear.stages.plan").told(wanted, place) if options.planned else []
+    wanted = [Graph(plan.planned) for plan in plans] or wanted
     for graph in wanted:
         check_run(graph.scene, place.store.root)
         taken = owner.claim(graph.scene, place.store)
@@ -79,10 +73,8 @@ def command(options: argparse.Namespace) -> None:
         copy_run(wanted[0], place, options.out)
     for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
         told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
-    missed = [text for plan in plans if options.verify for text in planning.verify(plan, place)]
-    conclude(wanted, place, outcome)
-    if missed:
-        raise MissedAccuracyError("\n".join(missed))
+    missed = [text for plan in plans if options.verify for text in plan.missed()]
+    conclude(wanted, place, outcome, missed)
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -211,14 +203,6 @@ def graph(scene: Scene) -> Graph:
     return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
 
-def rendered(scene: Scene, place: Workplace | None = None) -> Path:
-    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, wanted = place or workplace(), Graph(scene)
-    require_names(scene)
-    check(place.bring(list(wanted.render.values()), jobs=1))
-    return place.store.root / wanted.simulate.folder
-
-
 def results(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
     import xarray as xr
@@ -291,12 +275,12 @@ def check(outcome: Outcome) -> None:
         raise FailedTasksError(outcome.failures)
 
 
-def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome) -> None:
+def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
     """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
 
-    Raises MissedAccuracyError, after that, for runs that are not as accurate as their scene asks.
+    Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
     """
-    missed = []
+    missed = [*plans]
     for graph in graphs:
         record = outcome.records.get(id(graph.simulate))
         if record is None:

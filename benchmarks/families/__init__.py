@@ -5,6 +5,7 @@ NAMES = {
     "evaluation": "evaluation:FAMILY",
     "runs": "runs:FAMILY",
     "growth": "growth:FAMILY",
+    "peers": "peers:FAMILY",
     "exudyn": "exudyn:FAMILY",
     "integrators": "integrators:FAMILY",
     "accuracy": "accuracy:FAMILY",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.linalg.lapack import dgesv
@@ -30,7 +31,10 @@ def _scene(name: str) -> Record:
     system = maximal.assemble(here.scene, here.bundles)
     tasks: dict[str, Callable[[], float]] = {"dgesv": dgesv_time(system)}
     for label, state in states(engine, trajectory(engine)).items():
-        tasks[label] = lambda state=state: evaluation_time(engine, state, EVALUATIONS)  # type: ignore[misc]
+        for straight in (False, True):
+            tasks[f"{label}, straight" if straight else label] = partial(
+                evaluation_time, engine, state, EVALUATIONS, straight=straight
+            )
     times = interleaved(tasks, ROUNDS)
     dense = times.pop("dgesv")
     return {
@@ -62,11 +66,13 @@ def show(records: list[Record]) -> str:
     rows = []
     for r in records:
         cells = [r["case"], str(r["unknowns"]), spread(r["dgesv"], "us", 1)]
-        for label in ("free", "in contact"):
+        for label in ("free", "free, straight", "in contact", "in contact, straight"):
             ours = r["ours"].get(label)
             cells += [spread(ours, "us", 2), f"1/{ours['ratio']:.1f}"] if ours else ["", ""]
         rows.append(cells)
-    head = ("scene", "n", "dgesv(n) [us]", "free [us]", "of dgesv", "in contact [us]", "of dgesv")
+    head = ["scene", "n", "dgesv(n) [us]"]
+    for label in ("free", "straight, free", "in contact", "straight, in contact"):
+        head += [f"{label} [us]", "of dgesv"]
     derivations = "\n".join(f"- {r['case']}: n = {r['derivation']}" for r in records)
     return f"{pipe_table(head, rows)}\n\n{derivations}"
 

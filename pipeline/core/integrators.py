@@ -38,6 +38,7 @@ class Traits:
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
     long_steps: they hold many vibrations, whose work on the drives is known less exactly than the motion.
     retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
+    reads_all: it reads more of an evaluation than the rates, so that straight code does not serve it.
     hands_over_to: implicit method that goes on where stability limits the steps that it chooses, and that is named as
         the remedy where steps are given; empty for methods that are stable themselves.
     tolerances, steps: at which `flexclear cost` runs it; steps in s.
@@ -51,6 +52,7 @@ class Traits:
     dissipative: bool = False
     long_steps: bool = False
     retracts: bool = False
+    reads_all: bool = False
     hands_over_to: str = ""
     tolerances: tuple[float, ...] = ()
     steps: tuple[float, ...] = ()
@@ -69,6 +71,8 @@ INTEGRATORS: Mapping[str, Traits] = MappingProxyType(
             "generalized_alpha", 2, implicit=True, dissipative=True, retracts=True, steps=STEPS
         ),
         "radau": Traits("radau", 5, implicit=True, tolerances=TO_1E_9),
-        "exponential": Traits("exponential", 6, implicit=True, long_steps=True, retracts=True, tolerances=TO_1E_9),
+        "exponential": Traits(
+            "exponential", 6, implicit=True, long_steps=True, retracts=True, reads_all=True, tolerances=TO_1E_9
+        ),
     }
 )

@@ -146,14 +146,16 @@ class Room:
 ) = _places(32)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
-EVALUATE, PROJECT, RETRACT = ADDRESSES = _places(3)
+#: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
+EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1
 LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
 SITES = wiring("link port")  # port: or -1
-#: data0: first of its numbers; inboard: whether modes move the inboard frame
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard")
+#: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
+#: the mass matrix
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled")
 MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
 PORTS = wiring("flex column shapes")  # column, shapes: first of them
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
@@ -292,13 +294,13 @@ REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
-# being evaluated starts in w; then the stepper's own
+# being evaluated starts in w; whether the last evaluation left no more than the steps read; then the stepper's own
 # fmt: off
 (
-    EVALUATION, ACTIVE, MODE, STATE,
+    EVALUATION, ACTIVE, MODE, STATE, ABRIDGED,
     STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
     PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, INTEGERS,
-) = range(21)
+) = range(22)
 # fmt: on
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)

@@ -16,12 +16,12 @@ from flexclear.pipeline.dynamics import drives
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.oscillation import oscillate
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from flexclear.pipeline.dynamics.equations.prescribed_motion import make_known_motion
+from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws
 from flexclear.pipeline.dynamics.model import laws
 from tests.analytic.mechanism_runs import run
 from tests.properties.kernels import from_python
 
-KNOWN_MOTION = from_python(make_known_motion(oscillate))
+LAWS_OF_TIME = from_python(make_laws(oscillate))
 #: eq. (35): 60 mm out and back
 STROKE = Step(type="step", start=(0.0, 0.09), end=(0.09, 0.18), change=(0.06, -0.06))
 WAVES = {"type": "harmonic", "amplitude": [0.3, -0.1], "frequency": [2.0, "1.5 Hz"], "phase": [0.4, "90 deg"]}
@@ -86,7 +86,7 @@ def compiled(law: Any, t: float, piece: int) -> np.ndarray:
     h[m.N_LAWS], h[m.LAW.place], h[m.PIECES.place], h[m.HARMONICS.place] = 1, 0, 0, tables[m.PIECES].size
     h[m.PIECE_HARMONICS.place], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
     w = np.zeros(3)
-    KNOWN_MOTION(np.concatenate([h, shares]), f, w, n, t)
+    LAWS_OF_TIME(np.concatenate([h, shares]), f, w, n, t)
     return w
 
 

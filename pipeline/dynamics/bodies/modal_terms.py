@@ -91,7 +91,7 @@ def body_mass_matrix(h, f, w, k):
     c0, moves = m.FLEXES.c0(h, k), m.FLEXES.inboard(h, k)
     for i in range(n):
         start = h[m.MASS] + m.ENVELOPE.start(h, c0 + i) - m.ENVELOPE.first(h, c0 + i) + c0
-        for j in range(i + 1):
+        for j in range(0 if m.FLEXES.coupled(h, k) else i, i + 1):
             value = f[data + 12 * n + i * n + j]
             if moves:
                 value += dot6(w, m.MOMENTA.row(h, c0 + i), w, m.COLUMNS.row(h, c0 + j))

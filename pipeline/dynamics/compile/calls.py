@@ -98,6 +98,12 @@ def evaluate(h, f, w, n, t, y, dy):
 
 
 @kernel
+def rates(h, f, w, n, t, y, dy):
+    """The right-hand side of which steps need only the rates."""
+    call(h[m.RATES], (h, f, w, n, float(t), y, dy))
+
+
+@kernel
 def project(h, f, w, n, t, y, dy, tolerance):
     """Back onto the closures: `equations.projection`."""
     return call(h[m.PROJECT], (h, f, w, n, float(t), y, dy, tolerance))

@@ -25,11 +25,12 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
 from flexclear.pipeline.dynamics.compile.files import bring, compiled
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
-from flexclear.pipeline.dynamics.compile.sources import sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 SOURCES = Sources(TREE)
 #: what the functions are to who waits for them
@@ -39,7 +40,9 @@ WORDS = {
     "retract": "retractions",
     "observe": "recorded quantities",
     "advance": "integrator",
+    "specialised": "equations of motion of this mechanism alone",
 }
+SPECIALISED = "specialised"
 #: what others call, and where the header keeps its address
 ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 #: what this process compiles first and the second one last: the others have kernels in common, compiled once each
@@ -60,6 +63,7 @@ class Entry:
         for name, place in ADDRESSES.items():
             module = self.modules.get(name)
             h[place] = getattr(module, name).address if module else 0
+        h[m.RATES] = h[m.EVALUATE]
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
         """Slope of the state in Y at time t, into the first row of SLOPES."""
@@ -97,7 +101,15 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     """The compiled functions for these parts; `tell` hears of what has to be compiled."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     with disk_limits(folder):
-        return Entry(_modules(folder, sources(parts, scheme), tell, began))
+        return Entry(_modules(folder, sources.sources(parts, scheme), tell, began))
+
+
+def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None]) -> int:
+    """Address of the right-hand side for one wiring; UnsuitedError when there is none."""
+    folder, began = writable(kernel_root(), tell), time.monotonic()
+    with disk_limits(folder):
+        found = _modules(folder, {SPECIALISED: sources.specialised(parts, wiring)}, tell, began)
+    return int(found[SPECIALISED].specialised.address)
 
 
 def _modules(folder: Path, texts: dict[str, str], tell: Callable[[str], None], began: float) -> dict[str, ModuleType]:

@@ -28,6 +28,7 @@ from flexclear.pipeline.dynamics.effects import (
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 DYNAMICS = "flexclear.pipeline.dynamics"
 #: what others are called by
@@ -51,6 +52,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
     Raises InputError when a name is not listed in its family.
     """
     found = {part.module for part in named(scene)}
+    found |= _reached(specialised(most_parts(scene), ()))
     for scheme in schemes(scene):
         for source in sources(most_parts(scene), scheme).values():
             found |= _reached(source)
@@ -62,6 +64,20 @@ def _reached(source: str) -> frozenset[str]:
     """Modules that a generated file imports; many scenes share one, and every command asks this of each."""
     names, _ = imported(source.encode(), "entry", package=False)
     return frozenset(name for name in names if source_file(TREE, name))  # others are in modules
+
+
+def specialised(parts: Parts, wiring: Wiring) -> str:
+    """Source of the right-hand side for one wiring."""
+    given, imports = _forces(parts)
+    if parts.closures:
+        given["closures"] = _closures(imports, parts)
+    maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
+    _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
+    _import(imports, f"{DYNAMICS}.specialise.straight", "straight")
+    harmonics = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate") if parts.harmonics else ""
+    what = f"right-hand side of {', '.join(parts.joints)}, for one wiring"
+    wired = "".join(f"    {row},\n" for row in wiring)
+    return _file(what, imports, "rates", maker, given, SPECIALISED.format(harmonics=harmonics, wiring=wired))
 
 
 def _evaluate(parts: Parts) -> str:
@@ -108,7 +124,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     imports: Imports = []
     given = {
-        "evaluate": "calls.evaluate",
+        "evaluate": "calls.evaluate" if integrators.INTEGRATORS[scheme.integrator].reads_all else "calls.rates",
         "project": _projection(imports, parts),
         "retract": "calls.retract",
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),
@@ -199,6 +215,18 @@ def _file(what: str, imports: Imports, result: str, maker: str, given: dict[str,
 EVALUATE = """@calls.exported("evaluate")
 def evaluate(h, f, w, n, t, y, dy):
     right_hand_side(h, f, w, n, t, y, dy)
+    return 0
+"""
+# laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
+SPECIALISED = """WIRING = (
+{wiring})
+laws, along = make_laws({harmonics}), straight(rates, WIRING)
+
+
+@calls.exported("evaluate")
+def specialised(h, f, w, n, t, y, dy):
+    laws(h, f, w, n, t)
+    along(h, f, w, n, y, dy)
     return 0
 """
 PROJECT = """@calls.exported("project")

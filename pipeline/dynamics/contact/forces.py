@@ -175,10 +175,14 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
         push(h, w, outer, p_WQ, scale(-1.0, force))
 
     @kernel
+    def contact(h, f, w, n, c):
+        axis, turning = measure(h, f, w, c)
+        if n[n[m.MODE] + c] == 1:
+            forces(h, f, w, n, c, axis, turning)
+
+    @kernel
     def contacts(h, f, w, n):
         for c in range(h[m.N_SURFACES]):
-            axis, turning = measure(h, f, w, c)
-            if n[n[m.MODE] + c] == 1:
-                forces(h, f, w, n, c, axis, turning)
+            contact(h, f, w, n, c)
 
     return contacts

@@ -35,10 +35,14 @@ def wearing(contacts: Callable) -> Callable:
         w[slots + m.WEAR_LEDGER.load_path] = speed * w[o + m.TOUCH.normal_force]
 
     @kernel
+    def wear_if_closed(h, f, w, n, k):
+        if n[n[m.MODE] + m.WORN.contact(h, k)] == 1:
+            wear(h, f, w, k)
+
+    @kernel
     def with_wear(h, f, w, n):
         contacts(h, f, w, n)
         for k in range(h[m.N_WORN]):
-            if n[n[m.MODE] + m.WORN.contact(h, k)] == 1:
-                wear(h, f, w, k)
+            wear_if_closed(h, f, w, n, k)
 
     return with_wear

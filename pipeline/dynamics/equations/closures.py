@@ -83,13 +83,14 @@ def spread(h, w, c):
         first, row, mine = m.ENVELOPE.first(h, i), base(h, h[m.ENVELOPE.place], h[m.MASS], i), S + count * a
         for r in range(count):
             w[mine + r] = w[J + count * a + r]
-        for b in range(a):
+        for b in range(a - 1, -1, -1):
             k = m.SUPPORT.coordinate(h, support + b)
-            if k >= first:
-                l_ik, other = w[row + k], S + count * b
-                for r in range(count):
-                    w[mine + r] -= l_ik * w[other + r]
-        inverse = 1.0 / w[row + i]
+            if k < first:
+                break  # in increasing order
+            l_ik, other = w[row + k], S + count * b
+            for r in range(count):
+                w[mine + r] -= l_ik * w[other + r]
+        inverse = w[row + i]
         for r in range(count):
             w[mine + r] *= inverse
 
@@ -132,7 +133,7 @@ def independence(h, w):
     """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
     least = 1.0
     for r in range(h[m.N_KEPT_ROWS]):
-        pivot = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r] ** 2
+        pivot = 1.0 / w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r] ** 2
         o = h[m.ROW_SCALE] + r
         least = min(least, pivot / max(w[o], w[o + h[m.N_CLOSURE_ROWS]]))
     return least

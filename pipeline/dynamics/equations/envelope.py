@@ -3,7 +3,8 @@
 In the order "descendants before ancestors" the mass matrix of a tree has no fill outside this
 envelope (Featherstone, *Rigid Body Dynamics Algorithms*, sec. 6.5), so that the cost follows the
 branches of the mechanism. A matrix lies in w from place `a`; its row table (first column, start)
-in h from place `e`, for `n` rows.
+in h from place `e`, for `n` rows. On its diagonal a factor L holds the reciprocals 1/L_ii, by which all that it is
+applied to multiplies.
 """
 
 from __future__ import annotations
@@ -21,12 +22,12 @@ def base(h, e, a, i):
 
 @kernel
 def factor(h, e, w, a, n, threshold):
-    """Overwrite a symmetric matrix with its factor L; returns the smallest pivot ratio.
+    """Overwrite a symmetric matrix with its factor L, reciprocals on the diagonal; returns the smallest pivot ratio.
 
     A pivot is compared with its diagonal entry before elimination; a result <= threshold means
     that the matrix is not positive definite to working precision, and the factor is unusable.
     """
-    worst = 1.0
+    worst, sound = 1.0, True
     for i in range(n):
         first, row = h[e + 2 * i], base(h, e, a, i)
         diagonal = w[row + i]
@@ -35,16 +36,15 @@ def factor(h, e, w, a, n, threshold):
             total = w[row + j]
             for k in range(max(first, h[e + 2 * j]), j):
                 total -= w[row + k] * w[other + k]
-            w[row + j] = total / w[other + j]
+            w[row + j] = total * w[other + j]
         pivot = diagonal
         for k in range(first, i):
             pivot -= w[row + k] * w[row + k]
         ratio = pivot / diagonal
-        if not ratio > threshold:
-            return ratio
+        sound = sound & (ratio > threshold)  # not so of NaN
         worst = min(worst, ratio)
-        w[row + i] = np.sqrt(pivot)
-    return worst
+        w[row + i] = 1.0 / np.sqrt(pivot)
+    return worst if sound else 0.0
 
 
 @kernel
@@ -53,8 +53,9 @@ def multiply(h, e, w, a, n):
     for i in range(n - 1, -1, -1):
         first, row = h[e + 2 * i], base(h, e, a, i)
         for j in range(i, first - 1, -1):
-            other, total = base(h, e, a, j), 0.0
-            for k in range(max(first, h[e + 2 * j]), j + 1):
+            other = base(h, e, a, j)
+            total = 1.0 / w[row + i] ** 2 if j == i else w[row + j] / w[other + j]
+            for k in range(max(first, h[e + 2 * j]), j):
                 total += w[row + k] * w[other + k]
             w[row + j] = total
 
@@ -67,7 +68,7 @@ def forward(h, e, w, a, n, b):
         total = w[b + i]
         for k in range(h[e + 2 * i], i):
             total -= w[row + k] * w[b + k]
-        w[b + i] = total / w[row + i]
+        w[b + i] = total * w[row + i]
 
 
 @kernel
@@ -75,7 +76,7 @@ def backward(h, e, w, a, n, b):
     """L^-T applied to the vector in w from place b."""
     for i in range(n - 1, -1, -1):
         row = base(h, e, a, i)
-        value = w[b + i] / w[row + i]
+        value = w[b + i] * w[row + i]
         w[b + i] = value
         for k in range(h[e + 2 * i], i):
             w[b + k] -= w[row + k] * value

@@ -13,8 +13,18 @@ def no_harmonics(h, f, w, law, piece, s):
     """Polynomials only."""
 
 
-def make_known_motion(harmonics: Callable | None = None) -> Callable:
-    """The kernel known_motion(h, f, w, n, t); harmonics(h, f, w, law, piece, s) adds to value, rate, second rate."""
+@kernel
+def prescribe(h, w):
+    """Prescribed coordinates, speeds and accelerations from their laws, which are the first ones."""
+    for d in range(h[m.N_DRIVES]):
+        law = m.LAW.row(h, d)
+        w[h[m.X] + h[m.NQ] + d] = w[law]
+        w[h[m.U] + h[m.NV] + d] = w[law + 1]
+        w[h[m.DU] + h[m.NV] + d] = w[law + 2]
+
+
+def make_laws(harmonics: Callable | None = None) -> Callable:
+    """The kernel laws(h, f, w, n, t); harmonics(h, f, w, law, piece, s) adds to value, rate, second rate."""
     add_harmonics = no_harmonics if harmonics is None else harmonics
 
     @kernel
@@ -33,14 +43,4 @@ def make_known_motion(harmonics: Callable | None = None) -> Callable:
             w[law], w[law + 1], w[law + 2] = x, v, a
             add_harmonics(h, f, w, law, piece, s)
 
-    @kernel
-    def known_motion(h, f, w, n, t):
-        """Prescribed coordinates, speeds and accelerations at time t: the first laws are the drives'."""
-        laws(h, f, w, n, t)
-        for d in range(h[m.N_DRIVES]):
-            law = m.LAW.row(h, d)
-            w[h[m.X] + h[m.NQ] + d] = w[law]
-            w[h[m.U] + h[m.NV] + d] = w[law + 1]
-            w[h[m.DU] + h[m.NV] + d] = w[law + 2]
-
-    return known_motion
+    return laws

@@ -127,6 +127,8 @@ def make_projection(
             worst = max(widest(h, w, h[m.RESIDUAL], True), widest(h, w, h[m.RESIDUAL_RATE], True))
             if worst <= tolerance:
                 return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
+            if n[m.ABRIDGED]:
+                evaluate(h, f, w, n, t, y, dy)  # for its factors
             stiffen(h, f, w, n)
             if n[m.EVALUATION] != m.OK:
                 return -1

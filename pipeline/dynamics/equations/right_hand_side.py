@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.equations.envelope import backward, factor, forward
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
-from flexclear.pipeline.dynamics.equations.prescribed_motion import make_known_motion
+from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import accumulate, at, dot6
 
@@ -114,23 +114,37 @@ def make_forces(
     return forces
 
 
-def make_right_hand_side(
+def make_right_hand_side(harmonics: Callable | None = None, **parts: Any) -> Callable:
+    """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
+
+    harmonics: adds those of the laws of time.  parts: see `make_rates`.
+    """
+    laws, rates = make_laws(harmonics), make_rates(**parts)
+
+    @kernel
+    def evaluate(h, f, w, n, t, y, dy):
+        """Rates dy of the state y at time t, both places in w; n[EVALUATION] says whether it could."""
+        laws(h, f, w, n, t)
+        rates(h, f, w, n, y, dy)
+
+    return evaluate
+
+
+def make_rates(
     joints: tuple[Any, ...],
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
     stops: Callable | None = None,
     closures: Any = None,
-    harmonics: Callable | None = None,
     friction: tuple[Callable, Callable] | None = None,
 ) -> Callable:
-    """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
+    """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
     joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels
-    that apply them.  closures: the module of that name.  harmonics: adds those of the laws of time.  friction: of ideal
-    joints, on accelerations and on drives (`equations.joint_friction`).
+    that apply them.  closures: the module of that name.  friction: of ideal joints, on accelerations and on drives
+    (`equations.joint_friction`).
     """
-    known_motion = make_known_motion(harmonics)
     kinematics = make_kinematics(joints, flexible)
     forces = make_forces(flexible, contacts, loads, stops)
     port_load = no_link_load if flexible is None else flexible.port_load
@@ -165,7 +179,7 @@ def make_right_hand_side(
         modal(h, w)
 
     @kernel
-    def rates(h, w, dy):
+    def store_rates(h, w, dy):
         """Positions' rates, accelerations, and the ledger's powers."""
         power = 0.0
         for d in range(h[m.N_DRIVES]):
@@ -179,11 +193,10 @@ def make_right_hand_side(
             w[dy + h[m.NQ] + h[m.NV] + k] = w[h[m.LEDGER_RATE] + k]
 
     @kernel
-    def evaluate(h, f, w, n, t, y, dy):
-        """Rates dy of the state y at time t, both places in w; n[EVALUATION] says whether it could."""
-        n[m.STATE] = y
+    def rates(h, f, w, n, y, dy):
+        n[m.STATE], n[m.ABRIDGED] = y, 0
         spread_state(h, w, y)
-        known_motion(h, f, w, n, t)
+        prescribe(h, w)
         for k in range(h[m.N_LEDGER]):
             w[h[m.LEDGER_RATE] + k] = 0.0
         kinematics(h, f, w)
@@ -204,6 +217,6 @@ def make_right_hand_side(
         drive_forces(h, w)
         known_forces(h, w)
         rub_drives(h, w)
-        rates(h, w, dy)
+        store_rates(h, w, dy)
 
-    return evaluate
+    return rates

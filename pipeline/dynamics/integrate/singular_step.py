@@ -42,7 +42,7 @@ TIGHTLY = 1e-15
 @kernel
 def pivot(h, w, r):
     """How far kept row r is from depending on those before it, in the state just evaluated: a length in M^-1."""
-    return abs(w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r])
+    return 1.0 / abs(w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r])
 
 
 @kernel

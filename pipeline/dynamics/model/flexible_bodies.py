@@ -15,6 +15,8 @@ from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
 NEGLIGIBLE = 1e-13
+#: so is a product of inertia of two modes, of unit modal mass, below this: it is a sum over all elements
+UNCOUPLED = 1e-11
 
 
 def fill(numbering: Numbering) -> dict[Any, Any]:
@@ -31,7 +33,7 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         if any_shortened:
             chunk = np.concatenate([chunk, *_forms(mechanism, i, len(q))])
         moves = int(_inboard_moves(mechanism, i))
-        flex.append((i, len(q), q.start, c.start, data0, moment0, len(moments), moves))
+        flex.append((i, len(q), q.start, c.start, data0, moment0, len(moments), moves, int(coupled(mechanism, i))))
         flex_real.append(
             [float(bundle["mass"]), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
         )
@@ -173,6 +175,15 @@ def _inboard_moves(mechanism: Mechanism, link: int) -> bool:
     _, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
     drawn = bow(mechanism, link, frame)
     return any(np.any(shape) for shape in [*shapes, *([] if drawn is None else [drawn])])
+
+
+def coupled(mechanism: Mechanism, link: int) -> bool:
+    """Whether modes of a flexible link share entries of the mass matrix of its own.
+
+    They do where they move the frame by which it hangs in the tree, and with it the whole body.
+    """
+    mass = _body(mechanism, link)[1]["modal_mass"].values
+    return _inboard_moves(mechanism, link) or bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
 
 
 def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:

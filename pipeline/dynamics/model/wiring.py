@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model import arrays
+from flexclear.pipeline.dynamics.model import arrays, flexible_bodies
 from flexclear.pipeline.dynamics.model.couplings import Coupling
 from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.numbering import Numbering
@@ -35,8 +35,8 @@ def mass_entries(numbering: Numbering) -> dict[Any, Any]:
     for _, _, c, d in products:
         if c < numbering.nv and d < numbering.nv:
             first[max(c, d)] = min(first[max(c, d)], c, d)
-    for modes in numbering.modal_coordinates.values():
-        for c in modes:
+    for link, modes in numbering.modal_coordinates.items():
+        for c in modes if flexible_bodies.coupled(numbering.mechanism, link) else ():
             first[c] = min(first[c], modes.start)
     start, rows = 0, []
     for i, f in enumerate(first):

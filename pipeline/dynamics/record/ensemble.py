@@ -26,6 +26,8 @@ from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.singular import select_rows
+from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
@@ -42,6 +44,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     engine, other = engines(scene, bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
+    select_rows(engine, start, engine.start)
+    specialise(engine, progress)
     jacobian = offset_jacobian(engine, start)
     offsets = ball_offsets(engine.model, wanted, wanted.members)
     starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]

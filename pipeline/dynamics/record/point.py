@@ -67,6 +67,7 @@ class Runner:
     def _values(self, scene: Scene) -> tuple[Values, Values, int]:
         engine, other = engines_alike(self.engine, scene, self.bundles)
         self.engine = self.engine or engine
+        engine.straight.wanted = True
         if in_sections(self.kept):
             values, count = _sections(engine, self.kept)
             return values, {}, count

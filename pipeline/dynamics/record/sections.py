@@ -52,6 +52,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
     names = kept_bodies(engine.model, wanted.bodies, "[sections.bodies]")
     start = consistent_start(engine)
+    engine.straight.wanted = True
     parts = stretches(engine, period, wanted.phase)
     require_periodic(parts, start)
     count = wanted.transient + wanted.periods

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -29,12 +29,26 @@ from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 SHORTEST_SEGMENT = 1e-12
 
 
+@dataclass
+class Straight:
+    """Code for one wiring (`run.specialised`), shared by the engines of one work space.
+
+    wanted: whether all integrations shall use it.  used: whether the present one does.
+    addresses: where it is, by the closure rows that it solves for; 0: nowhere.
+    """
+
+    wanted: bool = False
+    used: bool = False
+    addresses: dict[bytes, int] = field(default_factory=dict)
+
+
 @dataclass(frozen=True)
 class Engine:
     """One per run: the work space is not shared.
 
     h: wiring with the rows solved for.  w, n: floats and integers of the work space.  lengths: of the stretches of w.
     kept: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
+    straight: code for this wiring alone.
     """
 
     model: Model
@@ -49,6 +63,7 @@ class Engine:
     start: float
     end: float
     rtol: float
+    straight: Straight
 
     @cached_property
     def breaks(self) -> np.ndarray:
@@ -90,6 +105,12 @@ class Engine:
         self.kept[:] = rows
         selection.write(self.model, self.h, self.kept)
         self.view(m.ROW_SCALE)[: len(rows)] = 0.0
+        self.connect()
+
+    def connect(self) -> None:
+        """Let the steps evaluate with straight code where there is some for the rows solved for."""
+        found = self.straight.addresses.get(self.kept.tobytes()) if self.straight.used else None
+        self.h[m.RATES] = found or self.h[m.EVALUATE]
 
     def view(self, place: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
@@ -134,18 +155,24 @@ class Engine:
         self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, t, repeat)
         return bool(self.n[m.EVALUATION] == m.OK)
 
+    def complete(self) -> None:
+        """See that the work space holds all of an evaluation, if need be of the state that the last step came to."""
+        if self.n[m.ABRIDGED]:
+            self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, float(self.control[m.TIME]))
+
     def mass_factor(self) -> np.ndarray:
         """L of the mass matrix M = L L^T that the last evaluation left in its envelope, shape (nv, nv)."""
         L, entries = np.zeros((self.model.nv,) * 2), self.view(m.MASS)
         for i, (first, start) in enumerate(self.model.arrays.table(m.ENVELOPE)):
             L[i, first : i + 1] = entries[start : start + i + 1 - first]
+            L[i, i] = 1.0 / L[i, i]
         return L
 
     def independence(self) -> np.ndarray:
         """How far each kept closure row is from depending on those before it, at the last evaluated state."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
         diagonal = envelope["start"] - envelope["first"] + np.arange(len(envelope))
-        return np.abs(self.view(m.SCHUR)[diagonal])
+        return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
 
     def rows(self, stored: int) -> np.ndarray:
         """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
@@ -168,14 +195,16 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     solver, space = model.scene.solver, model.arrays.work_space(method.room)
     entry.connect(space.h)
     kept, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol)
+    engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol, Straight())
     engine.control[m.LENGTH] = model.length
     return engine
 
 
 def another(engine: Engine) -> Engine:
     """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
-    return assemble(engine.model, engine.entry, engine.method, engine.mobility)
+    made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
+    made.straight.wanted, made.straight.addresses = engine.straight.wanted, engine.straight.addresses.copy()
+    return made
 
 
 def may_start_singular(model: Model) -> bool:

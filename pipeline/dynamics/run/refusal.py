@@ -20,6 +20,7 @@ OFTEN = 0.05
 
 def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
+    engine.complete()
     control, n, contacts = engine.control, engine.n, engine.model.contacts
     if n[m.STATUS] in LOOPS and jammed(engine):
         return f"at t = {control[m.TIME]:.6g} s: {explanation(engine)}"

@@ -159,7 +159,8 @@ def follow(
         except StiffError as stiff:
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
-            engine, left = other(heir), stiff.handover
+            wanted, engine, left = engine.straight.wanted, other(heir), stiff.handover
+            engine.straight.wanted = wanted
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:

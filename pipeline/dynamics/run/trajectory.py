@@ -20,6 +20,7 @@ from flexclear.pipeline.dynamics.run.pace import Judge, crawls
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
+from flexclear.pipeline.dynamics.run.specialised import settle
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
 
 #: evaluations between two looks at the clock and the keyboard
@@ -166,6 +167,7 @@ def _advance(
 ) -> None:
     """From segment to segment to the end; resumed: the first of them has been begun in an earlier attempt."""
     sample, control = _sampler(engine), engine.control
+    settle(engine, progress)
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
@@ -299,6 +301,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
         elif reason := judge.verdict(engine):
             raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
         else:
+            settle(engine, progress)
             _warn(engine, tape, progress)
             if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):
                 return True

@@ -78,7 +78,15 @@ def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
 
 
 def doubts(engine: Engine) -> list[str]:
-    """The same of the state that the engine evaluated last."""
+    """The same of the state that the engine's last step came to; the engine is left as it was."""
+    before = engine.w.copy(), engine.n.copy()
+    engine.complete()
+    sentences = _doubts(engine)
+    engine.w[:], engine.n[:] = before
+    return sentences
+
+
+def _doubts(engine: Engine) -> list[str]:
     coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
     finite = np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.place)))
     if not finite:

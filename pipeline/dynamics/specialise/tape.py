@@ -1,0 +1,263 @@
+"""A computation as it happens: arithmetic on symbols writes what it does on a tape.
+
+The tape is a tree of blocks: operations in their order, and branches, each with two blocks and what they leave behind.
+Equal operations are written once, and what numbers of the wiring make trivial (times zero, plus zero) not at all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+#: kinds of values: float64, int64, bit
+FLOAT, INTEGER, BIT = "float", "integer", "bit"
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+
+
+class UnsuitedError(Exception):
+    """There is no straight code for a wiring, or none that would be faster."""
+
+
+class Undecided(Exception):  # noqa: N818  (not an error: how a branch leaves the function that met it)
+    """A branch that depends on a symbol."""
+
+    def __init__(self, condition: Symbol) -> None:
+        super().__init__()
+        self.condition = condition
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Symbol:
+    """A value that is known only when the code runs: an operation, and what it is applied to.
+
+    number: in the order of their making, by which operands are ordered: equal wirings give equal code.
+    """
+
+    tape: Tape
+    number: int
+    kind: str
+    operation: str
+    arguments: tuple[Any, ...]
+
+    def __add__(self, other: Any) -> Any:
+        return self.tape.add(self, other)
+
+    def __radd__(self, other: Any) -> Any:
+        return self.tape.add(other, self)
+
+    def __sub__(self, other: Any) -> Any:
+        return self.tape.subtract(self, other)
+
+    def __rsub__(self, other: Any) -> Any:
+        return self.tape.subtract(other, self)
+
+    def __mul__(self, other: Any) -> Any:
+        return self.tape.multiply(self, other)
+
+    def __rmul__(self, other: Any) -> Any:
+        return self.tape.multiply(other, self)
+
+    def __truediv__(self, other: Any) -> Any:
+        return self.tape.divide(self, other)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return self.tape.divide(other, self)
+
+    def __pow__(self, other: Any) -> Any:
+        square = not isinstance(other, Symbol) and other == 2
+        return self.tape.multiply(self, self) if square else self.tape.write(FLOAT, "pow", self, other)
+
+    def __neg__(self) -> Any:
+        return self.tape.negate(self)
+
+    def __abs__(self) -> Any:
+        return self.tape.write(FLOAT, "fabs", self)
+
+    def __lt__(self, other: Any) -> Any:
+        return self.tape.write(BIT, "<", self, other)
+
+    def __le__(self, other: Any) -> Any:
+        return self.tape.write(BIT, "<=", self, other)
+
+    def __gt__(self, other: Any) -> Any:
+        return self.tape.write(BIT, ">", self, other)
+
+    def __ge__(self, other: Any) -> Any:
+        return self.tape.write(BIT, ">=", self, other)
+
+    def __eq__(self, other: object) -> Any:
+        return self.tape.write(BIT, "==", self, other)
+
+    def __ne__(self, other: object) -> Any:
+        return self.tape.write(BIT, "!=", self, other)
+
+    def __and__(self, other: Any) -> Any:
+        return self.tape.both(self, other)
+
+    __rand__ = __and__
+    __hash__ = object.__hash__
+
+    def __bool__(self) -> bool:
+        return self.tape.decide(self)
+
+
+@dataclass
+class Branch:
+    """Two blocks of which one runs; joins: what they leave, (symbol after it, value of the first, of the second)."""
+
+    condition: Symbol
+    blocks: tuple[list[Any], list[Any]]
+    joins: list[tuple[Symbol, Any, Any]] = field(default_factory=list)
+
+
+class Tape:
+    """What has been computed; `block` is where the next operation goes."""
+
+    def __init__(self, decide: Callable[[Symbol], bool], longest: int) -> None:
+        self.decide, self.longest, self.count = decide, longest, 0
+        self.block: list[Any] = []
+        #: known: operations that have been done on the way to here; scopes: which of them began in each open block
+        self._known: dict[Any, Symbol] = {}
+        self._scopes: list[list[Any]] = [[]]
+
+    def write(self, kind: str, operation: str, *arguments: Any) -> Symbol:
+        """The symbol of an operation, which joins the tape if it is new."""
+        key = (operation, *(id(a) if isinstance(a, Symbol) else (type(a), a) for a in arguments))
+        found = self._known.get(key)
+        if found is None:
+            found = self._known[key] = self._symbol(kind, operation, arguments)
+            self._scopes[-1].append(key)
+            self.block.append(found)
+            if self.count > self.longest:
+                raise UnsuitedError("the computation is too long")
+        return found
+
+    def _symbol(self, kind: str, operation: str, arguments: tuple[Any, ...]) -> Symbol:
+        self.count += 1
+        return Symbol(self, self.count, kind, operation, arguments)
+
+    def add(self, a: Any, b: Any) -> Any:
+        """The sum."""
+        if not isinstance(a, Symbol):
+            a, b = b, a
+        if not isinstance(b, Symbol) and b == 0:
+            return a
+        if INTEGER in (a.kind, getattr(b, "kind", FLOAT)):
+            return self.write(INTEGER, "iadd", a, b)
+        if _negative(b):
+            return self.subtract(a, b.arguments[0])
+        if _negative(a):
+            return self.subtract(b, a.arguments[0])
+        return self.write(FLOAT, "add", *_ordered(a, b))
+
+    def subtract(self, a: Any, b: Any) -> Any:
+        """The difference."""
+        if not isinstance(a, Symbol) and a == 0:
+            return self.negate(b)
+        if not isinstance(b, Symbol) and b == 0:
+            return a
+        if a is b:
+            return 0.0
+        if _negative(b):
+            return self.add(a, b.arguments[0])
+        if _negative(a):
+            return self.negate(self.add(a.arguments[0], b))
+        return self.write(FLOAT, "sub", a, b)
+
+    def negate(self, a: Any) -> Any:
+        """Minus a."""
+        if not isinstance(a, Symbol):
+            return -a
+        if _negative(a):
+            return a.arguments[0]
+        return self.write(FLOAT, "sub", a.arguments[1], a.arguments[0]) if a.operation == "sub" else self._minus(a)
+
+    def _minus(self, a: Symbol) -> Symbol:
+        return self.write(FLOAT, "neg", a)
+
+    def multiply(self, a: Any, b: Any) -> Any:
+        """The product."""
+        if not isinstance(a, Symbol):
+            a, b = b, a
+        if not isinstance(b, Symbol):
+            if a.kind == INTEGER:
+                return self.write(INTEGER, "imul", a, b)
+            if b == 0:
+                return 0.0
+            if b == 1:
+                return a
+            if b == -1:
+                return self.negate(a)
+        if _negative(a):
+            return self.negate(self.multiply(a.arguments[0], b))
+        if _negative(b):
+            return self.negate(self.multiply(a, b.arguments[0]))
+        return self.write(FLOAT, "mul", *_ordered(a, b))
+
+    def divide(self, a: Any, b: Any) -> Any:
+        """The quotient, by a reciprocal that others may share."""
+        if not isinstance(b, Symbol):
+            return self.multiply(a, 1.0 / b)
+        if _negative(b):
+            return self.negate(self.divide(a, b.arguments[0]))
+        return self.multiply(self.write(FLOAT, "reciprocal", b), a)
+
+    def both(self, a: Any, b: Any) -> Any:
+        """Whether both hold."""
+        if not isinstance(a, Symbol):
+            return b if a else False
+        if not isinstance(b, Symbol):
+            return a if b else False
+        return self.write(BIT, "and", a, b)
+
+    def select(self, condition: Any, a: Any, b: Any) -> Any:
+        """The first where the condition holds, else the second; both have been computed."""
+        if not isinstance(condition, Symbol):
+            return a if condition else b
+        return a if same(a, b) else self.write(kind_of(a), "select", condition, a, b)
+
+    # Branches ----------------------------------------------------------------------------------------------------
+
+    @contextmanager
+    def inside(self, block: list[Any]) -> Iterator[None]:
+        """Write into a block; what is computed there is not known outside."""
+        before, self.block = self.block, block
+        self._scopes.append([])
+        try:
+            yield
+        finally:
+            self.block = before
+            for key in self._scopes.pop():
+                del self._known[key]
+
+    def join(self, branch: Branch, a: Any, b: Any) -> Any:
+        """What a place holds after a branch."""
+        if same(a, b):
+            return a
+        joined = self._symbol(kind_of(a), "join", ())
+        branch.joins.append((joined, a, b))
+        return joined
+
+
+def _negative(a: Any) -> bool:
+    return isinstance(a, Symbol) and a.operation == "neg"
+
+
+def _ordered(a: Any, b: Any) -> tuple[Any, Any]:
+    return (a, b) if not isinstance(b, Symbol) or a.number <= b.number else (b, a)
+
+
+def same(a: Any, b: Any) -> bool:
+    """Whether two values are one."""
+    if isinstance(a, Symbol) or isinstance(b, Symbol):
+        return a is b
+    return bool(a == b)
+
+
+def kind_of(a: Any) -> str:
+    """Kind of a symbol or number."""
+    if isinstance(a, Symbol):
+        return a.kind
+    return BIT if isinstance(a, bool) else INTEGER if isinstance(a, int) else FLOAT

@@ -1,0 +1,191 @@
+"""Kernels run in Python on symbols, so that what they compute for one wiring stands on a tape.
+
+Sizes, offsets and tables of h are numbers, so loops are counted and places known while the tape is written; w and f
+hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it stands, and
+what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
+repeated.
+"""
+
+from __future__ import annotations
+
+import builtins
+from collections.abc import Callable
+from types import CellType, FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
+
+#: of NumPy, that kernels apply
+FUNCTIONS = ("sqrt", "sin", "cos", "exp", "tanh", "arctan2", "round", "copysign")
+
+
+class Memory:
+    """An array that is read and written by place; what was not written is loaded when the code runs."""
+
+    def __init__(self, trace: Trace, name: str, kind: str) -> None:
+        self.trace, self.name, self.kind = trace, name, kind
+        self.values: dict[int, Any] = {}
+
+    def __getitem__(self, place: Any) -> Any:
+        if not isinstance(place, Symbol) and place in self.values:
+            return self.values[place]
+        return self.trace.tape.write(self.kind, "load", self.name, place)
+
+    def __setitem__(self, place: int, value: Any) -> None:
+        self.trace.journal.append((self, place, self.values.get(place), value))
+        self.values[place] = value
+
+    def put_back(self, place: int, value: Any) -> None:
+        """Undo a store."""
+        if value is None:
+            del self.values[place]
+        else:
+            self.values[place] = value
+
+
+class Run:
+    """A run of a kernel: how its branches go, and what the kernels that it calls have done."""
+
+    def __init__(self, decisions: list[bool], done: list[Any]) -> None:
+        self.decisions, self.done, self.position, self.decided = decisions, done, 0, 0
+
+
+class Trace:
+    """Writes a tape; `journal` lists stores in their order."""
+
+    def __init__(self, longest: int) -> None:
+        self.tape = Tape(self.decide, longest)
+        self.journal: list[Any] = []
+        self.runs = [Run([], [])]
+        self._plain: dict[int, Any] = {}
+        self._alive: list[Any] = []
+
+    def decide(self, condition: Symbol) -> bool:
+        """How a branch goes in the run that is under way; Undecided when it goes both ways."""
+        run = self.runs[-1]
+        if run.decided == len(run.decisions):
+            raise Undecided(condition)
+        run.decided += 1
+        return run.decisions[run.decided - 1]
+
+    def call(self, function: Callable, arguments: tuple[Any, ...]) -> Any:
+        """Result of a kernel."""
+        caller = self.runs[-1]
+        if caller.position == len(caller.done):
+            start = len(self.journal)
+            result = self._explored(function, arguments, [], [])
+            caller.done.append((result, self.journal[start:]))
+        else:
+            result, stores = caller.done[caller.position]
+            for memory, place, _, value in stores:
+                memory[place] = value
+        caller.position += 1
+        return result
+
+    def _explored(self, function: Callable, arguments: tuple[Any, ...], decisions: list[bool], done: list[Any]) -> Any:
+        """Result of a kernel whose first branches go as said; further ones go both ways."""
+        start, run = len(self.journal), Run(decisions, done)
+        self.runs.append(run)
+        try:
+            return function(*arguments)
+        except Undecided as met:
+            branch = Branch(met.condition, ([], []))
+        finally:
+            self.runs.pop()
+        self._go_back(start)
+        ways = []
+        for block, choice in zip(branch.blocks, (True, False), strict=True):
+            with self.tape.inside(block):
+                result = self._explored(function, arguments, [*decisions, choice], list(run.done))
+            ways.append((result, {(memory, place): value for memory, place, _, value in self.journal[start:]}))
+            self._go_back(start)
+        return self._joined(branch, *ways)
+
+    def _go_back(self, start: int) -> None:
+        while len(self.journal) > start:
+            memory, place, before, _ = self.journal.pop()
+            memory.put_back(place, before)
+
+    def _joined(self, branch: Branch, first: Any, second: Any) -> Any:
+        """What a branch leaves: of stores in memory, and its result."""
+        self.tape.block.append(branch)
+        for memory, place in dict.fromkeys([*first[1], *second[1]]):
+            values = []
+            for block, (_, stores) in zip(branch.blocks, (first, second), strict=True):
+                with self.tape.inside(block):
+                    values.append(stores.get((memory, place), memory[place]))
+            memory[place] = self.tape.join(branch, *values)
+        return self._joined_results(branch, first[0], second[0])
+
+    def _joined_results(self, branch: Branch, a: Any, b: Any) -> Any:
+        if isinstance(a, tuple):
+            return tuple(self._joined_results(branch, x, y) for x, y in zip(a, b, strict=True))
+        return None if a is None else self.tape.join(branch, a, b)
+
+    # Kernels as Python --------------------------------------------------------------------------------------------
+
+    def plain(self, value: Any) -> Any:
+        """What a kernel refers to, with kernels that run on symbols in the place of compiled ones."""
+        if id(value) not in self._plain:
+            self._alive.append(value)
+            self._plain[id(value)] = self._made_plain(value)
+        return self._plain[id(value)]
+
+    def _made_plain(self, value: Any) -> Any:
+        if isinstance(value, Dispatcher):
+            return self._kernel(value.py_func)
+        if isinstance(value, ModuleType):
+            return self._functions() if value is np else _Names(self, value)
+        if isinstance(value, tuple):
+            entries = [self.plain(entry) for entry in value]
+            return type(value)(*entries) if hasattr(value, "_fields") else tuple(entries)
+        return value
+
+    def _kernel(self, function: FunctionType) -> Callable:
+        scope: dict[str, Any] = {"__builtins__": builtins, "max": self.largest, "min": self.smallest}
+        cells = tuple(CellType(self.plain(cell.cell_contents)) for cell in function.__closure__ or ())
+        run = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, cells)
+
+        def traced(*arguments: Any) -> Any:
+            if len(scope) == 3:  # at its first call, for kernels and what they are named like refer to each other
+                known = function.__globals__
+                scope.update({name: self.plain(known[name]) for name in function.__code__.co_names if name in known})
+                scope["_"] = None
+            return self.call(run, arguments)
+
+        return traced
+
+    def _functions(self) -> SimpleNamespace:
+        made = {name: self._function(name) for name in FUNCTIONS}
+        return SimpleNamespace(pi=np.pi, **made)
+
+    def _function(self, name: str) -> Callable:
+        def apply(*arguments: Any) -> Any:
+            if any(isinstance(a, Symbol) for a in arguments):
+                return self.tape.write(FLOAT, name, *arguments)
+            return float(getattr(np, name)(*arguments))
+
+        return apply
+
+    def largest(self, a: Any, b: Any) -> Any:
+        """The larger of two."""
+        return self.tape.select(b > a, b, a)
+
+    def smallest(self, a: Any, b: Any) -> Any:
+        """The smaller of two."""
+        return self.tape.select(b < a, b, a)
+
+
+class _Names:
+    """A module's names, each made plain when it is asked for."""
+
+    def __init__(self, trace: Trace, module: ModuleType) -> None:
+        self._trace, self._module = trace, module
+
+    def __getattr__(self, name: str) -> Any:
+        found = self._trace.plain(getattr(self._module, name))
+        setattr(self, name, found)
+        return found

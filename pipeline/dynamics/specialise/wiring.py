@@ -1,0 +1,68 @@
+"""The wiring of a mechanism as its specialised code depends on it, and what the code keeps apart from it.
+
+Sizes and tables of h, without those that only laws of time and error norms read. Where w and f keep what is none of it:
+stretches of arrays are known by their place in the header, so that one code serves every integrator and any number of
+pieces of laws.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.arrays import Arrays
+
+#: sizes of the header, then the rows of each table of h
+Wiring = tuple[tuple[int, ...], ...]
+#: read by laws of time and error norms alone
+LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS)
+SIZES = m.ADDRESSES[0]
+#: a place is a stretch of an array and where in the stretch; the first stretch is the array itself
+STRETCH = 40
+#: stretches of w that are told by an argument: the state and its rates
+STATE, RATES = m.HEADER + 1, m.HEADER + 2
+
+
+def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
+    """The wiring in h, with the closure rows that are solved for now."""
+    sizes = h[:SIZES].copy()
+    sizes[[m.N_LAWS, m.N_GROUPS]] = 0
+    tables = []
+    for table in m.TABLES["h"]:
+        rows = arrays.table(table, h).view(np.int64).reshape(-1, table.size)
+        if table is m.CLOSURE_ENVELOPE:
+            rows = rows[: h[m.N_KEPT_ROWS]]
+        tables.append(() if table in LEFT_OUT else tuple(rows.ravel().tolist()))
+    return (tuple(sizes.tolist()), *tables)
+
+
+def header(wired: Wiring) -> list[int]:
+    """The array h of a wiring, with a stretch in the place of every offset in f and w."""
+    h = [*wired[0], *((place + 1) << STRETCH for place in range(SIZES, m.HEADER))]
+    for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
+        h[table.place] = len(h)
+        h += rows
+    return h
+
+
+def split(place: int) -> tuple[int, int]:
+    """The header's place of a stretch, -1 of an array itself, and where in it."""
+    return (place >> STRETCH) - 1, place & ((1 << STRETCH) - 1)
+
+
+def start(stretch: int) -> int:
+    """The place where a stretch begins."""
+    return (stretch + 1) << STRETCH
+
+
+def ground(h: list[int]) -> dict[int, Any]:
+    """What w holds of the ground, which no kernel moves: its frame, at rest, and no inertia of its own."""
+    frame, own = h[m.LINK_FRAMES.place], h[m.OWN.place]
+    axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
+    return {
+        **{place: 0.0 for place in range(frame, frame + m.FRAME.size)},
+        **{place: 1.0 for place in axes},
+        **{place: 0.0 for place in range(own, own + m.OWN.size)},
+    }
