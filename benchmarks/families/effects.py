@@ -162,20 +162,27 @@ def _cell(record: Record, name: str) -> str:
 def _answers(found: dict[str, Record]) -> str:
     place, force, peak = (found[name] for name in ("platform.position", "A2.force", "A1.peak_force"))
     ratio = place["play_added"] / place["rod_added"]
-    together = force["rod_interaction"] > max(force["rod_added"], 0.1 * force["play_added"])
+    beyond, chance = force["rod_interaction"], force["rod_interaction_uncertainty"] or 0.0
+    together = beyond > max(chance, force["rod_added"], 0.1 * force["play_added"])
     alone, beside = _cell(place, "rod_added"), _cell(place, "rod_dropped")
     dominates = force["play_added"] > DOMINATES * force["rod_added"]
     lines = [
         f'- "The flexible rod alone does not matter for the pose": it moves the platform by {alone}, the clearance by '
-        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance the rod does matter: taken from both, "
-        f"the mean position changes by {beside}.",
+        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance, "
+        f"where it is taken from both, the mean position changes by {beside}{_told(place, 'rod_dropped')}.",
         f'- "Clearance dominates": alone it moves the platform by {_cell(place, "play_added")} and changes the force '
         f"at A2 by {_cell(force, 'play_added')}, the rod alone by {_cell(force, 'rod_added')}. {_so(dominates)}",
         f'- "Both together are needed for forces": without the rod\'s flexibility the largest force at A1 changes by '
-        f"{_cell(peak, 'rod_dropped')}; at A2 both do {_cell(force, 'rod_interaction')} beyond the sum of each. "
+        f"{_cell(peak, 'rod_dropped')}{_told(peak, 'rod_dropped')}; at A2 both do {_cell(force, 'rod_interaction')} "
+        f"beyond the sum of each{_told(force, 'rod_interaction')}. "
         f"{_so(together)}",
     ]
     return "\n".join(lines)
+
+
+def _told(record: Record, name: str) -> str:
+    """What to think of a difference of means that chance may explain."""
+    return "" if record[name] > (record[f"{name}_uncertainty"] or 0.0) else ", which chance may explain"
 
 
 def _share(value: float) -> str:
