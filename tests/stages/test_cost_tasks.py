@@ -28,8 +28,8 @@ def test_points_are_measured_alone_and_their_kernels_compiled_beforehand_side_by
     ahead = [task for task in in_order([study]) if task.stage == "kernels"]
     assert all(point.exclusive for point in points)
     assert not any(task.exclusive for task in ahead)
-    # three methods with chosen steps, three with fixed ones, and the paper's, whose contacts are not located
-    assert len(ahead) == 7
+    # four methods with chosen steps, three with fixed ones, and the paper's, whose contacts are not located
+    assert len(ahead) == 8
     assert all(point.inputs["kernels"] in ahead for point in points)
     for point in points:
         mine, compiled = (t.params["simulate"]["scene"]["solver"] for t in (point, point.inputs["kernels"]))
