@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.fingerprint import Sources, library_version
 from flexclear.pipeline.core.workflow.task import STORE, in_order
 from flexclear.stages.graph import Graph
 
@@ -64,3 +64,13 @@ def test_every_module_that_runs_is_in_the_key(root: Path, tmp_path: Path, scene:
     known = Sources(root).closure([task.run.partition(":")[0], STORE, *task.modules]).keys()
     assert len(loaded) > 2
     assert loaded <= known
+
+
+def test_the_version_is_known_in_a_checkout_on_the_path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """There the metadata of an editable installation lies beside the sources, as PKG-INFO."""
+    (tmp_path / "some_library.egg-info").mkdir()
+    (tmp_path / "some_library.egg-info" / "PKG-INFO").write_text(
+        "Metadata-Version: 2.4\nName: some_library\nVersion: 1.2\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert library_version("some_library") == "1.2"

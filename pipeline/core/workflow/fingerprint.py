@@ -189,6 +189,8 @@ def _required(package: str) -> tuple[str, ...]:
 @cache
 def _metadata(package: str) -> str | None:
     try:
-        return distribution(DISTRIBUTIONS.get(package, package)).read_text("METADATA") or ""
+        found = distribution(DISTRIBUTIONS.get(package, package))
     except PackageNotFoundError:
         return None
+    # in a checkout that is on the path itself, the program's own stands under its older name
+    return found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
