@@ -6,44 +6,22 @@ looked through.
 """
 
 import os
+from typing import TYPE_CHECKING
 
 if not os.path.isdir(os.path.join(os.path.dirname(__file__), "pipeline")):
     __path__.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
-from flexclear.pipeline import (
-    compare,
-    cost,
-    edited,
-    equilibrium,
-    frequencies,
-    load_scene,
-    open,
-    render,
-    report,
-    run,
-    sections,
-    sweep,
-)
+from flexclear import pipeline
+from flexclear.pipeline import __all__ as __all__
 
-__all__ = [
-    "Scene",
-    "compare",
-    "cost",
-    "edited",
-    "equilibrium",
-    "frequencies",
-    "load_scene",
-    "open",
-    "render",
-    "report",
-    "run",
-    "sections",
-    "sweep",
-]
+if TYPE_CHECKING:
+    from flexclear.pipeline import *  # noqa: F403  (listed there)
 
 
 def __getattr__(name: str) -> object:
-    """`Scene` and the version, which are found when they are asked for."""
-    from flexclear import pipeline
-
+    """The functions of `pipeline`, listed there alone, `Scene` and the version."""
     return getattr(pipeline, name)
+
+
+def __dir__() -> list[str]:
+    return [*globals(), *__all__]

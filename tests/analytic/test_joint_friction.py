@@ -138,7 +138,8 @@ def test_a_block_slides_down_a_slope_and_creeps_where_it_would_stick() -> None:
     assert np.diff(speed("slide"))[2:] == pytest.approx(a * np.diff(t)[2:], rel=1e-8)  # rtol 1e-10, many mechanisms
     load = made().joint_bearing_load.sel(rubbing="slide").values
     assert load == pytest.approx(MASS * G * np.cos(STEEP), rel=1e-12)  # rounding
-    # it has come to its creeping speed within m v_static/(1.5 mu N) = 0.3 ms
+    # it has come to its creeping speed within m v_static/(1.5 mu N) = 0.3 ms; rtol is 1e-10 of speeds of some m/s,
+    # up to ten thousand times this one
     assert speed("creep")[-1] == pytest.approx(creeping(np.tan(FLAT)), rel=1e-6)
 
 
@@ -147,7 +148,7 @@ def test_bristles_hold_a_block_on_a_slope() -> None:
     most = BRISTLES["static"] / BRISTLES["bristle_stiffness"]
     known = -most * np.log(1.0 - np.tan(FLAT) / BRISTLES["static"])
     at = made()["joint_position"].sel(coordinate="bristle").values
-    # the slow root of their motion, 37/s, leaves exp(-11) = 2e-5 of it
+    # the slow root of their motion, 37/s, leaves exp(-11) = 2e-5 of it, or some times that
     assert at[-1] == pytest.approx(known, rel=5e-4)
     assert abs(speed("bristle")[-1]) < 1e-2 * speed("creep")[-1]
 
@@ -158,7 +159,7 @@ def test_a_guide_locks_where_twice_the_coefficient_times_the_arm_of_the_push_exc
     assert np.diff(speed("free"))[2:] == pytest.approx(PUSH / MASS * (1.0 - share) * np.diff(t)[2:], rel=1e-8)
     # the locked one only creeps, at the speed where its friction carries the push, whatever that is
     share = 0.5 / np.hypot(ARMS["locked"] / LENGTH, 0.5 * MASS * G / PUSH)
-    assert speed("locked")[-1] == pytest.approx(creeping(share), rel=1e-6)
+    assert speed("locked")[-1] == pytest.approx(creeping(share), rel=1e-6)  # as of the one that creeps
 
 
 def test_wheel_ball_and_motor_feel_the_moment_of_their_weight() -> None:

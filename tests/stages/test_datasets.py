@@ -141,3 +141,8 @@ def test_units_are_those_of_each_entry_where_some_slide_and_others_turn(root: Pa
     alike = simulate(load_scene(root / "scenes" / "checks" / "pendulum.toml", {"time.end": 0.01}), {}, silent)
     assert alike["joint_position"].attrs["units"] == "rad"
     assert "joint_position_units" not in alike.coords
+
+
+def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
+    assert set(fc.__all__) == set(fc.pipeline.__all__) <= set(dir(fc))
+    assert all(getattr(fc, name) is getattr(fc.pipeline, name) for name in fc.__all__)

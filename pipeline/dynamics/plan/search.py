@@ -87,6 +87,14 @@ class Search:
         """Write down what becomes of an effect."""
         self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
 
+    def judge(
+        self, effect: Effect, small: bool, why: str, most: Mapping[str, float], apart: Mapping[str, Influence]
+    ) -> None:
+        """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there."""
+        difference = {name: influence.difference for name, influence in apart.items()}
+        uncertainty = {name: influence.uncertainty for name, influence in apart.items()}
+        self.decide(effect, not small, PILOT, why if small else _too_much(most, self.wanted), difference, uncertainty)
+
 
 def plan(
     scene: Scene,
@@ -198,10 +206,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         for name, bound in _sum((reach[e.name] for e in trial), search.wanted).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
-        estimate = {name: i.difference for name, i in apart.items()}
-        doubt = {name: i.uncertainty for name, i in apart.items()}
-        reason = "its impacts change what is asked for by less" if small else _too_much(most, search.wanted)
-        search.decide(effect, not small, PILOT, reason, estimate, doubt)
+        search.judge(effect, small, "its impacts change what is asked for by less", most, apart)
         if small:
             dropped = trial
             left = most
@@ -265,15 +270,7 @@ def _flexibilities(
         apart = _with_doubt(search, search.pilots.between(variant, there), False)
         most = {name: i.most for name, i in apart.items()}
         small = search.fits(most)
-        reason = "its deformation changes what is asked for by less" if small else _too_much(most, search.wanted)
-        search.decide(
-            effect,
-            not small,
-            PILOT,
-            reason,
-            {name: i.difference for name, i in apart.items()},
-            {name: i.uncertainty for name, i in apart.items()},
-        )
+        search.judge(effect, small, "its deformation changes what is asked for by less", most, apart)
         if small:
             dropped, left = trial, most
     if dropped:
@@ -309,14 +306,7 @@ def _beside_impacts(
     if small:
         search.spend(most)
     for effect in soft:
-        search.decide(
-            effect,
-            not small,
-            PILOT,
-            "with or without bending the loose joints do the same" if small else _too_much(most, search.wanted),
-            {name: i.difference for name, i in apart.items()},
-            {name: i.uncertainty for name, i in apart.items()},
-        )
+        search.judge(effect, small, "with or without bending the loose joints do the same", most, apart)
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
@@ -344,14 +334,7 @@ def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -
         if small:
             search.spend(most)
             gone.append(effect)
-        search.decide(
-            effect,
-            not small,
-            PILOT,
-            "it does next to nothing" if small else _too_much(most, search.wanted),
-            {name: i.difference for name, i in apart.items()},
-            {name: i.uncertainty for name, i in apart.items()},
-        )
+        search.judge(effect, small, "it does next to nothing", most, apart)
 
 
 def _modes(search: Search) -> dict[str, int]:
