@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from scipy.optimize import brentq
+from flexclear.pipeline.core.roots import brent
 
 #: nearest to 1 that psi(-y) may come; beyond it 1 - y is rounding
 NEAREST = 1.0 - 2.0**-53
@@ -33,7 +33,7 @@ def delivered(a: float) -> float:
     wanted = psi(a)
     if wanted >= psi(-NEAREST):
         return 1.0 / a
-    return float(brentq(lambda y: psi(-y) - wanted, 0.0, NEAREST, xtol=1e-300, rtol=1e-15)) / a
+    return float(brent(lambda y: psi(-y) - wanted, 0.0, NEAREST, xtol=1e-300, rtol=1e-15)) / a
 
 
 def factor(e: float) -> float:
@@ -48,7 +48,7 @@ def factor(e: float) -> float:
 
     if defect(NEAREST) >= 0.0:
         return NEAREST / e
-    return float(brentq(defect, 0.5 * e * (1.0 - e), NEAREST, xtol=1e-300, rtol=1e-15)) / e
+    return float(brent(defect, 0.5 * e * (1.0 - e), NEAREST, xtol=1e-300, rtol=1e-15)) / e
 
 
 def linear_delivered(zeta: float) -> float:
@@ -73,4 +73,4 @@ def damping_ratio(e: float) -> float:
     if e <= 0.0:
         raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
     # beyond 1 the restitution falls below (2 zeta)^-2, so that this is enough
-    return float(brentq(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5, xtol=1e-300, rtol=1e-15))
+    return float(brent(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5, xtol=1e-300, rtol=1e-15))

@@ -141,7 +141,7 @@ class Lever:
 
 
 def _lever(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
-    G = misfit(model.mechanism, list(joints), poses).gradient.toarray()
+    G = misfit(model.mechanism, list(joints), poses).gradient().toarray()
     u, s, vt = np.linalg.svd(G)
     rank = int(np.sum(s > RANK * s.max(initial=0.0)))
     response = -(vt[:rank].T / s[:rank]) @ u[:, :rank].T

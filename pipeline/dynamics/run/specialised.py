@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from threading import Lock
 
-from numba import config
-
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
@@ -47,7 +46,7 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
 def _make(engine: Engine, progress: Progress) -> None:
     """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster."""
     known, kept = engine.straight.addresses, engine.kept.tobytes()
-    if config.DISABLE_JIT or engine.model.parts.joint_frictions or engine.method.traits.reads_all:
+    if INTERPRETED or engine.model.parts.joint_frictions or engine.method.traits.reads_all:
         return
     if kept in known or len(known) >= SELECTIONS:
         return
