@@ -47,6 +47,8 @@ COMPRESSED = 1 << 26
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
+#: what this process has written last and read back, by its sha256, until it is loaded
+_READ_BACK: dict[str, xr.Dataset] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -120,13 +122,19 @@ class Store:
         return record
 
     def load(self, record: Record) -> xr.Dataset:
-        """The main file as a Dataset in memory. The bytes that were checked are those that are parsed."""
+        """The main file as a Dataset in memory. The bytes that were checked are those that are parsed.
+
+        The last one that this process has written was parsed already; that is given once.
+        """
         import xarray as xr
 
         path = self.path(record.stage, record.key, MAIN)
         content = path.read_bytes()
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
+        written = _READ_BACK.pop(record.files[MAIN], None)
+        if written is not None:
+            return written
         return xr.load_dataset(content, engine="netcdf4", decode_times=False)
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
@@ -261,6 +269,7 @@ def _attributes(product: Product) -> Mapping[str, object]:
 def write_dataset(path: Path, dataset: xr.Dataset) -> str:
     """Write NetCDF-4 atomically, read back and compared before it takes its name; returns its sha256.
 
+    What was read is kept for `Store.load`, until the next one is written.
     Equal datasets give equal bytes: no times or names of this machine.  Numeric arrays carry fletcher32 sums, so that
     other programs notice damage too; they are compressed from `COMPRESSED` bytes on, since what a run records has few
     digits to spare: deflating it takes longer than making it, and leaves half of it.
@@ -280,7 +289,12 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> str:
             made.write_bytes(bytes(dataset.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         content = made.read_bytes()
-        if not xr.load_dataset(content, engine="netcdf4", decode_times=False).equals(dataset):
+        read = xr.load_dataset(content, engine="netcdf4", decode_times=False)
+        if not read.equals(dataset):
             raise OSError(errno.EIO, "what was written does not read back", str(path))
         settle(made, path)
-    return sha256(content)
+    digest = sha256(content)
+    _READ_BACK.clear()
+    if read.nbytes < COMPRESSED:
+        _READ_BACK[digest] = read
+    return digest
