@@ -14,8 +14,8 @@ without it, and starts in half the time.
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import cached_property
-from types import FunctionType
 from typing import Any
 
 #: releases of Numba with which `lowering` has been looked at
@@ -38,7 +38,7 @@ def lowering() -> dict[str, Any]:
 class Kernel:
     """A function that compiled code calls; what Numba knows of it comes to be when it is first asked for."""
 
-    def __init__(self, py_func: FunctionType) -> None:
+    def __init__(self, py_func: Any) -> None:
         self.py_func = py_func
         self.__name__, self.__doc__, self.__module__ = py_func.__name__, py_func.__doc__, py_func.__module__
 
@@ -64,6 +64,6 @@ class Kernel:
         return self.dispatcher._numba_type_
 
 
-def kernel(function: FunctionType) -> Any:
+def kernel(function: Callable) -> Any:
     """The function, to be called by compiled code."""
     return function if INTERPRETED else Kernel(function)
