@@ -10,8 +10,8 @@ from flexclear.pipeline.core.algebra import rotation_between
 from tests.analytic.mechanism_runs import impacts, run
 
 BOTH, ALL = "sps4/variants/csj_a1_a2", "sps4/variants/csj_all"
-#: the first layout, whose impacts press ball and socket into each other by less than in the scenes of the paper: a vanishing
-#: clearance has more decades before that shows
+#: the first layout: its impacts press ball and socket into each other by less than those of the paper's scenes, so that
+#: a vanishing clearance has more decades before that shows
 CSJ, IDEAL = "sps4/variants/first_csj", "sps4/variants/first"
 #: radial clearance [m], with the stiffness of 0.5 mm held
 CLEARANCES = (5e-4, 1e-4, 2e-5, 5e-6, 1e-6)

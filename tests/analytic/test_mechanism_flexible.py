@@ -30,7 +30,7 @@ def at(dataset: xr.Dataset, time: np.ndarray) -> xr.Dataset:
 
 
 def deviation(scene: str) -> tuple[float, float, float]:
-    """Largest deviations from ideal, first layout, of the platform: rotation about y0 [rad], height [m], speed [m/s]."""
+    """Largest deviations of the platform from ideal, first layout: about y0 [rad], height [m], speed [m/s]."""
     ideal = run("sps4/variants/first").sel(body="platform")
     other = at(run(scene), ideal.time.values).sel(body="platform")
     tilt = [np.arcsin(quaternion_to_matrix(d["quaternion"].values)[:, 0, 2]) for d in (ideal, other)]

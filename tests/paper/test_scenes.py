@@ -184,9 +184,9 @@ def test_clearance_joint_is_that_of_tables_3_and_6() -> None:
     assert (friction.v_static, friction.v_dynamic) == (known.v_static, known.v_dynamic)
 
 
-def test_restitution_gravity_layout_and_counts_are_declared_assumptions() -> None:
+def test_restitution_gravity_height_and_counts_are_declared_assumptions() -> None:
     said = scene("sps4/far_csj_cb.toml").assumptions()
-    for place in ("joint.A1.normal.restitution", "body.ground", "body.rod1.modes", "joint.P1", "drive.P3"):
+    for place in ("joint.A1.normal.restitution", "body.platform.pose", "body.rod1.modes", "joint.P1", "drive.P3"):
         assert place in said
     assert "load.gravity" in scene("sps4/variants/gravity.toml").assumptions()
 
