@@ -80,6 +80,6 @@ def _contradiction(ours: Deviation) -> str:
         f"{printed.angle / printed.displacement:.2g} rad/mm. Whatever changes the length of leg 1 turns and lifts the "
         f"platform in a ratio that geometry sets: {TABLE8.angle / TABLE8.displacement:.2g} rad/mm by the paper's "
         f"Table 8, {1e-3 * ours.angle / ours.displacement:.2g} rad/mm here (Craig-Bampton), where the joint "
-        f"coordinates are fitted to that table. {printed.displacement:.3g} mm may be no more than the last digit that the "
-        "displacement was printed with."
+        f"coordinates are fitted to that table. {printed.displacement:.3g} mm may be no more than the last digit that "
+        "the displacement was printed with."
     )
