@@ -43,7 +43,7 @@ def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> n
     scene = plotter(size)
     actors = _build(scene, drawn)
     _place(drawn, actors, step, glow=False)
-    _look(scene, drawn)
+    look(scene, drawn)
     result = image(scene)
     scene.close()
     return result
@@ -69,7 +69,7 @@ def _frames(
     steps = np.clip(np.searchsorted(time, shown.times - 1e-12 * (time[-1] - time[0])), 0, time.size - 1)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
-    _look(scene, drawn)
+    look(scene, drawn)
     # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
     caption = pace.Caption((VIEW, 26), SOFT)
     with style.style():
@@ -95,7 +95,7 @@ def _struck(run: xr.Dataset, before: int, now: int) -> bool:
 
 
 def _build(scene: pv.Plotter, drawn: Mechanism) -> Actors:
-    _floor(scene, drawn)
+    floor(scene, drawn)
     parts = tuple(
         scene.add_mesh(polydata(part.surface), color=part.color, opacity=part.opacity, specular=0.3, specular_power=18)
         for part in drawn.parts
@@ -128,7 +128,7 @@ def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
         mesh.points, mesh["deflection"] = placed(drawn.run, bent, step)
 
 
-def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:
+def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
     """A pale disc under the mechanism; none behind a planar one, and none where its scene says from where to look."""
     if drawn.view.planar or drawn.looks.direction is not None:
         return
@@ -143,7 +143,8 @@ def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:
     scene.add_mesh(disc, color="#dfe5ec", ambient=0.12)
 
 
-def _look(scene: pv.Plotter, drawn: Mechanism) -> None:
+def look(scene: pv.Plotter, drawn: Mechanism) -> None:
+    """Put the camera where all that is drawn over the run is in the picture."""
     width, height = scene.window_size
     place, focus = eye(drawn.view, drawn.cloud, width / height, drawn.looks.zoom)
     scene.camera_position = [tuple(place), tuple(focus), tuple(drawn.view.up)]
