@@ -24,6 +24,7 @@ from flexclear.pipeline.post.render.mechanism import (
 )
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata, shading, skin
+from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
 from flexclear.pipeline.post.render.writing import RATE, write
 
@@ -96,11 +97,16 @@ def _struck(run: xr.Dataset, before: int, now: int) -> bool:
 
 def _build(scene: pv.Plotter, drawn: Mechanism) -> Actors:
     floor(scene, drawn)
-    parts = tuple(
-        scene.add_mesh(polydata(part.surface), color=part.color, opacity=part.opacity, specular=0.3, specular_power=18)
-        for part in drawn.parts
-    )
+    parts = tuple(solid(scene, part.surface, part.color, part.opacity) for part in drawn.parts)
     return Actors(parts, tuple(_flexible(scene, drawn, body) for body in drawn.flexible))
+
+
+def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh: pv.PolyData | None = None) -> Any:
+    """A surface as an actor, shaded by its own normals: round ones smoothly, edges sharp."""
+    shown = polydata(surface) if mesh is None else mesh
+    actor = scene.add_mesh(shown, color=color, opacity=opacity, specular=0.3, specular_power=18)
+    actor.prop.interpolation = "Phong"
+    return actor
 
 
 def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyData:

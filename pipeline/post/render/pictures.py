@@ -223,7 +223,7 @@ def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
 def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
     """The mechanism at rest, and how it vibrates about that."""
     assert shown.linear is not None
-    if not shown.linear.sizes["vibration"]:
+    if not bool((shown.linear["frequency"] > 0.0).any()):
         raise InputError("--what vibrations", "the mechanism has no motion that vibrates in this pose")
     drawn = mechanism(vibrations.as_run(shown.linear), shown.bundles, shown.looks)
     return drawn, vibrations.vibrations(drawn, shown.linear)
