@@ -26,7 +26,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=s4_watched.MEMBERS,
         metavar="N",
-        help=f"number of starts of each variant that has contacts (default {s4_watched.MEMBERS}); more of them resolve smaller differences",
+        help=f"number of starts of each variant that has contacts (default {s4_watched.MEMBERS}); "
+        "more of them resolve smaller differences",
     )
 
 
