@@ -132,7 +132,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
-    with pytest.raises((InputError, run.FailedTasksError), match="drop everything") as refused:
+    with pytest.raises((InputError, run.FailedTasksError), match="leave out everything") as refused:
         plan.bring(scene, run.workplace())
     assert refused.value.exit_code == 2
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
