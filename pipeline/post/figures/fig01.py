@@ -130,7 +130,7 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
         for place, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
             text = f"{name}\n({place[0]:.1f}, {place[1]:.1f})"
             axes.annotate(
-                text, place[:2], (0.0, 8.0 * way), textcoords="offset points", ha="center",
+                text, (place[0], place[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
                 va="bottom" if way > 0.0 else "top", fontsize=8.2,
             )  # fmt: skip
     axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)
