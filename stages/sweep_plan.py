@@ -191,7 +191,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
     if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
         raise InputError(
             f"{where} [keep]",
-            "a motion that is looked at once in each period goes on from period to period: neither runs of one period, "
+            "sections follow one motion over many periods: neither runs of one period, "
             "nor members, nor an estimated error go with it",
             "keep sections alone, or make two sweeps of it",
         )
