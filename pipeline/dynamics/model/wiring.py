@@ -124,23 +124,15 @@ def uncommon(route: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
 
 
 def _order(supports: list[set[int]]) -> list[int]:
-    """Reverse Cuthill-McKee on "shares a coordinate", with SciPy's choices among equals.
+    """Reverse Cuthill-McKee on "shares a coordinate"."""
+    n = len(supports)
+    if n < 2:
+        return list(range(n))
+    from scipy.sparse import csr_array  # slow to import, and open mechanisms need none of it
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    SciPy's own takes longer to import than most runs take.
-    """
-    near = [[b for b, other in enumerate(supports) if mine & other] for mine in supports]
-    degrees = [len(beside) for beside in near]
-    found = dict[int, None]()
-    for seed in np.argsort(degrees):  # of NumPy: what it does with equal degrees counts
-        level = [] if int(seed) in found else [int(seed)]
-        while level:
-            found |= dict.fromkeys(level)
-            below = list[int]()
-            for k in level:
-                beside = [b for b in near[k] if b not in found and b not in below]
-                below += sorted(beside, key=degrees.__getitem__)
-            level = below
-    return list(reversed(found))
+    graph = np.array([[bool(a & b) for b in supports] for a in supports], dtype=float)
+    return [int(k) for k in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]
 
 
 def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]:
