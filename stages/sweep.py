@@ -134,6 +134,9 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
             locks.enter_context(
                 place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep"))
             )
+        if folder is not None:
+            shown = str(folder.relative_to(place.store.root))
+            place.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
         found = {key: point for family in ready.families for key, point in family.find(place.store, plan.kept).items()}
         wanted = {job.key: job for job in ready.jobs}
         desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found})

@@ -5,10 +5,11 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.drives import PathDrive
@@ -55,7 +56,7 @@ class Family:
     @property
     def folder(self) -> tuple[str, str]:
         """Stage of its batches in the store, and a name there that no batch has."""
-        return f"sweep/{self.key}", "family"
+        return f"sweep/{self.key}", FAMILY
 
     def keep(self, points: Mapping[str, Point], store: Store, kept: Sequence[Kept]) -> None:
         """Store finished points as one artifact."""
@@ -80,13 +81,15 @@ class Family:
 class Plan:
     """A sweep whose places, values and quantities are known to fit its scene.
 
-    scene: with what is set, at the first point.  families, jobs: once the flexible bodies are there; see `prepare`.
+    scene: with what is set, at the first point.  turning: names of the quantities that are about an axis, not along.
+    families, jobs: once the flexible bodies are there; see `prepare`.
     """
 
     sweep: Sweep
     scene: Scene
     design: Design
     kept: tuple[Kept, ...]
+    turning: frozenset[str]
     families: tuple[Family, ...] = ()
     jobs: tuple[Job, ...] = ()
 
@@ -100,7 +103,7 @@ class Plan:
         attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
         keys, time = [job.key for job in self.jobs], regular_times(self.scene.time, self.scene.output)
-        return results.dataset(self.design, self.kept, keys, points, time, attributes)
+        return results.dataset(self.design, self.kept, keys, points, time, self.turning, attributes)
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
@@ -118,7 +121,7 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     base = edited(base, made.points()[0])
     kept = tuple(_kept(base, name, where) for name in sweep.keep)
     _check_kept(sweep, base, made, kept, where)
-    return Plan(sweep, base, made, kept)
+    return Plan(sweep, base, made, kept, _turning(base, made, kept, where))
 
 
 def _placed(place: str, error: InputError) -> InputError:
@@ -207,6 +210,32 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
         )
 
 
+def _turning(base: Scene, made: Design, kept: Sequence[Kept], where: str) -> frozenset[str]:
+    """Names of the quantities that are about an axis; InputError for one that is so at some of the points only."""
+    from flexclear.pipeline.dynamics.model.driving import turns
+
+    found = frozenset(one.quantity.name for one in kept if turns(base, one.quantity))
+    for axis, scene in _worded(base, made):
+        for one in kept:
+            if turns(scene, one.quantity) != (one.quantity.name in found):
+                raise InputError(
+                    f"{where} [vary.{axis.name}]",
+                    f"'{one.name}' is a force at some points and a torque at others",
+                    "make two sweeps of it",
+                )
+    return found
+
+
+def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
+    """The scene at a point with each value that is no number, and so may name other parts."""
+    points = made.points()
+    for axis in made.axes:
+        texts = list(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else []
+        for k in (texts.index(text) for text in dict.fromkeys(texts)):
+            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if made.grid else points[k]
+            yield axis, edited(base, chosen)
+
+
 def prepare(wanted: Plan, place: Workplace) -> Plan:
     """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
     points = wanted.design.points()
@@ -264,10 +293,8 @@ def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict
 def _modules(wanted: Plan) -> tuple[str, ...]:
     """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
     found = set(s4_simulate.modules(wanted.scene))
-    for axis in wanted.design.axes:
-        for value in dict.fromkeys(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else ():
-            original = next(v for v in axis.values if str(v) == value)
-            found |= set(s4_simulate.modules(edited(wanted.scene, dict.fromkeys(axis.places, original))))
+    for _, scene in _worded(wanted.scene, wanted.design):
+        found |= set(s4_simulate.modules(scene))
     return tuple(sorted(found))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from math import ceil
 from pathlib import PurePath
@@ -138,7 +139,7 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     x, y = (sweep[dim].values * _scale(sweep, dim)[0] for dim in (columns, rows))
     mesh = ax.pcolormesh(x, y, sweep[name].values, shading="nearest", cmap="viridis")
     bar = figure.colorbar(mesh, ax=ax)
-    bar.set_label(sweep[name].attrs["units"], color=SOFT)
+    bar.set_label(_written(sweep[name].attrs["units"]), color=SOFT)
     bar.outline.set_visible(False)
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
@@ -168,12 +169,21 @@ def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:
     ax.set_xlabel(_axis(sweep, parameter))
     units = sweep[name].attrs["units"]
-    ax.set_ylabel("" if units == "1" else units)
+    ax.set_ylabel("" if units == "1" else _written(units))
 
 
 def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
     unit = sweep[parameter].attrs.get("units", "")
-    return HANDY.get(unit, (1.0, unit))
+    return HANDY.get(unit, (1.0, _written(unit)))
+
+
+def _written(units: str) -> str:
+    """Units of a dataset as one writes them: ``m/s`` of ``m s-1``."""
+    parts = units.split()
+    over, under = ([p for p in parts if ("-" in p) == below] for below in (False, True))
+    powers = re.compile(r"(?<=[A-Za-z])-?(\d+)")
+    written = [powers.sub(lambda m: "" if m[1] == "1" else f"$^{m[1]}$", " ".join(some)) for some in (over, under)]
+    return "/".join([written[0] or "1", *written[1:]] if under else written[:1])
 
 
 def _axis(sweep: xr.Dataset, parameter: str) -> str:

@@ -13,10 +13,12 @@ import pytest
 from scipy.special import ellipk
 
 from flexclear import pipeline
+from flexclear.pipeline.core.artifacts.points import unit
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.pipeline.core.units import udunits
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.pipeline.post.sweep import figures
@@ -59,7 +61,7 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
     # the speed is largest between outputs 5 ms apart: within (2.5 ms omega)^2/2 of it, omega < 9 rad/s; 2.5e-4
     assert speed.values == pytest.approx(expected, rel=3e-4)
     assert (found["status"] == 0).all()
-    assert speed.attrs["units"] == "m/s"
+    assert speed.attrs["units"] == "m s-1"
     assert found.attrs["complete"] == 1
 
 
@@ -211,6 +213,29 @@ def test_what_cannot_be_is_refused_before_anything_runs(
     assert words in str(refused.value)
     assert refused.value.exit_code == 2
     assert asked == []
+
+
+def test_what_turns_is_told_in_the_units_of_turning(root: Path):
+    def units(scene: str, *keep: str) -> list[str]:
+        table = {"scene": scene, "vary": {"time.end": [0.1, 0.2]}, "keep": keep}
+        plan = sweep_plan.plan(read_sweep(table, "sweep"), load_scene(root / f"scenes/checks/{scene}.toml"), "sweep")
+        return [unit(one, plan.turning) for one in plan.kept]
+
+    ends = [f"{stop}.upper.{what}" for stop in "AC" for what in ("peak_force", "impulse", "impact_times.count")]
+    assert units("stops", *ends) == ["N", "N s", "1", "N m", "N m s", "1"]
+    kept = ("turning.drive_force.rms", "axis.force.largest", "axis.moment.final", "rotor.orientation.final")
+    assert units("spindle", *kept) == ["N m", "N", "N m", "1"]
+
+
+def test_a_force_at_some_points_that_is_a_torque_at_others_is_refused(root: Path):
+    vary = {"drive.turning.coordinate": ["rotation", "translation"]}
+    with pytest.raises(InputError, match="a force at some points and a torque at others"):
+        pipeline.sweep(root / "scenes/checks/spindle.toml", vary, ["turning.drive_force.rms"], workers=1)
+
+
+def test_units_of_parameters_are_read_by_other_programs():
+    written = ["m", "rad/s", "kg m^2", "N/m s", "N m s/rad", "N/m^1.5"]
+    assert [udunits(text) for text in written] == ["m", "rad s-1", "kg m2", "N m-1 s-1", "N m s rad-1", ""]
 
 
 def test_a_latin_hypercube_has_one_point_in_every_row_and_column():
