@@ -175,10 +175,14 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
     """Figures beside the dataset, and a summary on the screen."""
     from flexclear.pipeline.core.artifacts.store import publish
-    from flexclear.pipeline.post.sweep import figures
+    from flexclear.pipeline.post.sweep import NAME, figures
 
-    for name, content in figures(result).items():
+    drawn = figures(result)
+    for name, content in drawn.items():
         publish(folder / name, content)
+    for path in folder.glob(f"{NAME}.*g"):
+        if path.name not in drawn:  # of an earlier state of the sweep
+            path.unlink()
     if out is not None:
         with disk_limits(out.parent):
             write_dataset(out, result)

@@ -15,6 +15,7 @@ from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.kept import Kept, parse_kept
 from flexclear.pipeline.core.scene.load import edited, with_numbers
+from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
 from flexclear.pipeline.core.workflow.workers import without_main
 from flexclear.stages import s4_simulate
@@ -103,7 +104,10 @@ class Plan:
         attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
         keys, time = [job.key for job in self.jobs], regular_times(self.scene.time, self.scene.output)
-        return results.dataset(self.design, self.kept, keys, points, time, self.turning, attributes)
+        sections = (self.scene.sections or Sections()).periods
+        asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
+        shares = [share for share in results.SHARES if asked[share]]
+        return results.dataset(self.design, self.kept, keys, points, time, sections, self.turning, attributes, shares)
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:

@@ -24,11 +24,11 @@ NAME = "sweep"
 
 
 def figures(sweep: xr.Dataset) -> dict[str, bytes]:
-    """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, or text along them."""
+    """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, text along them, no point."""
     parameters = [str(name) for name in sweep["status"].dims]
     draw = _drawn(sweep, parameters)
     panels = _panels(sweep, sections=draw is _curve)
-    if draw is None or not panels:
+    if draw is None or not panels or not (sweep["status"] == 0).any():
         return {}
     rows = ceil(len(panels) / COLUMNS)
     with style():

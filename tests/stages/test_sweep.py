@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.special import ellipk
 
 from flexclear import pipeline
@@ -155,8 +156,15 @@ def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fr
 def test_a_sweep_of_refusals_only_is_no_success(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
     path = tmp_path / "none.toml"
     path.write_text('scene = "checks/pendulum"\nkeep = ["bob.velocity.final"]\nvary."solver.evaluations" = [50, 60]\n')
+    shown = fresh / "sweeps" / "none"
+    shown.mkdir(parents=True)
+    (shown / "sweep.png").write_bytes(b"of an earlier state")
     assert main(["sweep", str(path), "--workers=1"]) == 3
     assert "2 refused" in capsys.readouterr().out
+    with xr.open_dataset(shown / "sweep.nc") as found:
+        assert found["bob.velocity.final"].dims == ("solver.evaluations", "axis")
+        assert np.isnan(found["bob.velocity.final"].values).all()
+    assert [path.name for path in shown.glob("sweep.*")] == ["sweep.nc"]
 
 
 def test_members_give_mean_and_deviation(root: Path):

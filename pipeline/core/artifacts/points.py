@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -81,17 +82,24 @@ def dataset(
     keys: Sequence[str],
     points: Mapping[str, Point],
     time: np.ndarray,
+    sections: int,
     turning: Collection[str],
     attributes: Mapping[str, str | int],
+    shares: Sequence[str] = SHARES[:1],
 ) -> xr.Dataset:
     """All points of a sweep on its own dimensions; nan where there is no value.
 
     keys: of the points, in their order.  points: the finished ones.  time: of the series that are kept [s].
-    turning: as of `unit`.
+    sections: how many there are of each point.  turning: as of `unit`.  shares: of `SHARES`, those that are asked for.
     """
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
+    lengths = {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
     variables = _arrays(every, kept, dims, shape)
+    for one, share in itertools.product(kept, shares):  # where no point is done
+        if variable(one, share) not in variables:
+            inner = [lengths[dim] for dim in one.dims]
+            variables[variable(one, share)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
         "status": (np.array(status, dtype=np.int8), "what became of the point"),
