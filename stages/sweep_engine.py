@@ -19,6 +19,8 @@ from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 SHARE, MOST, QUEUED = 0.5, 1000, 2
+#: towards the end less is handed out, a share of what is left, so that all workers finish together; least seconds of it
+LEAST = 0.02
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
 #: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
@@ -71,7 +73,7 @@ class Engine:
             # nothing is compiled twice: until the first point is there nothing else begins
             width = self.width()
             while waiting and len(running) < (QUEUED * width if pace else 1):
-                mine = _take(waiting, min(MOST, max(1, int(max(SHARE, PER_WORKER * width) / pace))) if pace else 1)
+                mine = _take(waiting, _portion(sum(map(len, waiting)), pace, width) if pace else 1)
                 keep = self.here and not 0.0 < pace < LONG
                 running[self._given(mine, families, alone=not pace, keep=keep)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
@@ -111,6 +113,13 @@ def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     for job in jobs:
         found.setdefault(job.family, []).append(job)
     return [list(reversed(mine)) for mine in reversed(found.values())]
+
+
+def _portion(left: int, pace: float, width: int) -> int:
+    """Points that are handed out at a time. left: those that wait; pace: seconds of each."""
+    asking = PER_WORKER * width
+    seconds = min(max(SHARE, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    return min(MOST, max(1, int(seconds / pace)))
 
 
 def _take(waiting: list[list[Job]], count: int) -> list[Job]:
