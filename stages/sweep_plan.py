@@ -7,6 +7,7 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import FAMILY
@@ -25,10 +26,11 @@ from flexclear.stages.sweep_engine import Job
 from flexclear.stages.sweep_points import Family as Work
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.artifacts.store import Store
+    from flexclear.pipeline.core.artifacts.store import Record, Store
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.scene.sweep import Sweep
 
@@ -67,15 +69,20 @@ class Family:
         store.put(self.folder[0], name, {"nc": batch(points, kept)}, self.facts)
 
     def find(self, store: Store, kept: Sequence[Kept]) -> dict[str, Point]:
-        """All points of the family that are stored and sound."""
+        """All points of the family that are stored and sound, with their values of what is `kept`."""
         from flexclear.pipeline.core.artifacts.points import unpacked
 
         found: dict[str, Point] = {}
+        for _, batch in self.batches(store):
+            found |= unpacked(batch, kept)
+        return found
+
+    def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
+        """What `keep` has stored, as far as it is sound."""
         for path in sorted((store.root / "cache" / self.folder[0]).glob("*.json")):
             record = store.find(self.folder[0], path.stem)
             if record is not None:
-                found |= unpacked(store.load(record), kept)
-        return found
+                yield record, store.load(record)
 
 
 @dataclass(frozen=True)
@@ -97,17 +104,40 @@ class Plan:
     def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
         """The sweep's dataset of the points that are finished."""
         from flexclear.pipeline.core.artifacts import points as results
-        from flexclear.pipeline.core.quantities import regular_times
 
         attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
         attributes |= {"title": self.sweep.title} if self.sweep.title else {}
         attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
-        keys, time = [job.key for job in self.jobs], regular_times(self.scene.time, self.scene.output)
-        sections = (self.scene.sections or Sections()).periods
+        keys = [job.key for job in self.jobs]
+        return results.dataset(
+            self.design, self.kept, keys, points, self.time, self.sections, self.turning, attributes, self.shares
+        )
+
+    def rows(self, first: int, last: int) -> Plan:
+        """The part of the plan with these entries of the first dimension, up to the last one or the end."""
+        axes, each = self.design.axes, prod(self.design.shape[1:])
+        cut = [replace(axis, values=axis.values[first:last]) for axis in (axes[:1] if self.design.grid else axes)]
+        made = Design((*cut, *axes[len(cut) :]), self.design.grid)
+        return replace(self, design=made, jobs=self.jobs[first * each : last * each])
+
+    @property
+    def time(self) -> np.ndarray:
+        """Of the series that are kept [s]."""
+        from flexclear.pipeline.core.quantities import regular_times
+
+        return regular_times(self.scene.time, self.scene.output)
+
+    @property
+    def sections(self) -> int:
+        """How many there are of each point, where they are kept."""
+        return (self.scene.sections or Sections()).periods
+
+    @property
+    def shares(self) -> list[str]:
+        """Of `points.SHARES`, those that are asked for."""
         asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
-        shares = [share for share in results.SHARES if asked[share]]
-        return results.dataset(self.design, self.kept, keys, points, time, sections, self.turning, attributes, shares)
+        return [share for share, wanted in asked.items() if wanted]
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:

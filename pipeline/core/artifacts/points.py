@@ -94,7 +94,7 @@ def dataset(
     """
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
-    lengths = {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
+    lengths = dimensions(time, sections)
     variables = _arrays(every, kept, dims, shape)
     for one, share in itertools.product(kept, shares):  # where no point is done
         if variable(one, share) not in variables:
@@ -126,6 +126,11 @@ def dataset(
     result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
     finished = int(NOT_RUN not in status)
     return result.assign_attrs({"Conventions": CONVENTIONS, "complete": finished, **attributes})
+
+
+def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
+    """Lengths of the dimensions that what is kept of a point may have."""
+    return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 
 def _arrays(
