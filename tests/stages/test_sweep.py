@@ -299,6 +299,12 @@ def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
     assert example["best"]() == pytest.approx(2.0 * ((np.pi / 0.5) ** 2 + 1.0), abs=1e-4)
 
 
+def test_the_example_of_an_optimal_start_finds_the_steady_motion(root: Path):
+    example = runpy.run_path(str(root / "docs/examples/optimal_start.py"))
+    # the integrator's tolerance is 1e-10 of 0.25 m and 0.27 m/s; measured 6e-13
+    assert example["best"]() == pytest.approx(example["steady"](), abs=1e-10)
+
+
 def test_the_example_of_a_sensitivity_has_shares_of_a_whole(root: Path, tmp_path: Path):
     pytest.importorskip("SALib")
     example = runpy.run_path(str(root / "docs/examples/sensitivity.py"))
