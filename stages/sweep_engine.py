@@ -187,6 +187,8 @@ def _cluster(address: str) -> Iterator[Engine]:
         raise ResourceError(told) from None
     except (CancelledError, FutureCancelledError):
         raise ResourceError(f"{place}: the scheduler has gone; what was finished is kept") from None
+    except ImportError as error:  # of a worker that has joined since
+        raise InputError(place, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
         client.close()
 
@@ -217,10 +219,10 @@ def _threads(client: Any, place: str) -> int:
     threads = sum(client.nthreads().values())
     if not threads:
         raise InputError(place, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
-    try:
-        found = client.run(source_digest)
-    except ImportError as error:
-        raise InputError(place, f"its workers cannot import flexclear: {error}", "install it where they run") from None
+    found = client.run(source_digest, on_error="return")
+    for worker, digest in found.items():
+        if isinstance(digest, Exception):
+            raise InputError(place, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
     others = [worker for worker, digest in found.items() if digest != source_digest()]
     if others:
         raise InputError(place, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
