@@ -16,14 +16,38 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect, with_modes, without
 from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner
 
 #: starts of pilots with contacts: enough to see whether the motion parts
 MEMBERS = 3
-#: pilots are integrated to this tolerance; of motions without contact by the method for stiff ones to the second
+#: rigid pilots without contact are integrated to this tolerance; flexible ones by the method for stiff motions to the
+#: second
 RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
+#: tolerance of pilots with contacts: this share of the least clearance over the mechanism's size, between two limits
+#: (errors of places are the tolerance times that size, and must stay small beside the clearance)
+OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
+#: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
+#: 0.3 s on one core.  What takes longer is run over a part of the time, at least so much of it
+ALLOWED, LEAST_PART = 7e6, 0.0625
+#: a pilot is given up at so many times that, and is then as one that was refused
+GIVEN_UP = 4.0
 #: what a variant is: the effects that it lacks, and its solver
 Key = tuple[frozenset[str], str]
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What decides how dear a scene's runs are. size: of the mechanism [m].  variables: of its state."""
+
+    size: float
+    variables: int
+
+    @property
+    def most(self) -> int:
+        """Evaluations of one run at which it is given up."""
+        return int(GIVEN_UP * ALLOWED / (MEMBERS * self.variables))
 
 
 @dataclass
@@ -42,6 +66,7 @@ class Pilots:
     progress: Progress
     points: dict[Key, Point] = field(default_factory=dict)
     evaluations: int = 0
+    _extent: Extent | None = None
 
     def variant(self, gone: Collection[Effect], **solver: object) -> Scene:
         """The scene without some effects, integrated as `solver` says, else as pilots are."""
@@ -49,12 +74,46 @@ class Pilots:
         contacts = bool(bare.contacts() or bare.stop)
         smooth = bool(bare.flexible()) and not contacts
         usual: dict[str, object] = {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"rtol": RTOL}
+        if contacts:
+            usual = {"rtol": self.loose(bare), "evaluations": self.extent.most}
         return self.filled(edited(bare, {"solver": usual | solver}))
 
-    def point(self, gone: Collection[Effect], *, fewer: bool = False, share: float = 1.0, **solver: object) -> Point:
+    def loose(self, variant: Scene) -> float:
+        """The tolerance of a variant with contacts."""
+        clearances = [joint.clearance for joint in variant.contacts().values()]
+        if not clearances:
+            return LOOSEST
+        return float(np.clip(OF_CLEARANCE * min(clearances) / self.extent.size, TIGHTEST, LOOSEST))
+
+    @property
+    def extent(self) -> Extent:
+        """Of the full scene."""
+        if self._extent is None:
+            model = tabulate(build(self.scene, self.bundles))
+            self._extent = Extent(model.mechanism.length, model.nq + model.nv)
+        return self._extent
+
+    def part(self, gone: Collection[Effect]) -> float:
+        """The part of the time over which a variant is compared with others, so that it does not take too long.
+
+        Its beginning is run from one start to know.
+        """
+        begun = self.point(gone, share=LEAST_PART, members=0)
+        share = LEAST_PART * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
+        return LEAST_PART if begun.refused else float(np.clip(share, LEAST_PART, 1.0))
+
+    def point(
+        self,
+        gone: Collection[Effect],
+        *,
+        fewer: bool = False,
+        share: float = 1.0,
+        members: int = MEMBERS,
+        **solver: object,
+    ) -> Point:
         """What is watched of a variant over a share of its time; a refusal of the solver is in the point.
 
-        fewer: with fewer modes of those bodies that have a choice.
+        fewer: with fewer modes of those bodies that have a choice.  members: starts, where there are contacts.
         """
         scene = self.variant(gone, **solver)
         mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
@@ -64,11 +123,11 @@ class Pilots:
         if share < 1.0:
             scene = edited(scene, {"time.end": scene.time.start + share * (scene.time.end - scene.time.start)})
         names = frozenset(effect.name for effect in gone)
-        key = (names, json.dumps([scene.solver.model_dump(mode="json"), fewer, share]))
+        key = (names, json.dumps([scene.solver.model_dump(mode="json"), fewer, share, members]))
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
-            members = MEMBERS if scene.contacts() or scene.stop else 0
-            found = Runner(mine, kept(scene.owners(), self.chosen), members).run(members_apart(scene))
+            starts = members if scene.contacts() or scene.stop else 0
+            found = Runner(mine, kept(scene.owners(), self.chosen), starts).run(members_apart(scene))
             self.points[key] = found
             self.evaluations += found.evaluations
         return self.points[key]

@@ -9,7 +9,7 @@ What is not shown to be small is kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
@@ -24,7 +24,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
 from flexclear.pipeline.dynamics.linear.play import OF_POSE, Bounds, bounds
-from flexclear.pipeline.dynamics.plan.pilots import RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.pilots import MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import chosen_solver
 from flexclear.pipeline.dynamics.run.run import integrate
 
@@ -39,11 +39,8 @@ VIBRATION = 3.0
 OF_IMPACTS = 0.5
 #: what an influence measured with pilots' tolerance may be wrong by, as a share of it
 OF_PILOT = 0.15
-#: a loose run of the whole scene is only made where the clearance does no more than this many times what is wanted:
-#: bodies that bend change the time of impacts, and then all that these do
-WORTH_A_LOOK = 1.5
-#: tolerance and share of the time of runs with clearance and bending; and what the rest of the time may add, as a share
-LOOSE, PART, WHOLE = 1e-5, 0.25, 1.0
+#: what the rest of the time may add to what a run over a part of it shows, as a share
+WHOLE = 1.0
 #: peaks of forces between flexible bodies are at least this share of those between rigid ones
 SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this share of what is wanted
@@ -52,12 +49,14 @@ NEGLIGIBLE = 0.02
 
 @dataclass
 class Search:
-    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
+    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted.  modes: of bodies that
+    need fewer beside impacts."""
 
     pilots: Pilots
     wanted: dict[str, float]
     used: dict[str, float] = field(default_factory=dict)
     decisions: dict[str, Decision] = field(default_factory=dict)
+    modes: dict[str, int] = field(default_factory=dict)
 
     @property
     def gone(self) -> list[Effect]:
@@ -280,33 +279,52 @@ def _flexibilities(
 def _beside_impacts(
     search: Search, soft: Sequence[Effect], loose: Sequence[Effect], kept_loose: Sequence[Effect]
 ) -> None:
-    """Flexible bodies in a mechanism that stays loose: what they bend changes the impacts, and these everything."""
-    pilots = search.pilots
-    gone = search.gone
-    inner = [e for e in effects(pilots.scene) if e.within in {g.name for g in gone}]
-    softs = [*soft, *(e for e in effects(pilots.scene) if e.within in {s.name for s in soft})]
-    rigid = pilots.point([*gone, *inner, *softs])
-    tight = {e.name for e in loose}
-    held = [e for e in effects(pilots.scene) if e.name in tight or e.within in tight]
-    play = pilots.between(rigid, pilots.point([*held, *softs], rtol=RTOL))
-    worth = all(
-        search.wanted[name] * WORTH_A_LOOK >= (i.difference if np.isfinite(i.difference) else np.inf)
-        for name, i in play.items()
-    )
-    if not worth:
-        for effect in soft:
-            reason = f"{kept_loose[0].owner} stays loose, and bodies that bend change the times of its impacts"
-            search.decide(effect, True, NONE, reason)
-        return
-    whole = pilots.point([*gone, *inner], rtol=LOOSE, share=PART)
-    part = pilots.point([*gone, *inner, *softs], share=PART)
-    apart = _with_doubt(search, pilots.between(part, whole), False, WHOLE)
+    """Flexible bodies in a mechanism that stays loose: what they bend changes the impacts, and these everything.
+
+    Runs of the whole mechanism at a loose tolerance, over as much of the time as they may take, tell what rigid bodies
+    and what static modes alone would do.
+    """
+    pilots, gone = search.pilots, search.gone
+    every = effects(pilots.scene)
+    inner = [e for e in every if e.within in {g.name for g in gone}]
+    gone = [*gone, *inner]
+    share = pilots.part(gone)
+    more = 0.0 if share == 1.0 else WHOLE
+    whole = pilots.point(gone, share=share)
+    rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
+    # what takes longer than all modes do is no way to save time
+    longest = {"evaluations": whole.evaluations // MEMBERS} if not whole.refused else {}
+    apart = _with_doubt(search, pilots.between(pilots.point([*gone, *rigid], share=share), whole), False, more)
     most = {name: i.most for name, i in apart.items()}
     small = search.fits(most)
     if small:
         search.spend(most)
     for effect in soft:
         search.judge(effect, small, "with or without bending the loose joints do the same", most, apart)
+    if small or not pilots.fewer:
+        return
+    # the bodies go on to bend, so that chance, which members tell, does not count against leaving out what shakes them
+    apart = pilots.between(pilots.point(gone, fewer=True, share=share, **longest), whole)
+    most = {name: (1.0 + more) * i.difference for name, i in apart.items()}
+    if not search.fits(most):
+        return
+    search.spend(most)
+    search.modes = {name: int(bundle.sizes["mode"]) for name, bundle in pilots.fewer.items()}
+    beyond = [name for name, i in apart.items() if i.uncertainty > search.wanted[name]]
+    for effect in soft:
+        if effect.owner in search.modes:
+            told = search.decisions[effect.name]
+            search.decisions[effect.name] = replace(told, reason=f"{told.reason}; {_static(beyond, kept_loose)}")
+
+
+def _static(beyond: Sequence[str], kept_loose: Sequence[Effect]) -> str:
+    """Why the modes with the ends held may go."""
+    if not beyond:
+        return "its static stiffness alone does the same"
+    return (
+        f"{' and '.join(beyond)} parts by more than is wanted when {kept_loose[0].owner} starts a hair elsewhere, and "
+        "with static stiffness alone it differs by no more than that"
+    )
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
@@ -343,8 +361,8 @@ def _modes(search: Search) -> dict[str, int]:
     kept = [n for n in pilots.fewer if not any(e.owner == n and e.kind == FLEXIBILITY for e in gone)]
     if not kept:
         return {}
-    if pilots.variant(gone).contacts() or pilots.scene.stop:
-        return {}  # impacts shake modes of any frequency, and these change the impacts
+    if search.modes or pilots.variant(gone).contacts() or pilots.scene.stop:
+        return search.modes  # beside impacts it has been decided
     apart = _with_doubt(search, pilots.between(pilots.point(gone, fewer=True), pilots.point(gone)), False)
     most = {name: i.most for name, i in apart.items()}
     if not search.fits(most):
