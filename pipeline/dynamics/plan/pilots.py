@@ -29,8 +29,10 @@ RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
 #: (errors of places are the tolerance times that size, and must stay small beside the clearance)
 OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 #: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
-#: 0.3 s on one core.  What takes longer is run over a part of the time, at least so much of it
-ALLOWED, LEAST_PART = 7e6, 0.0625
+#: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
+ALLOWED, LEAST_PART = 5e6, 0.0625
+#: the beginning that is run to know how long the rest takes
+BEGINNING = 0.03125
 #: a pilot is given up at so many times that, and is then as one that was refused
 GIVEN_UP = 4.0
 #: what a variant is: the effects that it lacks, and its solver
@@ -98,8 +100,8 @@ class Pilots:
 
         Its beginning is run from one start to know.
         """
-        begun = self.point(gone, share=LEAST_PART, members=0)
-        share = LEAST_PART * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
+        begun = self.point(gone, share=BEGINNING, members=0)
+        share = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
         return LEAST_PART if begun.refused else float(np.clip(share, LEAST_PART, 1.0))
 
     def point(

@@ -121,6 +121,7 @@ def plan(
     search = Search(pilots, _wanted(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
     found = _bounds(search, [*loose, *soft, *inner]) if loose or soft else Bounds({}, {}, {})
     _clearances(search, loose, [*soft, *inner], found, ideal)
+    _interactions(search, soft, inner)
     _flexibilities(search, soft, loose, inner, found)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
     return _finished(search, every)
@@ -211,6 +212,29 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
             left = most
     if dropped:
         search.spend(left)
+
+
+def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
+    """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
+
+    Rates and forces only: vibrations that impacts excite are small in places and large in these.
+    """
+    pilots = search.pilots
+    dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
+    if not soft or not dropped or all(q.kind in OF_POSE for q in pilots.chosen):
+        return
+    share = pilots.part(())
+    names = {effect.name for effect in dropped}
+    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], share=share)
+    apart = _with_doubt(
+        search, pilots.between(lacking, pilots.point((), share=share)), False, 0.0 if share == 1.0 else WHOLE
+    )
+    most = {name: i.most for name, i in apart.items()}
+    if all(most[name] <= BUDGET * wanted for name, wanted in search.wanted.items()):
+        return
+    search.used = {}
+    for effect in dropped:
+        search.judge(effect, False, "", most, apart)
 
 
 def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effect]) -> Point:
