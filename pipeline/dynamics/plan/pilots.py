@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.influence import Influence, influence, kept, members_apart
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
@@ -35,6 +36,8 @@ ALLOWED, LEAST_PART = 5e6, 0.0625
 BEGINNING = 0.03125
 #: a pilot is given up at so many times that, and is then as one that was refused
 GIVEN_UP = 4.0
+#: how refusals name that limit
+TAKES_LONG = "[solver.evaluations]"
 #: what a variant is: the effects that it lacks, and its solver
 Key = tuple[frozenset[str], str]
 
@@ -57,7 +60,7 @@ class Pilots:
     """Variants of a scene that have been run.
 
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such.  filled: fills in what
-    recipes tell of rigid bodies.  points: by what was run.
+    recipes tell of rigid bodies.  points: by what was run.  refused_loose: whether the loose tolerance was refused.
     """
 
     scene: Scene
@@ -68,6 +71,7 @@ class Pilots:
     progress: Progress
     points: dict[Key, Point] = field(default_factory=dict)
     evaluations: int = 0
+    refused_loose: bool = False
     _extent: Extent | None = None
 
     def variant(self, gone: Collection[Effect], **solver: object) -> Scene:
@@ -83,6 +87,8 @@ class Pilots:
     def loose(self, variant: Scene) -> float:
         """The tolerance of a variant with contacts."""
         clearances = [joint.clearance for joint in variant.contacts().values()]
+        if self.refused_loose:
+            return RTOL
         if not clearances:
             return LOOSEST
         return float(np.clip(OF_CLEARANCE * min(clearances) / self.extent.size, TIGHTEST, LOOSEST))
@@ -100,7 +106,7 @@ class Pilots:
 
         Its beginning is run from one start to know.
         """
-        begun = self.point(gone, share=BEGINNING, members=0)
+        begun = self.must_run(gone, BEGINNING, 0)
         share = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
         return LEAST_PART if begun.refused else float(np.clip(share, LEAST_PART, 1.0))
 
@@ -133,6 +139,19 @@ class Pilots:
             self.points[key] = found
             self.evaluations += found.evaluations
         return self.points[key]
+
+    def must_run(self, gone: Collection[Effect], share: float, members: int = MEMBERS) -> Point:
+        """What is watched of a variant that the decisions need, at a tight tolerance where the loose one is refused.
+
+        Raises SolverError where it is refused then, too, for another reason than that it takes long.
+        """
+        found = self.point(gone, share=share, members=members)
+        if found.refused and TAKES_LONG not in found.refused:
+            self.refused_loose = True
+            found = self.point(gone, share=share, members=members, rtol=RTOL)
+        if found.refused and TAKES_LONG not in found.refused:
+            raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {found.refused}")
+        return found
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:
         """How far two of them are apart in each quantity; infinitely where one of them was refused."""

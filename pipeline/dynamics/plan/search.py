@@ -24,7 +24,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
 from flexclear.pipeline.dynamics.linear.play import OF_POSE, Bounds, bounds
-from flexclear.pipeline.dynamics.plan.pilots import MEMBERS, RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.pilots import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import chosen_solver
 from flexclear.pipeline.dynamics.run.run import integrate
 
@@ -112,6 +112,8 @@ def plan(
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
     pilots = Pilots(_plain(scene), bundles, fewer, filled, quantities, progress)
+    _ = pilots.extent  # a scene that cannot be built is refused before anything is run
+    pilots.must_run((), BEGINNING, 0)
     every = effects(scene)
     loose = [effect for effect in every if effect.kind == CLEARANCE]
     soft = [effect for effect in every if effect.kind == FLEXIBILITY]
@@ -314,7 +316,7 @@ def _beside_impacts(
     gone = [*gone, *inner]
     share = pilots.part(gone)
     more = 0.0 if share == 1.0 else WHOLE
-    whole = pilots.point(gone, share=share)
+    whole = pilots.must_run(gone, share)
     rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
     # what takes longer than all modes do is no way to save time
     longest = {"evaluations": whole.evaluations // MEMBERS} if not whole.refused else {}
