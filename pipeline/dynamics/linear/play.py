@@ -83,7 +83,7 @@ def bounds(full: Scene, run: Run, bundles: Mapping[str, xr.Dataset], chosen: Seq
     whole = not model.scene.gear and len(joints) == _joined(model)
     for row in rows if asked else ():
         poses = [Placement(frame["origin"], frame["axes"]) for frame in seen.links[row]]
-        lever = _lever(model, joints, poses)
+        lever = lever_of(model, joints, poses)
         for q in asked:
             shown = _shown(model, poses, q)
             adjoint = lever.adjoint(shown)
@@ -156,7 +156,8 @@ class Adjoint:
     free: float
 
 
-def _lever(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
+def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
+    """The joints' rates in a pose of all links, and what solves with them."""
     G = sparse.csc_array(misfit(model.mechanism, list(joints), poses).gradient)
     normal = (G.T @ G).tocsc()
     least = RANK * float(normal.diagonal().max(initial=1.0))

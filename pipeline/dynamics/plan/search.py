@@ -20,6 +20,7 @@ from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Deci
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.influence import Influence
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
@@ -45,6 +46,8 @@ WHOLE = 1.0
 SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this share of what is wanted
 NEGLIGIBLE = 0.02
+#: why parts go that the motion asked for never feels
+UNCOUPLED = "nothing couples it to what is asked for"
 
 
 @dataclass
@@ -111,10 +114,13 @@ def plan(
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
-    pilots = Pilots(_plain(scene), bundles, fewer, filled, quantities, progress)
+    apart = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
+    bare = lessened(_plain(scene), apart)
+    mine, less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, fewer))
+    pilots = Pilots(bare, mine, less, filled, quantities, progress)
     _ = pilots.extent  # a scene that cannot be built is refused before anything is run
     pilots.must_run((), BEGINNING, 0)
-    every = effects(scene)
+    every = effects(bare)
     loose = [effect for effect in every if effect.kind == CLEARANCE]
     soft = [effect for effect in every if effect.kind == FLEXIBILITY]
     inner = [effect for effect in every if effect.within]
@@ -126,7 +132,7 @@ def plan(
     _interactions(search, soft, inner)
     _flexibilities(search, soft, loose, inner, found)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
-    return _finished(search, every)
+    return _finished(search, effects(scene), apart)
 
 
 def _plain(scene: Scene) -> Scene:
@@ -397,10 +403,13 @@ def _modes(search: Search) -> dict[str, int]:
     return {name: int(pilots.fewer[name].sizes["mode"]) for name in kept}
 
 
-def _finished(search: Search, every: Sequence[Effect]) -> Plan:
+def _finished(search: Search, every: Sequence[Effect], apart: tuple[str, ...]) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
     modes = _modes(search)
     integrator, rtol, error = chosen_solver(search.pilots, search.gone, search.wanted, fewer=bool(modes))
+    for effect in every:
+        if ".".join(effect.name.split(".")[:2]) in apart:
+            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.wanted, 0.0))
     decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
     pilots = search.pilots
     return Plan(
@@ -412,4 +421,5 @@ def _finished(search: Search, every: Sequence[Effect]) -> Plan:
         modes,
         pilots.evaluations,
         len(pilots.points),
+        apart,
     )
