@@ -44,6 +44,8 @@ OF_PILOT = 0.15
 WHOLE = 1.0
 #: peaks of forces between flexible bodies are at least this share of those between rigid ones
 SOFTER = 0.5
+#: where members part, static modes are only trusted that were seen over this part of the time
+LEAST_SEEN = 0.5
 #: effects that cost nothing to keep are dropped below this share of what is wanted
 NEGLIGIBLE = 0.02
 #: why parts go that the motion asked for never feels
@@ -131,6 +133,7 @@ def plan(
     _clearances(search, loose, [*soft, *inner], found, ideal)
     _interactions(search, soft, inner)
     _flexibilities(search, soft, loose, inner, found)
+    _confirm(search, soft, inner)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
     return _finished(search, effects(scene), apart)
 
@@ -308,6 +311,26 @@ def _flexibilities(
         search.spend(left)
 
 
+def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
+    """Clearances that go beside bodies that stay flexible: one run of all tells whether they do as was estimated.
+
+    Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
+    """
+    pilots = search.pilots
+    dropped = [effect for effect in search.gone if effect.kind == CLEARANCE]
+    if not dropped or all(effect in search.gone for effect in soft):
+        return
+    share = min(1.0, MEMBERS * pilots.part(()))
+    names = {effect.name for effect in search.gone}
+    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], share=share)
+    apart = pilots.between(lacking, pilots.must_run((), share, 0))
+    most = {name: (1.0 if share == 1.0 else 1.0 + WHOLE) * i.difference for name, i in apart.items()}
+    if all(most[name] <= wanted for name, wanted in search.wanted.items()):
+        return
+    for effect in dropped:
+        search.judge(effect, False, "", most, apart)
+
+
 def _beside_impacts(
     search: Search, soft: Sequence[Effect], loose: Sequence[Effect], kept_loose: Sequence[Effect]
 ) -> None:
@@ -335,6 +358,10 @@ def _beside_impacts(
         search.judge(effect, small, "with or without bending the loose joints do the same", most, apart)
     if small or not pilots.fewer:
         return
+    if share < LEAST_SEEN:
+        own = pilots.point([*gone, *rigid])
+        if any(i.uncertainty > search.wanted[name] for name, i in pilots.between(own, own).items()):
+            return  # members of rigid bodies part later, and the beginning does not tell what modes do then
     # the bodies go on to bend, so that chance, which members tell, does not count against leaving out what shakes them
     apart = pilots.between(pilots.point(gone, fewer=True, share=share, **longest), whole)
     most = {name: (1.0 + more) * i.difference for name, i in apart.items()}
