@@ -25,7 +25,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import parse
 
-SEED, SCENES = 1, 60
+SEED, SCENES = 9, 60
 #: starts of runs with contacts
 MEMBERS = 3
 #: a miss by more than this is wrong, and so much may planning cost: of the full run, or a second
