@@ -110,6 +110,15 @@ def test_table_8_says_what_is_fitted_and_what_contradicts():
     assert "contradicts" not in table08.make(agreeing)["table08.md"].decode()
 
 
+def test_verdicts_on_clearance_have_the_first_layouts_numbers_in_brackets():
+    """The made-up wobble of the first layout is a fifth of the other's."""
+    found = {row["statement"]: row for row in rows(table_verdicts, "table_verdicts")}
+    row = found["The velocity does not suffer from clearance"]
+    own, first = (float(text.split(" %")[0]) for text in row["numbers"].rstrip(")").split("("))
+    assert own == pytest.approx(5.0 * first, rel=0.05)  # one decimal is printed
+    assert row["verdict"] == "does not hold"
+
+
 def test_table_9_says_how_far_single_runs_count():
     data = everything()
     horizon = 1e3 * float(data["sps4/far_csj_free:post"].ensemble_horizon)
