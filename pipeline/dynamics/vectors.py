@@ -249,6 +249,25 @@ def tangent(v, x):
 
 
 @kernel
+def tangent_matrix(v):
+    """The matrix of `tangent`: x to angular velocity."""
+    s = dot(v, v)
+    a, b, _, _ = _tangent_series(s)
+    x, y, z = v
+    return (
+        1.0 - b * (y * y + z * z),
+        b * x * y - a * z,
+        b * x * z + a * y,
+        b * x * y + a * z,
+        1.0 - b * (x * x + z * z),
+        b * y * z - a * x,
+        b * x * z - a * y,
+        b * y * z + a * x,
+        1.0 - b * (x * x + y * y),
+    )
+
+
+@kernel
 def tangent_rate(v, x):
     """Angular acceleration of exp(v) at constant rate x of v: d/dt of `tangent`."""
     _, b, da, db = _tangent_series(dot(v, v))
