@@ -62,12 +62,12 @@ def plain(f, data, n, j):
 class FlexibleBodies:
     """Kernels of all flexible bodies.
 
-    deform(h, f, w): before all else, of X and U in the interface basis.  site(h, f, w, s), inboard(h, f, w, i, ...): of
-    frames on them (see `ports`).  inertia(h, f, w, n): spatial inertias,
-    wrenches and modal forces, modal accelerations taken as zero.  mass_matrix(h, f, w): modal blocks, right after it.
-    modal_inertia(h, f, w, n): what these add to the wrenches.  port_load(h, w, i): a link on a flexible parent loads
-    its modes, too.  modal_forces(h, w): generalised forces of the modes.
-    modal_rates(h, f, w, dy): their accelerations into the state's rates.  energies(h, f, w): kinetic and elastic [J].
+    deform(h, f, w): X and U in the interface basis, before all else.  site(h, f, w, s), inboard(h, f, w, i, ...): of
+    frames on them (see `ports`).  inertia(h, f, w, n): spatial inertias, wrenches and modal forces, modal accelerations
+    taken as zero.  mass_matrix(h, f, w): modal blocks, right after it.  modal_inertia(h, f, w, n): what these add to
+    the wrenches.  port_load(h, w, i): a link on a flexible parent loads its moving shapes, too.  modal_forces(h, w):
+    generalised forces of the modes.  modal_rates(h, f, w, dy): their accelerations into the state's rates.
+    energies(h, f, w): kinetic and elastic [J].
     """
 
     deform: Callable

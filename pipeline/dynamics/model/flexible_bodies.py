@@ -204,12 +204,12 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
             pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros((3, n)), np.zeros((3, n))
         else:
             pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
-        shapes = [shape @ numbering.bases[link].moving for shape in shapes]
+        chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
         if shortened:
             drawn = None if frame is None else bow(mechanism, link, frame)
-            shapes.append(np.zeros(n * n) if drawn is None else drawn)
+            chunks.append(np.zeros(n * n) if drawn is None else drawn.ravel())
         rows.append((numbering.flexible.index(link), column, start))
         reals.append(pose)
-        data += [shape.ravel() for shape in shapes]
-        start += sum(shape.size for shape in shapes)
+        data += chunks
+        start += sum(len(chunk) for chunk in chunks)
     return rows, reals, np.concatenate([*data, np.zeros(0)])
