@@ -52,7 +52,7 @@ def test_modes_that_move_frames_in_different_ways_are_not_mixed() -> None:
 
 
 def chain() -> Scene:
-    """A rod that carries another one on a ball joint, with a heavy block on its end; 24 modes each."""
+    """A clamped rod that carries another one on a universal joint, with a heavy block on its end; 24 modes each."""
     modes = {"reference": "craig-bampton", "count": 24, "interfaces": ["bottom", "top"]}
     rod: dict[str, Any] = {"type": "flexible", "mesh": str(TREE / "meshes/actuated_rod.toml"), "modes": modes}
     along = {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}  # the rods lie along x
@@ -62,7 +62,7 @@ def chain() -> Scene:
             "time": {"end": 0.01},
             "output": {"interval": 0.01},
             "body": {
-                "ground": {"type": "ground", "frames": {"base": {}}},
+                "ground": {"type": "ground", "frames": {"base": {"axes": along}}},
                 "lower": rod | {"pose": {}},
                 "upper": rod | {"pose": {"position": [0.24, 0.0, 0.0]}},
                 "block": {
@@ -74,9 +74,9 @@ def chain() -> Scene:
                 },
             },
             "joint": {
-                "foot": {"type": "spherical", "between": ["ground.base", "lower.bottom"]},
-                "knee": {"type": "spherical", "between": ["lower.top", "upper.bottom"]},
-                "top": {"type": "revolute", "between": ["upper.top", "block.under"]},
+                "foot": {"type": "fixed", "between": ["ground.base", "lower.bottom"]},
+                "knee": {"type": "universal", "between": ["lower.top", "upper.bottom"]},
+                "top": {"type": "fixed", "between": ["upper.top", "block.under"]},
             },
             "load": {"gravity": {"type": "gravity", "acceleration": [1.0, 2.0, -9.81]}},
         }
@@ -121,16 +121,18 @@ def evaluated(model: Model) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    "name, held",
+    "name, held, tolerance",
+    # rounding times the condition of the mass matrix with a unit diagonal: of the two rods, where the lower one turns
+    # the upper one's block about its light self, 7e6, of the others up to 2e3.  Measured 3e-10 and 4e-12
     [
-        ("checks/flexible_slider_crank", [6]),
-        ("sps4/far_csj_cb, heavy ball", [7]),
-        ("sps4/far_csj_free, 30 free modes", [18]),
-        ("two rods", [18, 18]),
+        ("checks/flexible_slider_crank", [6], 1e-10),
+        ("sps4/far_csj_cb, heavy ball", [7], 1e-10),
+        ("sps4/far_csj_free, 30 free modes", [18], 1e-10),
+        ("two rods", [18, 18], 1e-8),
     ],
 )
 def test_accelerations_are_those_of_coupled_eigenmodes(
-    name: str, held: list[int], monkeypatch: pytest.MonkeyPatch
+    name: str, held: list[int], tolerance: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A rod in a loop, one with a heavy ball, one whose modes move both its ends, and one that carries another."""
     made = scene(name)
@@ -142,8 +144,7 @@ def test_accelerations_are_those_of_coupled_eigenmodes(
     one, other = evaluated(mixed), evaluated(plain)
     speeds = mixed.speeds
     assert np.abs(one[: mixed.nq] - other[: mixed.nq]).max() < 1e-13 * np.abs(other[: mixed.nq]).max()
-    # rounding times the condition of the mass matrix, some 1e4 here
-    assert np.abs(one[speeds] - other[speeds]).max() < 1e-10 * np.abs(other[speeds]).max()
+    assert np.abs(one[speeds] - other[speeds]).max() < tolerance * np.abs(other[speeds]).max()
 
 
 def test_mass_of_held_shapes_is_diagonal_and_thin() -> None:

@@ -106,7 +106,7 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
     _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))
     # turns before displacements: shapes after the first ones move frames without turning them. With something heavy
     # on a frame, the mass matrix of other moving shapes, scaled to a unit diagonal, is worse conditioned by 10 to 100
-    turns_first, _ = np.linalg.qr((motions @ moving)[::-1].T)
+    turns_first, _ = np.linalg.qr((motions[np.any(motions != 0.0, axis=1)] @ moving)[::-1].T)
     return still @ axes, moving @ turns_first
 
 
