@@ -99,6 +99,7 @@ def _project(parts: Parts) -> str:
     if parts.flexible:
         stiffen = _import(imports, f"{DYNAMICS}.equations.projection", "make_stiffen")
         given["stiffen"] = f"{stiffen}({given['closures']})"
+        given["to_modes"] = _import(imports, f"{DYNAMICS}.bodies.interface", "to_modes")
     maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
     return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
 
