@@ -204,8 +204,8 @@ FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), sti
 MOMENT_VALUES = numbers("value")
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
-#: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind of
-#: surfaces has
+#: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
+#: of surfaces has
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
 #: along the axis and per moment about it; preload: normal force that is always there

@@ -4,7 +4,8 @@ A step over such a kink has less derivatives than its method and its error estim
 chance: at single tolerances ten times and more off the trend. Where an accepted step has passed a kink, it is made
 again with its end there, as near as the tolerance asks; both sides are smooth. Nothing begins afresh.
 
-Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6 (discontinuities).
+Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6
+(discontinuous equations).
 """
 
 from __future__ import annotations
