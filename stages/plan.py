@@ -119,7 +119,9 @@ def bring(scene: Scene, place: Workplace) -> Planned:
     where = f"{scene.path or scene.name}"
     if scene.accuracy is None or not scene.accuracy.quantities:
         raise InputError(
-            f"{where} [accuracy]", "nothing is wanted", 'say what is, such as platform.position = "10 um" in [accuracy]'
+            f"{where} [accuracy]",
+            "the scene asks for no accuracy",
+            'name one, such as platform.position = "10 um" in [accuracy]',
         )
     if not variants.effects(scene):
         raise InputError(

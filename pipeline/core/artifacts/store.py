@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 #: the file of an artifact that other stages read
 MAIN = "nc"
+#: stands for the key of all artifacts of a stage, such as the batches of a sweep's points
+FAMILY = "family"
 #: attributes of the main file that a command tells, without opening the file
 TOLD = ("warnings", "accuracy_verdict")
 #: bytes of a dataset from which on room on the disk counts for more than time
@@ -184,6 +186,20 @@ class Store:
         """What `outdated` has noted, if it has."""
         table = read_checked(self._facts(folder, label, "failed")) if folder else None
         return None if table is None else str(table["why"])
+
+    def show_families(self, folder: str, families: Mapping[str, Mapping[str, str]]) -> None:
+        """Note in ``folder/.facts`` what is shown there in a dataset of its own: stages with all their artifacts.
+
+        families: facts of each stage.
+        """
+        paths = {self._facts(folder, stage.replace("/", ".")): (stage, facts) for stage, facts in families.items()}
+        with disk_limits(self.root / folder):
+            (self.root / folder / ".facts").mkdir(parents=True, exist_ok=True)
+            for path, (stage, facts) in paths.items():
+                publish(path, checked(asdict(Record(stage, FAMILY, {}, dict(facts)))))
+            for path in (self.root / folder / ".facts").glob("*.json"):
+                if path not in paths:
+                    path.unlink(missing_ok=True)
 
     def _tell_outdated(self, folder: str) -> None:
         path = self.root / folder / OUTDATED

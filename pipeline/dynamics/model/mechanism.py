@@ -325,7 +325,7 @@ def require_bodies(scene: Scene) -> None:
             raise InputError(
                 f"[body.{name}]",
                 f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
-                'join it; that a body shall fly freely is said by a joint of type "free"',
+                'join it to another body; if it is to fly freely, add a joint of type "free"',
             )
 
 

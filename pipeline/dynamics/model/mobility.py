@@ -205,7 +205,7 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
         "[joint]",
         f"the mechanism is locked: {mobility.coordinates} free coordinates of its tree against {mobility.rank} "
         f"independent closure rows leave it no motion{hardly}",
-        "write frames and poses with more digits, or let one of the joints give way"
+        "write frames and poses with more digits, or replace a joint by one that leaves more motion"
         if hardly
         else "remove a joint, choose one with more freedom, or drive one",
     )

@@ -164,8 +164,8 @@ def _wanted(scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: C
         q = quantities[0]
         raise InputError(
             f"{where} {q.name}",
-            f"{found[q.name]:.3g} {q.unit} is more than it changes at all ({sizes[q.name]:.3g} {q.unit}), and so it is "
-            "with all that is asked for: the plan would drop everything, the motion too",
+            f"{found[q.name]:.3g} {q.unit} is more than it changes ({sizes[q.name]:.3g} {q.unit}), "
+            "and so are all other accuracies that are asked for: the plan would leave out everything, even the motion",
             "ask for an accuracy below what the quantity does",
         )
     return found
