@@ -33,7 +33,7 @@ FIGURES = {
     "energy.png": ("Energy", "Energies over time, and the error of their balance"),
 }
 #: of a run's attributes, those that tell how it was made
-COST = ("method", "evaluations", "steps", "rejected_steps", "jacobians", "projections")
+COST = ("method", "method_reason", "evaluations", "steps", "rejected_steps", "jacobians", "projections")
 STABILITY = ("switched", "stiff_share", "redundant_closure_rows", "accuracy_verdict")
 PROVENANCE = ("scene", "versions", "Conventions")
 

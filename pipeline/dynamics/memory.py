@@ -211,8 +211,9 @@ BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
-#: radius: of the inner surface; shape: what else its kind of surfaces has
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2")
+#: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
+#: of surfaces has
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
 #: along the axis and per moment about it; preload: normal force that is always there
 BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
