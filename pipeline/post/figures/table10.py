@@ -127,7 +127,8 @@ def _verdict(timing: xr.Dataset, way: str) -> str:
         return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
     least, most = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
     return (
-        f"{WAYS[way].capitalize()}: our ratios are {rounded(found[least], 2)} ({least}) to {rounded(found[most], 2)} ({most}) "
+        f"{WAYS[way].capitalize()}: our ratios are "
+        f"{rounded(found[least], 2)} ({least}) to {rounded(found[most], 2)} ({most}) "
         "times the paper's."
     )
 

@@ -200,6 +200,9 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
     if np.isinf(value):
         return "other number of impacts"
     error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
+    if np.isnan(error):  # of one of the two runs it is not known
+        factor, written = scaled(value, unit)
+        return f"{rounded(factor * value, 4)} ± ? {written}"
     return measured(value, error, unit)
 
 
