@@ -346,7 +346,7 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
 
 def _column(path: Path, header: list[str], rows: list[list[str]], wanted: object) -> int:
     if isinstance(wanted, int) and not isinstance(wanted, bool):
-        if rows and wanted > len(rows[0]):
+        if rows and not 1 <= wanted <= len(rows[0]):
             raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {wanted}")
         return wanted - 1
     if wanted not in header:
