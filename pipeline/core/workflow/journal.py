@@ -18,7 +18,7 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from flexclear.pipeline.core.artifacts.disk import publish
+from flexclear.pipeline.core.artifacts.disk import publish, read_whole
 from flexclear.pipeline.core.artifacts.seal import same, sealed
 
 #: how often unfinished work is written [s], and the share of the time that writing may take where it is slow
@@ -164,7 +164,7 @@ class Journal:
         import numpy as np
 
         try:
-            whole = self._path(name).read_bytes()
+            whole = read_whole(self._path(name))
         except OSError:
             return None
         content = whole[DIGEST + 1 :]
