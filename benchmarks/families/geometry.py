@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.geometry import identify, predict
 from benchmarks.geometry.identify import DANGLE, DZ, Member
-from benchmarks.geometry.kinematics import Layout, answer
+from benchmarks.geometry.kinematics import answer
 from benchmarks.geometry.predict import FLEXIBLE, MEMBERS, RESTITUTION, STARTS, Open
 from benchmarks.page import Columns, table
 from flexclear.pipeline.post.paper import TABLE8, TABLE9
@@ -35,8 +35,8 @@ def velocity_rows() -> Iterator[Record]:
     """Runs with clearance of some of the family, the other choices as in the scenes; and of the first layout."""
     for member in sorted(identify.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
         yield _member(member) | predict.rigid(member.layout, Open())
-    first = Layout(0.086603, 0.05, 0.1, 0.173205, 0.35)
-    yield _member(Member(first, answer(first))) | predict.rigid(first, Open()) | {"first": True}
+    first = Member(identify.FIRST, answer(identify.FIRST))
+    yield _member(first) | predict.rigid(first.layout, Open()) | {"first": True}
 
 
 def open_rows() -> Iterator[Record]:

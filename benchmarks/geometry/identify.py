@@ -30,6 +30,8 @@ GRID = {"ay": (0.02, 0.08), "bx": (0.02, 0.36), "by": (0.02, 0.40)}
 #: through the corners of its plate, 200 mm square; cylinders of 20 and sockets of 25 mm beside each other [m]
 SHORTEST, LONGEST, REACH, CYLINDERS, SOCKETS = 0.32, 0.46, 0.1 * np.sqrt(2.0), 0.04, 0.05
 WORST_CONDITION = 10.0
+#: the layout that was assumed before: joints of the platform on a circle of 100 mm, those of the base on one of 200 mm
+FIRST = Layout(0.086603, 0.05, 0.1, 0.173205, 0.35)
 #: what is printed has four digits: sensitivities within half a unit of the third, so that those count that have their
 #: largest value beside the start as well
 AGREES = 1e-3

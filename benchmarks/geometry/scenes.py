@@ -1,4 +1,4 @@
-"""Scenes of the paper's mechanism with another layout: as edits of the first one's, and as files."""
+"""Scenes of the paper's mechanism with another layout, as edits of a scene of any layout."""
 
 from __future__ import annotations
 
@@ -15,27 +15,26 @@ from flexclear.stages.run import find_scene
 ROD_END, ROD_CENTRE, CYLINDER_CENTRE = 0.28, 0.16, 0.146
 #: the central chain: centre of its rod below the joint, lower end of the rod below it
 CENTRAL_ROD, CENTRAL_END = 0.16, 0.28
-FITTED = "identified: {} from Table 8, see docs/geometry.md"
-FREE = "assumed: the paper prints no joint coordinates; within what Table 8 leaves open, see docs/geometry.md"
 
 
-def edits(layout: Layout, *, flexible: bool = False, aside: float = 0.0) -> dict[str, Any]:
-    """What differs from the first layout, by place.
+def edits(layout: Layout, *, flexible: bool = False, along: float = 0.0, aside: float = 0.0) -> dict[str, Any]:
+    """All that the layout decides, by place.
 
-    flexible: whether rod 1 is.  aside: leg 1 starts turned about B1, so that its ball is so far from the centre of its
-    socket [m], downwards as far as that goes.
+    flexible: whether rod 1 is.  along: where the prismatic joints are on the rods, from the lower ends [m].
+    aside: leg 1 starts turned about B1, so that its ball is so far from the centre of its socket [m], downwards as far
+    as that goes.
     """
     found: dict[str, Any] = {"body.platform.pose.position": [0.0, 0.0, layout.height]}
     for k in range(4):
         found[f"body.platform.frames.A{k + 1}.position"] = layout.A[k].tolist()
         found[f"body.ground.frames.B{k + 1}.position"] = layout.B[k].tolist()
-        found |= _leg(layout, k, flexible=flexible and k == 0, aside=aside if k == 0 else 0.0)
+        found |= _leg(layout, k, flexible=flexible and k == 0, along=along, aside=aside if k == 0 else 0.0)
     found["body.ground.frames.Z.position"] = [0.0, 0.0, layout.height - CENTRAL_END]
     found["body.central_rod.pose.position"] = [0.0, 0.0, layout.height - CENTRAL_ROD]
     return {place: _plain(value) for place, value in found.items()}
 
 
-def _leg(layout: Layout, k: int, *, flexible: bool, aside: float) -> dict[str, Any]:
+def _leg(layout: Layout, k: int, *, flexible: bool, along: float, aside: float) -> dict[str, Any]:
     """Poses of a leg's bodies: z along it from B to A, x horizontal; of a flexible rod x along it, y horizontal."""
     way = layout.A[k] + [0.0, 0.0, layout.height] - layout.B[k]
     length = float(np.linalg.norm(way))
@@ -43,20 +42,20 @@ def _leg(layout: Layout, k: int, *, flexible: bool, aside: float) -> dict[str, A
         down = np.array([0.0, 0.0, -1.0])
         across = down - way * (down @ way) / length**2
         way = way + aside * across / np.linalg.norm(across)
-    along, level = way / np.linalg.norm(way), np.array([-way[1], way[0], 0.0])
-    pose = {"z": along.tolist(), "x": level.tolist()}
+    axis, level = way / np.linalg.norm(way), np.array([-way[1], way[0], 0.0])
+    pose = {"z": axis.tolist(), "x": level.tolist()}
 
     def at(distance: float) -> list[float]:
-        place: list[float] = (layout.B[k] + distance * along).tolist()
+        place: list[float] = (layout.B[k] + distance * axis).tolist()
         return place
 
     n = k + 1
     rod: dict[str, Any] = {"position": at(length - ROD_CENTRE), "axes": pose}
     if flexible:
-        rod = {"position": at(length - ROD_END), "axes": {"x": along.tolist(), "y": level.tolist()}}
+        rod = {"position": at(length - ROD_END), "axes": {"x": axis.tolist(), "y": level.tolist()}}
     return {
         f"body.cylinder{n}.pose": {"position": at(CYLINDER_CENTRE), "axes": pose},
-        f"body.cylinder{n}.frames.P.position": [0.0, 0.0, length - ROD_END - CYLINDER_CENTRE],
+        f"body.cylinder{n}.frames.P.position": [0.0, 0.0, length - ROD_END - CYLINDER_CENTRE + along],
         f"body.rod{n}.pose": rod,
     }
 
@@ -72,42 +71,3 @@ def scene(name: str, layout: Layout, more: dict[str, Any] | None = None, *, asid
     """A scene of the paper's mechanism with this layout. more: other edits."""
     plain = load_scene(find_scene(name))
     return load_scene(find_scene(name), edits(layout, flexible="rod1" in plain.flexible(), aside=aside) | (more or {}))
-
-
-def file_text(layout: Layout) -> str:
-    """``scenes/sps4/variants/identified.toml``: the ideal mechanism with this layout."""
-    parts: dict[str, list[str]] = {}
-    for place, value in edits(layout).items():
-        _, body, rest = place.split(".", 2)
-        parts.setdefault(body, []).append(f"{rest} = {_toml(value)}")
-    for body, why in _sources().items():
-        parts[body] += [f'source.{key} = "{text}"' for key, text in why.items()]
-    blocks = [f"[set.body.{body}]\n" + "\n".join(lines) for body, lines in parts.items()]
-    title = "4-SPS/PS mechanism, ideal joints, rigid rods, layout identified from Table 8"
-    return f'extends = "../ideal.toml"\ntitle = "{title}"\n\n' + "\n\n".join(blocks) + "\n"
-
-
-def flexible_pose(layout: Layout) -> str:
-    """The pose of a flexible rod 1, for the scenes that have one."""
-    return _toml(edits(layout, flexible=True)["body.rod1.pose"])
-
-
-def _sources() -> dict[str, dict[str, str]]:
-    found = {
-        "platform": {"frames": f"{FITTED.format('the distance of the joints from the y axis')}; {FREE}",
-                     "pose": FITTED.format("the legs' slope at the start")},
-        "ground": {"frames": FREE},
-        "central_rod": {"pose": "follows from the start height"},
-    }  # fmt: skip
-    for n in range(1, 5):
-        found[f"cylinder{n}"] = {"pose": "follows from the joint positions"}
-        found[f"rod{n}"] = {"pose": "follows from the joint positions"}
-    return found
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_toml(v)}" for key, v in value.items()) + " }"
-    if isinstance(value, list):
-        return "[" + ", ".join(repr(v) for v in value) + "]"
-    return repr(value)

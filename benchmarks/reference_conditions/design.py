@@ -55,7 +55,7 @@ class Case:
     """One scene with one mode set.
 
     place: of the prismatic joint [mm].  condition: of the modes, FULL or RIGID.  finer: factor of the elements.
-    layout: of the mechanism, where it is not that of the scenes; the prismatic joint is at 0 mm then.
+    layout: of the mechanism; the first one but for the group of rows that looks at others.
     """
 
     place: int
@@ -64,7 +64,7 @@ class Case:
     clearance: bool = False
     finer: int = 1
     members: int = field(default=0)
-    layout: Layout | None = None
+    layout: Layout = identify.FIRST
 
     @property
     def label(self) -> str:
@@ -81,9 +81,9 @@ def modes(case: Case) -> dict[str, Any]:
 
 
 def scene(case: Case) -> Scene:
-    """The paper's scene with the joint at the case's place and the rod of its mode set."""
+    """The paper's scene in the case's layout, with the joint at its place and the rod of its mode set."""
     stem, folder = ("", "sps4") if case.place == 0 else (f"prismatic_{case.place}mm", "sps4/variants")
-    moved = {} if case.layout is None else edits(case.layout, flexible=case.condition != RIGID)
+    moved = edits(case.layout, flexible=case.condition != RIGID, along=1e-3 * case.place)
     if case.condition == RIGID:
         name = "_".join(part for part in (stem, "csj" if case.clearance else "") if part) or "ideal"
         return load_scene(find_scene(f"{folder}/{name}"), moved)
@@ -113,7 +113,7 @@ def task(case: Case) -> Task:
 
 def _where(case: Case) -> str:
     """What is special to a case's mechanism, for progress reports."""
-    if case.layout is None:
+    if case.layout == identify.FIRST:
         return f"{case.place} mm"
     return "layout " + ", ".join(f"{1e3 * getattr(case.layout, name):.1f}" for name in ("ay", "bx", "by")) + " mm"
 

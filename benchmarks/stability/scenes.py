@@ -112,7 +112,7 @@ def _random(seed: int, count: int) -> Iterator[Case]:
 
 def scene(p: Parameters, rtol: float | None = None) -> Scene:
     """The scene of a point. Raises InputError when it cannot be described."""
-    table = compose(TREE / "scenes" / "sps4" / "csj.toml")
+    table = compose(TREE / "scenes" / "sps4" / "variants" / "first_csj.toml")
     _place(table, p)
     _scale_mass(table["body"]["platform"], p.mass)
     joint = _contact(table["joint"]["A1"], p)

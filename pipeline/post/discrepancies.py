@@ -22,10 +22,10 @@ DISCREPANCIES = (
         "Fig. 1, section 2",
         "Joint coordinates, the start height and which way the legs lean are not printed; equal squares above "
         "each other would be singular.",
-        "A regular geometry with an alternating twist is assumed; every coordinate is marked in the scene file. "
-        "Table 8's "
-        "displacement contradicts it; a layout identified from Table 8 stands beside it as a variant and misses "
-        "Table 8's velocity, see [geometry.md](geometry.md).",
+        "Of five numbers of a symmetric layout two are fitted to angle and displacement of Table 8, three chosen by a "
+        "rule; velocities, accelerations and forces are predictions, and Table 8's velocity contradicts them, see "
+        "[geometry.md](geometry.md). The layout that was assumed before stands beside Table 8, in the scenes "
+        "sps4/variants/first*.",
     ),
     Discrepancy(
         "Table 3, eq. (25)",

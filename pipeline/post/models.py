@@ -31,6 +31,10 @@ FAR_CSJ_FREE = Model("sps4/far_csj_free", "FAR-CSJ, free-free modes", "#0072B2")
 FAR_CSJ_FIXED = Model("sps4/far_csj_fixed", "FAR-CSJ, fixed-fixed modes", "#D55E00")
 FAR_CSJ_CB = Model("sps4/far_csj_cb", "FAR-CSJ, Craig-Bampton modes (added)", "#009E73", ours=True)
 
+#: the layout that was assumed before one was identified from Table 8
+FIRST_IDEAL = Model("sps4/variants/first", "ideal, first layout", "#111111", ours=True)
+FIRST_CSJ = Model("sps4/variants/first_csj", "CSJ, first layout", "#E69F00", ours=True)
+
 FAR = (FAR_FREE, FAR_FIXED, FAR_CB)
 FAR_CSJ = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
 MODELS = (IDEAL, *FAR, CSJ, *FAR_CSJ)

@@ -19,7 +19,11 @@ from flexclear.pipeline.post.plotting.table import Table, from_markdown
 
 #: what the page shows of the project's own pages: file, sections, endings of the pictures
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
-    "accuracy": ("accuracy.md", ("What to choose", "sps4/csj", "sps4/far_csj_cb"), ("work_precision.png",)),
+    "accuracy": (
+        "accuracy.md",
+        ("What to choose", "sps4/variants/first_csj", "sps4/variants/first_far_csj_cb"),
+        ("work_precision.png",),
+    ),
     "stability": ("stability.md", ("", "One parameter at a time"), ("sweeps.png",)),
     "chaos": ("chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
     "conditions": ("reference-conditions.md", ("In short", "What holds of the paper's statements"), ()),

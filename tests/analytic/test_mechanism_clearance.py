@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.post.paper import TABLE8
 from tests.analytic.mechanism_runs import impacts, run
 from tests.reference import contact_solutions as exact
 from tests.reference import sps4
 from tests.reference.clearance_simulation import simulate
 
-#: made by `python -m tests.reference.clearance_simulation`
+#: made by `python -m tests.reference.clearance_simulation`, in the first layout
 KEPT = Path(__file__).resolve().parents[1] / "reference" / "csj.json"
-SCENE = "sps4/csj"
+SCENE, IDEAL = "sps4/variants/first_csj", "sps4/variants/first"
 #: a contact short enough for sums over microseconds; the first impact of the run lies in it
 CLOSE_UP = (("output.interval", "1 us"), ("time.end", "7.2 ms"))
 #: no friction, in the same kernels
@@ -101,7 +102,7 @@ def test_impulse_of_the_contact_is_the_change_of_angular_momentum() -> None:
     turned = quaternion_to_matrix(dataset.sel(body="socket_A1")["quaternion"].values)
     world = np.einsum("tij,tj->ti", turned, offset)
     reach = sps4.Contact().ball_radius * world / np.linalg.norm(world, axis=1, keepdims=True).clip(1e-12)
-    moment = np.cross(socket + world + reach - sps4.B[0], dataset.contact_force.values[:, 0])
+    moment = np.cross(socket + world + reach - sps4.FIRST.B[0], dataset.contact_force.values[:, 0])
     impulse = np.sum(0.5 * (moment[1:] + moment[:-1]) * np.diff(time)[:, None], axis=0)
     pushed = np.linalg.norm(impulse)
     assert pushed > 0.1 * np.linalg.norm(momentum[0] - momentum[-1]) > 0.0
@@ -116,7 +117,7 @@ def _angular_momentum(dataset: object, body: str) -> np.ndarray:
     R = quaternion_to_matrix(motion["quaternion"].values)
     inertia = R @ np.diag([data.transverse, data.transverse, data.axial]) @ np.swapaxes(R, 1, 2)
     spin = np.einsum("tij,tj->ti", inertia, motion.angular_velocity.values)
-    return spin + data.mass * np.cross(motion.position.values - sps4.B[0], motion.velocity.values)
+    return spin + data.mass * np.cross(motion.position.values - sps4.FIRST.B[0], motion.velocity.values)
 
 
 def test_friction_never_drives() -> None:
@@ -139,14 +140,30 @@ def test_loops_stay_closed() -> None:
     assert run(SCENE).constraint_error.max() <= 1e-10
 
 
+def deviations(clearance: str, ideal: str) -> tuple[float, float, float]:
+    """Largest ones of the platform: rotation about y0 [rad], position [m], velocity [m/s]."""
+    loose, tight = run(clearance).sel(body="platform"), run(ideal).sel(body="platform")
+    same = loose.sel(time=tight.time, method="nearest", tolerance=1e-9)
+    tilt = [np.arcsin(quaternion_to_matrix(d["quaternion"].values)[:, 0, 2]) for d in (same, tight)]
+    place, speed = (np.abs(same[name].values - tight[name].values).max() for name in ("position", "velocity"))
+    return float(np.abs(tilt[0] - tilt[1]).max()), float(place), float(speed)
+
+
 def test_deviation_from_ideal_has_the_known_magnitude() -> None:
     """1.59 mrad about y0, 0.13 mm, 15.4 mm/s: the clearance through the mechanism's kinematics."""
-    csj, ideal = run(SCENE).sel(body="platform"), run("sps4/ideal").sel(body="platform")
-    same = csj.sel(time=ideal.time, method="nearest", tolerance=1e-9)
-    assert np.abs(same.position.values - ideal.position.values).max() == pytest.approx(0.130e-3, abs=1e-6)
-    assert np.abs(same.velocity.values - ideal.velocity.values).max() == pytest.approx(15.4e-3, abs=1e-4)
-    tilt = [np.arcsin(quaternion_to_matrix(d["quaternion"].values)[:, 0, 2]) for d in (same, ideal)]
-    assert np.abs(tilt[0] - tilt[1]).max() == pytest.approx(1.59e-3, abs=1e-5)
+    angle, place, speed = deviations(SCENE, IDEAL)
+    assert place == pytest.approx(0.130e-3, abs=1e-6)
+    assert speed == pytest.approx(15.4e-3, abs=1e-4)
+    assert angle == pytest.approx(1.59e-3, abs=1e-5)
+
+
+def test_the_scenes_layout_has_table_8s_angle_and_displacement_and_misses_its_velocity() -> None:
+    """The two were fitted, by kinematics at the start alone: impacts keep off the extreme by half a per cent or so."""
+    angle, place, speed = deviations("sps4/csj", "sps4/ideal")
+    assert angle == pytest.approx(TABLE8.angle, rel=0.05)
+    assert place == pytest.approx(1e-3 * TABLE8.displacement, rel=0.05)
+    # predicted, 70 mm/s where 13.57 are printed: no choice of what else the paper leaves open comes near
+    assert speed > 3.0 * 1e-3 * TABLE8.velocity
 
 
 @pytest.mark.slow

@@ -19,26 +19,33 @@ DOWN = np.array([0.0, 0.0, -9.81])
 RAISED = 22.5e-3
 #: scene -> gravity and platform of the independent computation
 CASES = {
-    "sps4/ideal": (np.zeros(3), sps4.platform()),
-    "sps4/variants/gravity": (DOWN, sps4.platform()),
-    "sps4/variants/stacked": (np.zeros(3), sps4.platform(RAISED, 7.048e-3)),
-    "sps4/variants/prismatic_60mm": (np.zeros(3), sps4.platform()),
+    "sps4/ideal": (np.zeros(3), sps4.platform(sps4.LAYOUT)),
+    "sps4/variants/gravity": (DOWN, sps4.platform(sps4.LAYOUT)),
+    "sps4/variants/stacked": (np.zeros(3), sps4.platform(sps4.LAYOUT, RAISED, 7.048e-3)),
+    "sps4/variants/prismatic_60mm": (np.zeros(3), sps4.platform(sps4.LAYOUT)),
+    "sps4/variants/first": (np.zeros(3), sps4.platform(sps4.FIRST)),
 }
+LAYOUTS = {"sps4/variants/first": sps4.FIRST}
 LEGS = range(1, 5)
 every_case = pytest.mark.parametrize("scene", CASES)
 
 
 @cache
-def motions() -> list[Motion]:
-    """The independent motion at the output times of the ideal scene."""
+def moved(layout: str) -> list[Motion]:
+    """The independent motion at the output times of the ideal scene, by a key of LAYOUTS or ``""``."""
     time = run("sps4/ideal").time.values
-    return ideal(time, np.where(time < 0.18, 1, -1))
+    return ideal(LAYOUTS.get(layout, sps4.LAYOUT), time, np.where(time < 0.18, 1, -1))
+
+
+def motions(scene: str) -> list[Motion]:
+    """The independent motion of a scene's layout."""
+    return moved(scene if scene in LAYOUTS else "")
 
 
 @cache
 def forces(scene: str) -> list[Reactions]:
     """The independent reactions at the output times."""
-    return [reactions(m, *CASES[scene]) for m in motions()]
+    return [reactions(m, *CASES[scene]) for m in motions(scene)]
 
 
 def close(found: xr.DataArray, expected: list[np.ndarray], share: float) -> bool:
@@ -56,22 +63,22 @@ def test_all_scenes_share_the_output_times(scene: str) -> None:
 def test_pose_is_the_inverse_of_the_leg_lengths_at_every_output(scene: str) -> None:
     dataset = run(scene).sel(body="platform")
     height = RAISED if scene.endswith("stacked") else 0.0
-    centre = np.array([m.height * UP + m.rotation @ (height * UP) for m in motions()])
+    centre = np.array([m.height * UP + m.rotation @ (height * UP) for m in motions(scene)])
     assert np.abs(dataset.position.values - centre).max() <= 1e-9
     turn = quaternion_to_matrix(dataset["quaternion"].values)
-    error = turn @ np.array([m.rotation.T for m in motions()])
+    error = turn @ np.array([m.rotation.T for m in motions(scene)])
     angle = np.linalg.norm(error - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
     assert angle.max() <= 1e-9
 
 
-@pytest.mark.parametrize("scene", ["sps4/ideal", "sps4/variants/gravity"])
+@pytest.mark.parametrize("scene", ["sps4/ideal", "sps4/variants/gravity", "sps4/variants/first"])
 def test_speeds_and_accelerations_are_the_known_ones_at_every_output(scene: str) -> None:
     dataset = run(scene).sel(body="platform")
     # the state is projected to the constraints at 1e-13 of its size; rates follow linearly
-    assert close(dataset.velocity, [m.speed * UP for m in motions()], 1e-9)
-    assert close(dataset.angular_velocity, [m.omega for m in motions()], 1e-9)
-    assert close(dataset.acceleration, [m.acceleration * UP for m in motions()], 1e-8)
-    assert close(dataset.angular_acceleration, [m.alpha for m in motions()], 1e-8)
+    assert close(dataset.velocity, [m.speed * UP for m in motions(scene)], 1e-9)
+    assert close(dataset.angular_velocity, [m.omega for m in motions(scene)], 1e-9)
+    assert close(dataset.acceleration, [m.acceleration * UP for m in motions(scene)], 1e-8)
+    assert close(dataset.angular_acceleration, [m.alpha for m in motions(scene)], 1e-8)
 
 
 @every_case
@@ -104,7 +111,7 @@ def test_drive_forces_are_those_of_inverse_dynamics(scene: str) -> None:
 def test_prismatic_joints_carry_the_forces_across_the_legs(scene: str) -> None:
     for k in LEGS:
         found = run(scene).joint_force.sel(joint=f"P{k}").values
-        axes = np.array([m.legs[0][k - 1] for m in motions()])
+        axes = np.array([m.legs[0][k - 1] for m in motions(scene)])
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         across = found - np.sum(found * axes, axis=1, keepdims=True) * axes
         expected = np.array([r.across[k - 1] for r in forces(scene)])
@@ -123,7 +130,7 @@ def test_spherical_joints_carry_no_moment(scene: str) -> None:
 def test_legs_do_not_spin(scene: str) -> None:
     dataset = run(scene)
     for k in LEGS:
-        axes = np.array([m.legs[0][k - 1] for m in motions()])
+        axes = np.array([m.legs[0][k - 1] for m in motions(scene)])
         axes /= np.linalg.norm(axes, axis=1, keepdims=True)
         for part in ("rod", "cylinder", "ball_A", "ball_B"):
             spin = np.sum(dataset.angular_velocity.sel(body=f"{part}{k}").values * axes, axis=1)

@@ -27,6 +27,8 @@ def everything() -> dict[str, xr.Dataset]:
     data = {"sps4:timing": synthetic.timing()}
     _put(data, synthetic.run("sps4/ideal"))
     _put(data, synthetic.run("sps4/csj", clearance=True, noise=1e-4))
+    _put(data, synthetic.run("sps4/variants/first"))
+    _put(data, synthetic.run("sps4/variants/first_csj", clearance=True, noise=2e-5))
     for name, noise in WOBBLE.items():
         _put(data, synthetic.run(f"sps4/{name}", noise=noise, modes=7))
     for k, name in enumerate(("free", "fixed", "cb")):

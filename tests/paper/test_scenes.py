@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.geometry import identify
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.load import load_scene
@@ -88,6 +87,11 @@ def _bare(part: object) -> object:
     return {k: _bare(v) for k, v in part.items() if k != "source"} if isinstance(part, dict) else part
 
 
+def layout_of(name: str) -> sps4.Layout:
+    """The layout of a scene of the paper's mechanism, by the scene's name."""
+    return sps4.FIRST if "first" in name else sps4.LAYOUT
+
+
 def differing(a: str, b: str) -> set[str]:
     """Names of the parts that two scenes do not share."""
     one, two = parts(scene(a)), parts(scene(b))
@@ -127,15 +131,12 @@ def test_the_frames_of_every_joint_meet_at_the_start(name: str) -> None:
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_joint_centres_are_the_assumed_ones(name: str) -> None:
     frames = start(scene(name))
-    A, B, height = sps4.A, sps4.B, sps4.HEIGHT
-    if "identified" in name:
-        layout = identify.fitted(0.07, 0.15, 0.35)  # the member that docs/geometry.md takes
-        A, B, height = layout.A, layout.B, layout.height
+    layout = layout_of(name)
+    up = np.array([0.0, 0.0, layout.height])
     for k in range(4):
-        up = np.array([0.0, 0.0, height])
-        assert frames[f"socket_A{k + 1}.centre"][1] == pytest.approx(A[k] + up, abs=ROUNDING)
-        assert frames[f"ball_B{k + 1}.centre"][1] == pytest.approx(B[k], abs=ROUNDING)
-    assert frames["ball_C.centre"][1] == pytest.approx([0.0, 0.0, height], abs=ROUNDING)
+        assert frames[f"socket_A{k + 1}.centre"][1] == pytest.approx(layout.A[k] + up, abs=ROUNDING)
+        assert frames[f"ball_B{k + 1}.centre"][1] == pytest.approx(layout.B[k], abs=ROUNDING)
+    assert frames["ball_C.centre"][1] == pytest.approx(up, abs=ROUNDING)
 
 
 def test_masses_and_inertias_are_those_of_table_1() -> None:
@@ -155,12 +156,13 @@ def test_masses_and_inertias_are_those_of_table_1() -> None:
         assert np.array(body.inertia) == pytest.approx(inertia, rel=1e-14)
 
 
-def test_legs_add_up_to_the_lengths_of_the_parts() -> None:
-    s, frames = scene("sps4/ideal.toml"), start(scene("sps4/ideal.toml"))
+@pytest.mark.parametrize("name", ["sps4/ideal.toml", "sps4/variants/first.toml"])
+def test_legs_add_up_to_the_lengths_of_the_parts(name: str) -> None:
+    s, frames = scene(name), start(scene(name))
     for k in range(1, 5):
         axis = frames[f"ball_A{k}.centre"][1] - frames[f"ball_B{k}.centre"][1]
         length = np.linalg.norm(axis)
-        assert length == pytest.approx(sps4.LENGTH, abs=ROUNDING)
+        assert length == pytest.approx(layout_of(name).length, abs=ROUNDING)
         for frame, along in (
             (f"rod{k}.bottom", length - 0.28),
             (f"rod{k}.top", length - 0.04),
@@ -195,6 +197,18 @@ def test_an_effect_is_one_part_of_a_scene() -> None:
     assert differing("sps4/csj.toml", "sps4/far_csj_fixed.toml") == {"body.rod1"}
     assert differing("sps4/far_free.toml", "sps4/far_csj_free.toml") == {"joint.A1"}
     assert differing("sps4/ideal.toml", "sps4/variants/gravity.toml") == {"load.gravity"}
+
+
+def test_the_scenes_of_the_first_layout_differ_from_the_others_in_places_alone() -> None:
+    """Ground, platform, cylinders and rods stand elsewhere; masses, joints, drives and modes are the same."""
+    moved = {"body.ground", "body.platform", "body.central_rod"}
+    moved |= {f"body.{part}{k}" for part in ("cylinder", "rod") for k in range(1, 5)}
+    assert differing("sps4/ideal.toml", "sps4/variants/first.toml") == moved
+    for name in ("csj", "far_free", "far_fixed", "far_cb", "far_csj_free", "far_csj_fixed", "far_csj_cb"):
+        first = f"sps4/variants/first_{name}.toml"
+        assert differing(f"sps4/{name}.toml", first) == moved
+        one, other = (scene(place).body["rod1"].model_dump() for place in (f"sps4/{name}.toml", first))
+        assert {key for key in one if key != "source" and one[key] != other[key]} == {"pose"}
 
 
 @pytest.mark.parametrize("millimetres", [60, 120])

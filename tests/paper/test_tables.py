@@ -12,6 +12,7 @@ from flexclear.pipeline.post.figures import table04, table05, table07, table08, 
 from flexclear.pipeline.post.plotting.error_table import number
 from flexclear.pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
+from tests.paper import synthetic
 from tests.paper.material import WOBBLE, everything
 
 
@@ -97,6 +98,25 @@ def test_table_8_compares_the_clearance_run_with_the_paper():
     found = {row["largest error"]: row for row in rows(table08, "table08")}
     assert found["velocity z0 (mm/s)"]["paper"] == "13.570"
     assert value(found["displacement z0 (mm)"]["ours"]) == pytest.approx(0.1, rel=2e-3)  # made with 1e-4 m, see above
+
+
+def test_table_8_says_what_is_fitted_and_what_contradicts():
+    """The made-up wobble has 1e-4 m and 0.2 m/s, 14 times the printed velocity; the first layout's is a fifth of it."""
+    text = table08.make(everything())["table08.md"].decode()
+    assert "Angle and displacement are fitted, not predicted" in text
+    assert "The velocity is a prediction, and the paper contradicts it: it is 14 times the printed one." in text
+    assert "has 2.8 times the printed velocity and 0.1 times the printed displacement" in text
+    agreeing = everything() | {"sps4/csj:run": synthetic.run("sps4/csj", clearance=True, noise=7e-6)}
+    assert "contradicts" not in table08.make(agreeing)["table08.md"].decode()
+
+
+def test_verdicts_on_clearance_have_the_first_layouts_numbers_in_brackets():
+    """The made-up wobble of the first layout is a fifth of the other's."""
+    found = {row["statement"]: row for row in rows(table_verdicts, "table_verdicts")}
+    row = found["The velocity does not suffer from clearance"]
+    own, first = (float(text.split(" %")[0]) for text in row["numbers"].rstrip(")").split("("))
+    assert own == pytest.approx(5.0 * first, rel=0.05)  # one decimal is printed
+    assert row["verdict"] == "does not hold"
 
 
 def test_table_9_says_how_far_single_runs_count():

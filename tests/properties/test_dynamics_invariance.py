@@ -21,7 +21,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, impacts
 
-IDEAL, CSJ, BOUNCE = "sps4/ideal", "sps4/csj", "checks/bounce"
+IDEAL, CSJ, BOUNCE = "sps4/ideal", "sps4/variants/first_csj", "checks/bounce"
 #: about no axis of the scene, and far from where it stands
 TURN, SHIFT = rotation_vector_to_matrix(np.array([0.7, -1.9, 0.4])), np.array([3.0, -2.0, 5.0])
 Table = dict[str, Any]

@@ -30,20 +30,20 @@ class Setting:
 
 
 def setting(contact: sps4.Contact | None = None, gravity: Array = WEIGHTLESS) -> Setting:
-    """The paper's mechanism; another contact or gravity on demand."""
+    """The paper's mechanism in the first layout; another contact or gravity on demand."""
     times = np.arange(0.0, 0.18 + GRID / 2, GRID)
-    guesses = ideal(times, np.where(times < 0.18, 1, -1))
-    return Setting(contact or sps4.Contact(), sps4.platform(), gravity, guesses)
+    guesses = ideal(sps4.FIRST, times, np.where(times < 0.18, 1, -1))
+    return Setting(contact or sps4.Contact(), sps4.platform(sps4.FIRST), gravity, guesses)
 
 
 def platform_motion(s: Setting, t: float, side: int, distance: float, rate: float) -> Motion:
     """The platform's motion while the socket's distance from B1 has no second derivative."""
     guess = s.guesses[min(max(round(t / GRID), 0), len(s.guesses) - 1)]
-    return motion(*_lengths(t, side, distance, rate, 0.0), guess.height, guess.rotation)
+    return motion(*_lengths(t, side, distance, rate, 0.0), guess)
 
 
 def _lengths(t: float, side: int, distance: float, rate: float, second: float) -> tuple[Array, Array, Array]:
-    lengths, rates, accelerations = sps4.leg_lengths(t, side)
+    lengths, rates, accelerations = sps4.leg_lengths(sps4.FIRST, t, side)
     lengths[0], rates[0], accelerations[0] = distance, rate, second
     return lengths, rates, accelerations
 
@@ -51,7 +51,7 @@ def _lengths(t: float, side: int, distance: float, rate: float, second: float) -
 def demand(s: Setting, m: Motion) -> tuple[Array, Array, Array]:
     """Six balances of platform, legs 2..4 and central chain in the motion m; axes of and arms to legs 2..4."""
     legs = leg_loads(*(part[1:] for part in m.legs), s.gravity)
-    arms = sps4.A[1:] @ m.rotation.T
+    arms = m.layout.A[1:] @ m.rotation.T
     force, moment = platform_demand(m, s.plate, s.gravity)
     force = force + legs.across_at_A.sum(axis=0) + sps4.CENTRAL_MASS * (m.acceleration - s.gravity[2]) * UP
     moment = moment + cross(arms, legs.across_at_A).sum(axis=0)
@@ -67,7 +67,7 @@ def socket_acceleration(
     """
     base, axes, arms = demand(s, m)
     # the demand is linear in the unknown: one more evaluation, at 1 m/s^2, gives its column
-    faster = motion_at(m.height, m.rotation, *_lengths(t, side, distance, rate, 1.0))
+    faster = motion_at(m.layout, m.height, m.rotation, *_lengths(t, side, distance, rate, 1.0))
     matrix = np.zeros((6, 6))
     matrix[:, 0] = demand(s, faster)[0] - base
     matrix[:3, 1:4], matrix[3:, 1:4] = axes.T, cross(arms, axes).T

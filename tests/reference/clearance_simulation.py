@@ -34,8 +34,8 @@ def axis(y: Array) -> tuple[Array, Array]:
 
 def start() -> Array:
     """Ball concentric with its socket and at rest, shape (9,)."""
-    d = np.array([0.0, 0.0, sps4.HEIGHT]) + sps4.A[0] - sps4.B[0]
-    return np.concatenate([[sps4.LENGTH, 0.0], d / np.sqrt(d @ d), np.zeros(4)])
+    d = np.array([0.0, 0.0, sps4.FIRST.height]) + sps4.FIRST.A[0] - sps4.FIRST.B[0]
+    return np.concatenate([[sps4.FIRST.length, 0.0], d / np.sqrt(d @ d), np.zeros(4)])
 
 
 def mechanism(s: Setting) -> clearance_run.Mechanism:
@@ -45,7 +45,7 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
         return platform_motion(s, t, side, y[0], y[1])
 
     def pressed(t: float, side: int, y: Array, m: Motion, latched: float | None) -> Touch:
-        lengths, rates, _ = sps4.leg_lengths(t, side)
+        lengths, rates, _ = sps4.leg_lengths(sps4.FIRST, t, side)
         u, u_rate = axis(y)
         velocity = rates[0] * u + lengths[0] * u_rate - m.legs[1][0]
         return press(s.contact, lengths[0] * u - m.legs[0][0], velocity, cross(u, u_rate) + y[8] * u, m.omega, latched)
@@ -57,7 +57,7 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
         def derivative(t: float, y: Array) -> Array:
             m = platform(t, side, y)
             now = pressed(t, side, y, m, latched)
-            lengths, rates, _ = sps4.leg_lengths(t, side)
+            lengths, rates, _ = sps4.leg_lengths(sps4.FIRST, t, side)
             u, u_rate = axis(y)
             arm = lengths[0] * u + now.reach
             about_B, slope, weight_arm = leg_inertia(lengths[0])
@@ -66,7 +66,7 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
             turned = moment - along * u - slope * rates[0] * cross(u, u_rate) - AXIAL * y[8] * u_rate
             out = np.empty(9)
             out[0] = y[1]
-            out[1] = socket_acceleration(s, t, side, y[0], y[1], m, sps4.B[0] + arm, now.force)
+            out[1] = socket_acceleration(s, t, side, y[0], y[1], m, sps4.FIRST.B[0] + arm, now.force)
             out[2:5], out[8] = u_rate, along / AXIAL
             out[5:8] = cross(turned / about_B, u) - (u_rate @ u_rate) * u
             return out

@@ -42,7 +42,7 @@ class Result:
 def balances(m: Motion, plate: sps4.Plate) -> tuple[Array, Array, Array]:
     """Six balances of the mechanism but for the axial forces; axes of and arms to the four legs."""
     legs = leg_loads(*m.legs, WEIGHTLESS)
-    arms = sps4.A @ m.rotation.T
+    arms = m.layout.A @ m.rotation.T
     force, moment = platform_demand(m, plate, WEIGHTLESS)
     force = force + legs.across_at_A.sum(axis=0) + sps4.CENTRAL_MASS * m.acceleration * UP
     moment = moment + cross(arms, legs.across_at_A).sum(axis=0)
@@ -51,12 +51,12 @@ def balances(m: Motion, plate: sps4.Plate) -> tuple[Array, Array, Array]:
 
 def stretch_acceleration(t: float, side: int, y: Array, guess: Motion, plate: sps4.Plate) -> float:
     """Second derivative of the stretch [m/s^2] in the state y = (stretch, rate)."""
-    lengths, rates, accelerations = sps4.leg_lengths(t, side)
+    lengths, rates, accelerations = sps4.leg_lengths(guess.layout, t, side)
     driven = accelerations[0]
     lengths[0], rates[0] = lengths[0] + y[0], rates[0] + y[1]
-    m = motion(lengths, rates, accelerations, guess.height, guess.rotation)
+    m = motion(lengths, rates, accelerations, guess)
     base, axes, arms = balances(m, plate)
-    faster = motion_at(m.height, m.rotation, lengths, rates, accelerations + np.array([1.0, 0.0, 0.0, 0.0]))
+    faster = motion_at(m.layout, m.height, m.rotation, lengths, rates, accelerations + np.array([1.0, 0.0, 0.0, 0.0]))
     matrix = np.zeros((7, 7))
     matrix[:6, 0] = balances(faster, plate)[0] - base
     matrix[:3, 1:5], matrix[3:6, 1:5] = axes.T, cross(arms, axes).T
@@ -75,7 +75,7 @@ def stretch_acceleration(t: float, side: int, y: Array, guess: Motion, plate: sp
 def simulate(until: float, interval: float = 1e-4, rtol: float = 1e-9) -> Result:
     """Run from rest to `until` [s] <= 0.09, in the rising half of the stroke."""
     times = np.arange(0.0, until + interval / 2.0, interval)
-    guesses, plate = ideal(times), sps4.platform()
+    guesses, plate = ideal(sps4.FIRST, times), sps4.platform(sps4.FIRST)
 
     def rhs(t: float, y: Array) -> Array:
         guess = guesses[min(round(t / interval), len(guesses) - 1)]
@@ -91,8 +91,8 @@ def simulate(until: float, interval: float = 1e-4, rtol: float = 1e-9) -> Result
     stretch = np.array(states)
     platform = []
     for t, y, guess in zip(times, stretch, guesses, strict=True):
-        lengths, rates, accelerations = sps4.leg_lengths(t)
+        lengths, rates, accelerations = sps4.leg_lengths(sps4.FIRST, t)
         lengths[0], rates[0] = lengths[0] + y[0], rates[0] + y[1]
         accelerations[0] += stretch_acceleration(t, 1, y, guess, plate)
-        platform.append(motion(lengths, rates, accelerations, guess.height, guess.rotation))
+        platform.append(motion(lengths, rates, accelerations, guess))
     return Result(times, stretch, platform)

@@ -35,9 +35,9 @@ def solve(s: Setting, one: Leg, t: float, y: Array) -> tuple[Array, Motion, Arra
     """State rate, platform motion, and force on the ball A1 by the socket, world axes; rising half of the stroke."""
     n = one.shapes.shape[1]
     x, m = read(n, t, 1, y), platform_motion(s, t, 1, y[0], y[1])
-    lengths, rates, accelerations = sps4.leg_lengths(t)
+    lengths, rates, accelerations = sps4.leg_lengths(m.layout, t)
     lengths[0], rates[0], accelerations[0] = y[0], y[1], 1.0
-    faster = motion_at(m.height, m.rotation, lengths, rates, accelerations)
+    faster = motion_at(m.layout, m.height, m.rotation, lengths, rates, accelerations)
     base, axes, arms = demand(s, m)
     M, right = equations(one, x)
     point = carried(one, x, ball_turn(one, x), STEM)
@@ -49,7 +49,7 @@ def solve(s: Setting, one: Leg, t: float, y: Array) -> tuple[Array, Motion, Arra
     A[k : k + 6, k] = demand(s, faster)[0] - base
     A[k : k + 3, k + 1 : k + 4], A[k + 3 : k + 6, k + 1 : k + 4] = axes.T, cross(arms, axes).T
     A[k, k + 4] = A[k + 1, k + 5] = 1.0
-    A[k : k + 3, force], A[k + 3 : k + 6, force] = np.eye(3), skew(m.rotation @ sps4.A[0])
+    A[k : k + 3, force], A[k + 3 : k + 6, force] = np.eye(3), skew(m.rotation @ sps4.FIRST.A[0])
     b[k : k + 6] = -base
     A[force, :k], A[force, k] = x.R @ ball, m.legs[2][0] - faster.legs[2][0]
     b[force] = m.legs[2][0] - x.R @ point.bias

@@ -60,7 +60,7 @@ class Now:
 
 def read(n: int, t: float, side: int, y: Array) -> Now:
     """Leg 1 in the state y = (lambda, rate, quaternion, omega, q, q')."""
-    lengths, rates, accelerations = sps4.leg_lengths(t, side)
+    lengths, rates, accelerations = sps4.leg_lengths(sps4.FIRST, t, side)
     w, a, b, c = y[2:6] / np.sqrt(y[2:6] @ y[2:6])
     v = np.array([a, b, c])
     R = (w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * skew(v)
@@ -171,13 +171,13 @@ def state_rate(y: Array, x: Now, second: float, accelerations: Array) -> Array:
 
 def start(n: int) -> Array:
     """Straight rod, ball concentric and at rest, shape (9 + 2n,); x of the leg's frame is horizontal."""
-    d = np.array([0.0, 0.0, sps4.HEIGHT]) + sps4.A[0] - sps4.B[0]
+    d = np.array([0.0, 0.0, sps4.FIRST.height]) + sps4.FIRST.A[0] - sps4.FIRST.B[0]
     z = d / np.sqrt(d @ d)
     x = np.array([-d[1], d[0], 0.0]) / np.sqrt(d[0] ** 2 + d[1] ** 2)
     R = np.column_stack([x, cross(z, x), z])
     w = 0.5 * np.sqrt(1.0 + np.trace(R))
     v = np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]]) / (4.0 * w)
-    return np.concatenate([[sps4.LENGTH, 0.0, w], v, np.zeros(3 + 2 * n)])
+    return np.concatenate([[sps4.FIRST.length, 0.0, w], v, np.zeros(3 + 2 * n)])
 
 
 def mechanism(s: Setting) -> clearance_run.Mechanism:
@@ -206,7 +206,7 @@ def mechanism(s: Setting) -> clearance_run.Mechanism:
             M, right = equations(one, x)
             force, reach = x.R.T @ now.force, x.R.T @ now.reach
             accelerations = np.linalg.solve(M, right + load(turn, ball, reach, force))
-            point = sps4.B[0] + x.R @ (ball.place + reach)
+            point = sps4.FIRST.B[0] + x.R @ (ball.place + reach)
             return state_rate(y, x, socket_acceleration(s, t, side, y[0], y[1], m, point, now.force), accelerations)
 
         return derivative

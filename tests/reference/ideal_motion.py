@@ -25,6 +25,7 @@ class Motion:
     jacobian: rows d l_k / d (z', omega), shape (4, 4).
     """
 
+    layout: sps4.Layout
     height: float
     rotation: Array
     speed: float
@@ -63,14 +64,14 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
-def pose(lengths: Array, height: float, rotation: Array) -> tuple[float, Array]:
+def pose(layout: sps4.Layout, lengths: Array, height: float, rotation: Array) -> tuple[float, Array]:
     """Height and rotation that fit the leg lengths, from a guess on the same branch.
 
     Raises ArithmeticError when Newton's method does not converge.
     """
     for _ in range(30):
-        arms = sps4.A @ rotation.T
-        d = height * UP + arms - sps4.B
+        arms = layout.A @ rotation.T
+        d = height * UP + arms - layout.B
         defect = np.sum(d * d, axis=1) - lengths**2
         step = np.linalg.solve(np.column_stack([2.0 * d[:, 2], 2.0 * cross(arms, d)]), -defect)
         height += step[0]
@@ -81,10 +82,12 @@ def pose(lengths: Array, height: float, rotation: Array) -> tuple[float, Array]:
     raise ArithmeticError(f"no platform pose for the leg lengths {lengths.tolist()} m")
 
 
-def motion_at(height: float, rotation: Array, lengths: Array, rates: Array, accelerations: Array) -> Motion:
+def motion_at(
+    layout: sps4.Layout, height: float, rotation: Array, lengths: Array, rates: Array, accelerations: Array
+) -> Motion:
     """Platform motion in a pose that fits the leg lengths, for their derivatives; each shape (4,)."""
-    arms = sps4.A @ rotation.T
-    d = height * UP + arms - sps4.B
+    arms = layout.A @ rotation.T
+    d = height * UP + arms - layout.B
     jacobian = np.column_stack([d[:, 2], cross(arms, d)])
     twist = np.linalg.solve(jacobian, lengths * rates)
     omega = twist[1:]
@@ -94,6 +97,7 @@ def motion_at(height: float, rotation: Array, lengths: Array, rates: Array, acce
     twist_rate = np.linalg.solve(jacobian, known)
     second = twist_rate[0] * UP + cross(twist_rate[1:], arms) + centripetal
     return Motion(
+        layout=layout,
         height=float(height),
         rotation=rotation,
         speed=float(twist[0]),
@@ -105,19 +109,22 @@ def motion_at(height: float, rotation: Array, lengths: Array, rates: Array, acce
     )
 
 
-def motion(lengths: Array, rates: Array, accelerations: Array, height: float, rotation: Array) -> Motion:
-    """Platform motion for leg lengths and their derivatives, each shape (4,); guess as in `pose`."""
-    return motion_at(*pose(lengths, height, rotation), lengths, rates, accelerations)
+def motion(lengths: Array, rates: Array, accelerations: Array, guess: Motion) -> Motion:
+    """Platform motion for leg lengths and their derivatives, each shape (4,), on the branch of the guess."""
+    found = pose(guess.layout, lengths, guess.height, guess.rotation)
+    return motion_at(guess.layout, *found, lengths, rates, accelerations)
 
 
-def ideal(times: Array, side: Array | int = 1) -> list[Motion]:
+def ideal(layout: sps4.Layout, times: Array, side: Array | int = 1) -> list[Motion]:
     """The ideal mechanism's motion at ascending times [s]; side: which limit at a drive break."""
     sides = np.broadcast_to(side, np.shape(times))
-    height, rotation, found, before = sps4.HEIGHT, np.eye(3), [], 0.0
+    height, rotation, found, before = layout.height, np.eye(3), [], 0.0
     for t, s in zip(np.asarray(times, dtype=float), sides, strict=True):
         # short walks keep Newton's method on the branch on which the mechanism was assembled
         for between in np.linspace(before, t, 2 + int((t - before) / 2e-3))[1:-1]:
-            height, rotation = pose(sps4.leg_lengths(between)[0], height, rotation)
-        found.append(motion(*sps4.leg_lengths(t, int(s)), height, rotation))
+            height, rotation = pose(layout, sps4.leg_lengths(layout, between)[0], height, rotation)
+        lengths, rates, accelerations = sps4.leg_lengths(layout, t, int(s))
+        here = pose(layout, lengths, height, rotation)
+        found.append(motion_at(layout, *here, lengths, rates, accelerations))
         height, rotation, before = found[-1].height, found[-1].rotation, t
     return found

@@ -94,9 +94,9 @@ def platform_demand(m: Motion, plate: sps4.Plate, gravity: Array) -> tuple[Array
 
 def reactions(m: Motion, gravity: Array = WEIGHTLESS, plate: sps4.Plate | None = None) -> Reactions:
     """All reactions of the ideal mechanism in the motion m."""
-    plate = sps4.platform() if plate is None else plate
+    plate = sps4.platform(m.layout) if plate is None else plate
     legs = leg_loads(*m.legs, gravity)
-    u, across, arms = legs.axis, legs.across_at_A, sps4.A @ m.rotation.T
+    u, across, arms = legs.axis, legs.across_at_A, m.layout.A @ m.rotation.T
     force, moment = platform_demand(m, plate, gravity)
     vertical = sps4.CENTRAL_MASS * (m.acceleration - gravity[2])
     # on the platform: -(T_k u_k + across_k) at A_k, -at_C at the origin

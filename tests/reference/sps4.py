@@ -1,8 +1,9 @@
 """Data of the 4-SPS/PS mechanism for the independent solutions, typed once more from the paper.
 
 SI units. Masses and inertias: Wang & Wang (2019), Table 1; contact: Tables 3 and 6; drive: eq. (35).
-Joint positions are the assumed ones of the scenes. World z is up, origin in the plane of the base
-ball centres; the platform frame starts parallel to the world.
+World z is up, origin in the plane of the base ball centres; the platform frame starts parallel to the
+world. The paper prints no joint positions: the layout of the scenes, and the one that was assumed before
+it, with which the second derivations of clearance and flexibility were run.
 """
 
 from __future__ import annotations
@@ -14,12 +15,32 @@ import numpy as np
 Array = np.ndarray
 
 SIGNS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
-#: joint centres A_k in the platform frame and B_k in the world, shape (4, 3) [m]
-A = np.column_stack([SIGNS * [0.086603, 0.05], np.zeros(4)])
-B = np.column_stack([SIGNS * [0.1, 0.173205], np.zeros(4)])
-HEIGHT = 0.35
-#: distance between the ball centres of a leg at the start [m]
-LENGTH = float(np.sqrt(0.013397**2 + 0.123205**2 + 0.35**2))
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Joint centres A_k in the platform frame and B_k in the world, shape (4, 3), and the start height [m]."""
+
+    A: Array = field(repr=False)
+    B: Array = field(repr=False)
+    height: float
+
+    @property
+    def length(self) -> float:
+        """Distance between the ball centres of a leg at the start [m]."""
+        dx, dy, _ = self.A[0] - self.B[0]
+        return float(np.sqrt(dx**2 + dy**2 + self.height**2))
+
+
+def _placed(on_platform: list[float], on_base: list[float], height: float) -> Layout:
+    A, B = (np.column_stack([SIGNS * place, np.zeros(4)]) for place in (on_platform, on_base))
+    return Layout(A, B, height)
+
+
+#: the layout identified from Table 8, that of the scenes
+LAYOUT = _placed([0.1186215235792, 0.07], [0.15, 0.35], 0.23288976482063)
+#: the layout that was assumed before
+FIRST = _placed([0.086603, 0.05], [0.1, 0.173205], 0.35)
 
 
 @dataclass(frozen=True)
@@ -68,9 +89,9 @@ class Plate:
     inertia: Array = field(repr=False)
 
 
-def platform(plate_height: float = 0.0, socket_height: float = 0.0) -> Plate:
+def platform(layout: Layout, plate_height: float = 0.0, socket_height: float = 0.0) -> Plate:
     """The merged platform; heights of the centres of mass above the plane of the joint centres [m]."""
-    places = [np.zeros(3), *A]
+    places = [np.zeros(3), *layout.A]
     bodies = [(PLATE, np.array([0.0, 0.0, plate_height]))]
     bodies += [(SOCKET, p + np.array([0.0, 0.0, socket_height])) for p in places]
     mass = sum(b.mass for b, _ in bodies)
@@ -132,8 +153,8 @@ def drive(t: float, side: int = 1) -> tuple[float, float, float]:
     return (s if rises else STROKE - s), rate, acceleration
 
 
-def leg_lengths(t: float, side: int = 1) -> tuple[Array, Array, Array]:
+def leg_lengths(layout: Layout, t: float, side: int = 1) -> tuple[Array, Array, Array]:
     """Distances between ball centres of the four legs and their two time derivatives, each shape (4,)."""
     moved = np.array([1.0, 1.0, 0.0, 0.0])
     s, rate, acceleration = drive(t, side)
-    return LENGTH + s * moved, rate * moved, acceleration * moved
+    return layout.length + s * moved, rate * moved, acceleration * moved

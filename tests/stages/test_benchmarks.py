@@ -31,6 +31,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.stages import cost_peers
+from tests.reference import sps4
 from tests.reference.ideal_motion import ideal
 
 UNKNOWNS = {"ideal": 116, "csj": 113, "far_cb": 129, "far_csj_cb": 126}
@@ -45,7 +46,7 @@ def test_the_dense_system_gives_the_start_accelerations_of_the_ideal_mechanism(r
     system = maximal.assemble(scene(root, "ideal"), {})
     solution = np.linalg.solve(system.matrix, system.right_side)
     first = system.first[system.group_of["platform"]]
-    expected = ideal(np.array([0.0]))[0]
+    expected = ideal(sps4.LAYOUT, np.array([0.0]))[0]
     # the scene gives its poses to 16 digits, the closures magnify that by their condition, 1e4
     assert np.allclose(solution[first : first + 3], [0.0, 0.0, expected.acceleration], rtol=0.0, atol=1e-9)
     assert np.allclose(solution[first + 3 : first + 6], expected.alpha, rtol=0.0, atol=1e-8)
@@ -165,7 +166,7 @@ def test_effects_are_taken_away_as_parts(root: Path):
 
 def platform_motion(samples: Samples) -> tuple[float, float]:
     """Largest deviations of height [m] and speed [m/s] from the ideal motion."""
-    exact = ideal(samples.time, np.where(samples.time < 0.09, 1, -1))
+    exact = ideal(sps4.LAYOUT, samples.time, np.where(samples.time < 0.09, 1, -1))
     z, v = np.array([m.height for m in exact]), np.array([m.speed for m in exact])
     return float(np.max(np.abs(samples.position[:, 2] - z))), float(np.max(np.abs(samples.velocity[:, 2] - v)))
 
@@ -211,8 +212,8 @@ def test_the_peer_s_model_refuses_what_it_would_leave_out():
 
 def test_the_logged_runs_of_the_peer_are_points_of_cost_studies(tmp_path: Path):
     found = exudyn.points([r for session in log.latest(log.FOLDER / "exudyn.jsonl") for r in session.records])
-    assert {"sps4/csj", "sps4/variants/far_csj_cb_damped"} <= found.keys()
-    for track in found["sps4/csj"]:
+    assert {"sps4/variants/first_csj", "sps4/variants/first_far_csj_cb_damped"} <= found.keys()
+    for track in found["sps4/variants/first_csj"]:
         # in SI: some 10 um and some mm/s at the longest step
         assert 1e-8 < track["error"]["platform.position"][0] < 1e-4
         assert 1e-4 < track["error"]["platform.velocity"][0] < 1e-1

@@ -119,6 +119,21 @@ def test_differences_are_those_of_the_runs():
     assert rows["A1.peak_force", "ideal"][2] == "–"
 
 
+def test_a_peak_between_output_times_counts_as_a_difference():
+    """One run has a row of its own, at an impact: velocities differ there although no common time shows it."""
+    runs = pair()
+    loose = runs["loose"]
+    between = loose.isel(time=[1]).assign_coords(time=loose["time"].values[[1]] + 1e-5)
+    between["velocity"] = between["velocity"] + 7.0
+    runs["loose"] = xr.concat([loose, between], "time", data_vars="minimal").sortby("time")
+    found = comparison.assemble(runs, {}, QUANTITIES).sel(run="loose", quantity="platform.velocity")
+    reference = float(
+        comparison.assemble(runs, {}, QUANTITIES)["largest"].sel(run="ideal", quantity="platform.velocity")
+    )
+    assert float(found["largest"]) > reference + 5.0
+    assert float(found["difference"]) == pytest.approx(float(found["largest"]) - reference, rel=1e-12)
+
+
 def test_runs_without_a_common_time_are_refused():
     runs = pair()
     late = runs["loose"].assign_coords(time=runs["loose"]["time"] + 3e-5)

@@ -11,7 +11,11 @@ import pytest
 from benchmarks.geometry import identify, kinematics, scenes
 from benchmarks.geometry.identify import DANGLE, DZ
 from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post.paper import TABLE8
+from flexclear.stages.run import find_scene
 
 TREE = Path(__file__).resolve().parents[2]
 TAKEN = (0.07, 0.15, 0.35)
@@ -51,7 +55,7 @@ def test_fitted_layouts_have_table_8_s_sensitivities() -> None:
 
 
 def test_other_layouts_do_not() -> None:
-    first = answer(Layout(0.086603, 0.05, 0.1, 0.173205, 0.35))
+    first = answer(identify.FIRST)
     assert abs(first.dz / DZ - 1.0) > 0.3
     assert abs(first.dangle / DANGLE - 1.0) < 0.05
 
@@ -72,13 +76,39 @@ def _ends() -> float:
     return float(np.linalg.norm(p - c - t * (d - c)))
 
 
-def test_the_scene_is_that_of_the_layout_that_the_log_takes() -> None:
+#: the scenes are typed in mm with ten digits after the point or more [m]
+TYPED = 1e-13
+
+
+def test_the_scenes_are_of_the_layout_that_the_log_takes() -> None:
     records = [json.loads(line) for line in (TREE / "benchmarks" / "log" / "geometry.jsonl").read_text().splitlines()]
     taken = [r for r in records if r.get("case") == "members"][-1]
     layout = identify.fitted(taken["ay"], taken["bx"], taken["by"])
     assert layout.height == pytest.approx(taken["height"], abs=1e-12)
-    text = (TREE / "scenes" / "sps4" / "variants" / "identified.toml").read_text()
-    assert text == scenes.file_text(layout)
-    for name in ("far_cb", "far_csj_free", "far_csj_fixed", "far_csj_cb"):
-        flexible = (TREE / "scenes" / "sps4" / "variants" / f"identified_{name}.toml").read_text()
-        assert f"pose = {scenes.flexible_pose(layout)}" in flexible
+    for name in ("ideal", "csj", "far_free", "far_csj_cb", "variants/prismatic_60mm_far_csj_fixed"):
+        same(f"sps4/{name}", layout)
+
+
+def test_edits_make_the_first_layout_s_scenes() -> None:
+    for name in ("first", "first_far_csj_free"):
+        same(f"sps4/variants/{name}", identify.FIRST)
+
+
+def same(name: str, layout: Layout) -> None:
+    """That the edits which make this layout out of a scene change nothing but the digits of numbers."""
+    plain = load_scene(find_scene(name))
+    along = 0.06 if "prismatic_60mm" in name else 0.0
+    places = scenes.edits(layout, flexible="rod1" in plain.flexible(), along=along)
+    for (place, one), (_, other) in zip(numbers(plain), numbers(load_scene(find_scene(name), places)), strict=True):
+        assert one == pytest.approx(other, abs=TYPED), place
+
+
+def numbers(scene: Scene) -> list[tuple[str, np.ndarray]]:
+    """Where the bodies of a scene are, as rotation matrices and positions, and their frames, by place."""
+    found = []
+    for name, body in scene.body.items():
+        for frame, pose in {**getattr(body, "frames", {}), "pose": getattr(body, "pose", None)}.items():
+            if pose is not None:
+                turn = quaternion_to_matrix(pose.as_quaternion())
+                found.append((f"{name}.{frame}", np.vstack([turn, pose.position])))
+    return found

@@ -36,7 +36,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             "Figure 1: four SPS legs and a central PS chain carry the platform; "
             "rod 1 is flexible, joint A1 has clearance",
-            "the paper prints neither the joint coordinates nor the start height: those shown are assumed",
+            "the paper prints neither the joint coordinates nor the start height: those shown are fitted to Table 8, "
+            "or assumed",
         )
         return style.files("fig01", figure)
 

@@ -29,7 +29,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         figure = maps(PLANE, data)
         style.heading(
             figure,
-            "Figure 14: angle and velocity of the platform hardly show the impacts",
+            "Figure 14: an impact is a small step of the platform's velocity; the angle does not show it",
             "the paper calls these phase plots Poincaré maps; second row (added): states when an impact "
             "begins, hollow beyond the horizon",
         )

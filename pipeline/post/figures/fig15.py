@@ -29,7 +29,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         figure = maps(PLANE, data)
         style.heading(
             figure,
-            "Figure 15: displacement and velocity of the platform hardly show the impacts",
+            "Figure 15: an impact is a small step of the platform's velocity; the displacement does not show it",
             "the paper calls these phase plots Poincaré maps; second row (added): states when an impact "
             "begins, hollow beyond the horizon",
         )

@@ -35,7 +35,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         figure = maps(PLANE, data)
         style.heading(
             figure,
-            "Figure 16: the acceleration shows every impact; in between it is nearly that of the ideal model",
+            "Figure 16: the acceleration shows every impact; in between the platform moves without leg 1",
             "the paper calls these phase plots Poincaré maps; second row (added): states when an impact "
             "begins, hollow beyond the horizon; grey band: linear scale, logarithmic outside",
         )

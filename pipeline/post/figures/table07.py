@@ -61,8 +61,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     notes.append(
         "Free-free modes lack part of the rod's static compliance between its joints; Craig-Bampton modes have "
         "all of it, so that column "
-        "is the reference. Errors this small depend on the assumed joint coordinates and on the absent "
-        "structural damping."
+        "is the reference. Errors this small depend on joint coordinates that the paper does not print and on the "
+        "absent structural damping."
     )
     notes.append(_contradiction(both))
     notes.append(MEANING)
@@ -79,8 +79,7 @@ def _contradiction(ours: Deviation) -> str:
         f"The paper's two rows contradict each other: {printed.angle:.3g} rad with {printed.displacement:.3g} mm is "
         f"{printed.angle / printed.displacement:.2g} rad/mm. Whatever changes the length of leg 1 turns and lifts the "
         f"platform in a ratio that geometry sets: {TABLE8.angle / TABLE8.displacement:.2g} rad/mm by the paper's "
-        "Table 8, "
-        f"{1e-3 * ours.angle / ours.displacement:.2g} rad/mm here (Craig-Bampton). {printed.displacement:.3g} mm "
-        "may be no "
-        "more than the last digit that the displacement was printed with."
+        f"Table 8, {1e-3 * ours.angle / ours.displacement:.2g} rad/mm here (Craig-Bampton), where the joint "
+        f"coordinates are fitted to that table. {printed.displacement:.3g} mm may be no more than the last digit that "
+        "the displacement was printed with."
     )

@@ -84,11 +84,10 @@ def _against_paper(data: dict[str, xr.Dataset]) -> str:
         velocity = 1e3 * np.array([member.velocity for member in _members(model, data)])
         texts.append(f"{name} {velocity.mean() / TABLE9[name].velocity:.2f}")
     return (
-        f"Mean largest velocity error over the paper's: {', '.join(texts)}. The paper's values are one run "
-        "each, at a fixed step, of a motion that "
-        "does not repeat under tiny changes; agreement of more than the magnitude would be chance. Angle and "
-        "displacement follow the clearance and the "
-        "assumed geometry as in Table 8."
+        f"Mean largest velocity error over the paper's: {', '.join(texts)}; as in Table 8 it is a prediction. The "
+        "paper's values are one run each, at a fixed step, of a motion that does not repeat under tiny changes; "
+        "agreement of more than the magnitude would be chance. Angle and displacement are the clearance times "
+        "sensitivities that are fitted to Table 8."
     )
 
 
