@@ -145,7 +145,7 @@ MESHES: dict[str, tuple[bytes | None, str]] = {
     "mesh.vtk": (GRID.encode(), "promises a grid of 2.7e\\+07 points"),
     "mesh.inp": (b"*INCLUDE, INPUT=/dev/zero\n", "no ordinary file"),
     "mesh.xdmf": (b"<a>" + b"a" * 1_000_000, "cannot read|no surface"),
-    "mesh.stl": (b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 100, ""),
+    "mesh.stl": (b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 100, "cannot read|no solid cells|no triangles"),
     "mesh.ply": (POINTS.encode(), "cannot read|no surface"),
     "pipe.vtu": (None, "no ordinary file"),
 }

@@ -136,7 +136,7 @@ def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
     monkeypatch.setattr(specialised, "MANY", 100)
     scene = check(root, "bricard", **CHANGING)
     whole = dynamics.simulate(scene, {}, silent)
-    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 7)
+    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 3)
     assert kills >= 2
     assert found.identical(whole)
 
