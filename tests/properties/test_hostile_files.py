@@ -245,6 +245,9 @@ def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:
     altered(record, files={"x/../../../../precious.txt": sha256(b"other")})
     assert read_record(record) is None
     assert upkeep.inventory(store, whole=True).unreadable == (record,)
+    for stage in ("../stage", "stage/../..", "/stage", ""):
+        altered(record, stage=stage, files={"txt": sha256(b"content")})
+        assert read_record(record) is None
     for artifact in upkeep.prunable(store, upkeep.inventory(store, whole=True), -1.0):
         upkeep.remove(store, artifact)
     assert (tmp_path / "precious.txt").read_text() == "precious"

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     Product = Mapping[str, xr.Dataset | bytes]
 
-#: stage, key or file of an artifact: part of the name of a file, and no way to another folder
+#: part of a stage (those of sweeps are folders in folders), key or file of an artifact: no way to another folder
 _PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
@@ -257,7 +257,7 @@ def read_record(path: Path) -> Record | None:
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
     # a record of somebody else's must not lead out of its folder: what is pruned is removed
-    inside = all(_PART.fullmatch(name) for name in (found.stage, found.key, *found.files))
+    inside = all(_PART.fullmatch(name) for name in (*found.stage.split("/"), found.key, *found.files))
     return found if inside and found.files else None
 
 
