@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import xarray as xr
@@ -15,7 +16,9 @@ from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.run import observed
+from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
@@ -59,7 +62,11 @@ class Error:
 
 @dataclass(frozen=True)
 class Rung:
-    """One of our runs: by what, its time once [s], how wrong it is, and how to time it once more [s]."""
+    """One of our runs: by what, its time once [s], how wrong it is, and how to time it once more [s].
+
+    bare: how to time its integration alone [s], whose samples are states.  straight: how to time it by the code for its
+    wiring alone, with which sweeps and ensembles step [s]; None for methods that do not use it.
+    """
 
     integrator: str
     rtol: float
@@ -67,6 +74,8 @@ class Rung:
     seconds: float
     error: Error
     time: Callable[[], float]
+    bare: Callable[[], float]
+    straight: Callable[[], float] | None
 
 
 @dataclass(frozen=True)
@@ -109,8 +118,8 @@ def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
                 run = _run(mine)
             except SolverError:
                 continue
-            error, timer = reference.error(_regular(run, body, reference.sampling)), _timer(mine)
-            rungs.append(Rung(integrator, rtol, int(run.attrs["evaluations"]), timer(), error, timer))
+            error, timers = reference.error(_regular(run, body, reference.sampling)), _timers(mine)
+            rungs.append(Rung(integrator, rtol, int(run.attrs["evaluations"]), timers[0](), error, *timers))
             if len(rungs) > 1 and rungs[-1].seconds > DEAR * min(r.seconds for r in rungs):
                 break  # tighter ones are dearer still
     return rungs
@@ -132,11 +141,28 @@ def _regular(run: xr.Dataset, body: str, sampling: float) -> Samples:
     return Samples(time[here], motion["position"].values[here], motion["velocity"].values[here])
 
 
-def _timer(here: Mechanism) -> Callable[[], float]:
+Timer = Callable[[], float]
+
+
+def _timers(here: Mechanism) -> tuple[Timer, Timer, Timer | None]:
+    """Of a run with all that is recorded of its rows, of its integration alone, and of the first by straight code."""
     engine = here.engine()
     start = consistent_start(engine)
-    # with the rows evaluated, as the peer evaluates its samples
-    return lambda: once(lambda: observed(engine, integrate(engine, start, silent)))
+
+    def whole(engine: Engine) -> float:
+        return once(lambda: observed(engine, integrate(engine, start, silent)))
+
+    @cache
+    def straight() -> Engine:
+        made = another(engine)
+        specialise(made)
+        return made
+
+    return (
+        lambda: whole(engine),
+        lambda: once(lambda: integrate(engine, start, silent)),
+        None if engine.method.traits.reads_all else lambda: whole(straight()),
+    )
 
 
 def cheapest(rungs: list[Rung], good: Callable[[Error], bool]) -> Rung | None:

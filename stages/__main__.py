@@ -12,6 +12,7 @@ from importlib import import_module
 
 from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, ResourceError, shown
 from flexclear.pipeline.core.system import plain_output
+from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
@@ -42,7 +43,8 @@ def main(arguments: list[str] | None = None) -> int:
     plain_output()
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
-        return int(options.command(options) or 0)
+        with workers.kept():
+            return int(options.command(options) or 0)
     except FlexclearError as error:
         print(f"flexclear: {error}", file=sys.stderr)
         return error.exit_code

@@ -44,7 +44,7 @@ def _size(options: argparse.Namespace) -> None:
     found = upkeep.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}
     for artifact in found.artifacts:
-        sizes.setdefault(artifact.record.stage, []).append(artifact.size)
+        sizes.setdefault(artifact.record.stage.partition("/")[0], []).append(artifact.size)
     for stage, each in sorted(sizes.items()):
         print(f"{stage:<12} {len(each):>6} artifacts {_megabytes(sum(each))}")
     kernels = [path for path in kernel_root().rglob("*") if path.is_file()]

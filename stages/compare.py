@@ -151,13 +151,12 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
     labels = list(graphs)
     inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
     inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}
-    name = "+".join(label.replace("/", "_").replace(" ", "_") for label in labels)
     return Task(
         stage="comparison",
         scene=labels[-1],
         run="flexclear.stages.s8_comparison:run",
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
-        folder=f"compare/{name}",
+        folder=f"compare/{run.joined(labels)}",
         names={"nc": "compare.nc"},
     )

@@ -72,7 +72,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--bundle", metavar="SCENE", help="run a scene and write all that is needed to repeat it into one file"
     )
     either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="run what such a file holds")
-    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of the scene of --bundle")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="with --bundle: change a value of the scene"
+    )
     parser.add_argument("--out", type=Path, metavar="FILE.zip", help="where --bundle writes")
 
 

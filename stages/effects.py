@@ -26,7 +26,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=s4_watched.MEMBERS,
         metavar="N",
-        help=f"starts of each variant with contacts (default {s4_watched.MEMBERS}); more tell smaller differences",
+        help=f"number of starts of each variant that has contacts (default {s4_watched.MEMBERS}); "
+        "more of them resolve smaller differences",
     )
 
 
@@ -43,7 +44,9 @@ def command(options: argparse.Namespace) -> None:
 def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> tuple[Task, Record]:
     """All variants, and their differences.  InputError for a scene without effects, or that watches nothing."""
     if members < 2:
-        raise InputError("--members", f"must be at least 2 (got {members})", "a single start tells nothing of chance")
+        raise InputError(
+            "--members", f"must be at least 2 (got {members})", "the scatter cannot be estimated from one start"
+        )
     there, chosen = variants.effects(scene), scene.watched()
     if not there:
         raise InputError(

@@ -17,7 +17,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
     parser.add_argument("--at", metavar="TIME", help="time whose drive positions are held, e.g. 0.09 or '90 ms'")
-    parser.add_argument("--moving", action="store_true", help="the drives keep their speed: steady motion")
+    parser.add_argument(
+        "--moving",
+        action="store_true",
+        help="vibrations about steady motion: drives keep their speed instead of being held",
+    )
     as_json.json_argument(parser)
 
 

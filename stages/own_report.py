@@ -30,10 +30,10 @@ FIGURES = {
     ),
     "wear.png": ("Wear of contacts", "Load times sliding way over time, and how deep the surfaces wear over the angle"),
     "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
-    "energy.png": ("Energy", "Energies over time, and what their ledger misses"),
+    "energy.png": ("Energy", "Energies over time, and the error of their balance"),
 }
 #: of a run's attributes, those that tell how it was made
-COST = ("method", "evaluations", "steps", "rejected_steps", "jacobians", "projections")
+COST = ("method", "method_reason", "evaluations", "steps", "rejected_steps", "jacobians", "projections")
 STABILITY = ("switched", "stiff_share", "redundant_closure_rows", "accuracy_verdict")
 PROVENANCE = ("scene", "versions", "Conventions")
 
@@ -91,17 +91,17 @@ def _page(
         Part("film", "The mechanism moving", _moving(graph, place, records)),
         Part("run", "The run", _media(place, graph.overview, records, FIGURES)),
         *(compare.parts(compared) if compared is not None else []),
-        Part("doubts", "To be doubted", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("", "warning"))),
-        Part("assumptions", "Assumptions, those on which most hangs first", listed(assumed, ("value", "assumption"))),
+        Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
+        Part("assumptions", "Assumptions, the most influential first", listed(assumed, ("value", "assumption"))),
         Part(
             "effects",
             "Effects present and absent",
             listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
         ),
-        Part("cost", "What it cost", listed(_told(attributes, COST), ("", ""))),
-        Part("stability", "How firmly it stands", listed(_stability(run), ("", ""))),
-        Part("provenance", "Where it comes from", listed(_provenance(graph, place, records), ("", ""))),
-        Part("downloads", "To take away", downloads(_files(graph, compared))),
+        Part("cost", "Computing cost", listed(_told(attributes, COST), ("figure", "value"))),
+        Part("stability", "Stability and constraints", listed(_stability(run), ("figure", "value"))),
+        Part("provenance", "Provenance", listed(_provenance(graph, place, records), ("item", "value"))),
+        Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
@@ -127,12 +127,14 @@ def _stability(run: xr.Dataset | None) -> dict[str, str]:
     found = _told(run.attrs, STABILITY)
     end = float(run["time"].values[-1])
     horizon = float(run["horizon"]) if "horizon" in run else end
-    found["neighbouring starts"] = (
-        "stay together to the end" if horizon >= end else f"part after {1e3 * horizon:.4g} ms of {1e3 * end:.4g} ms"
+    found["runs that start almost equally"] = (
+        "stay together to the end"
+        if horizon >= end
+        else f"differ visibly from {1e3 * horizon:.4g} ms on (the run lasts {1e3 * end:.4g} ms)"
     )
     for name, label, unit in (
-        ("energy_error", "largest energy that the ledger misses", "J"),
-        ("constraint_error", "largest opening of a loop", "m"),
+        ("energy_error", "largest error of the energy balance", "J"),
+        ("constraint_error", "largest error of a closed loop", "m"),
     ):
         if name in run:
             found[label] = f"{float(abs(run[name]).max()):.2e} {unit}"

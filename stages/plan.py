@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.coupling import lessened
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_plan
@@ -119,7 +120,9 @@ def bring(scene: Scene, place: Workplace) -> Planned:
     where = f"{scene.path or scene.name}"
     if scene.accuracy is None or not scene.accuracy.quantities:
         raise InputError(
-            f"{where} [accuracy]", "nothing is wanted", 'say what is, such as platform.position = "10 um" in [accuracy]'
+            f"{where} [accuracy]",
+            "the scene asks for no accuracy",
+            'name one, such as platform.position = "10 um" in [accuracy]',
         )
     if not variants.effects(scene):
         raise InputError(
@@ -140,11 +143,11 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities told."""
     told = s8_plan.from_dataset(plan)
     bare = variants.without(scene, variants.named(scene, told["gone"], f"{scene.name} [plan]"))
-    fewer = variants.with_modes(bare, told["modes"])
+    fewer = lessened(variants.with_modes(bare, told["modes"]), told["apart"])
     owners = fewer.owners()
     there = {name for names in owners.values() for name in names}
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
-    view = fewer.view.model_dump(mode="json", exclude_none=True) if fewer.view is not None else {}
+    view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
     solver = {"integrator": told["integrator"], "rtol": told["rtol"]}
     result = edited(
         fewer,

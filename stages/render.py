@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
@@ -49,12 +50,14 @@ def command(options: argparse.Namespace) -> None:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
     graphs, place = run.graphs(options.scenes, options.set), run.workplace(options)
     tasks = {graph.scene.name: _tasks(graph, wanted, options.what is not None, time) for graph in graphs}
-    outcome = place.bring([task for found in tasks.values() for task in found])
-    for found in tasks.values():
-        for task in found:
-            record = outcome.records.get(id(task))
-            if record is not None:
-                _tell(place, task.folder, list(record.files))
+    made = [task for found in tasks.values() for task in found]
+    if len(graphs) > 1 and wanted == [("modes", "html")]:
+        made.append(_beside(graphs))
+    outcome = place.bring(made)
+    for task in made:
+        record = outcome.records.get(id(task))
+        if record is not None:
+            _tell(place, task.folder, list(record.files))
     run.check(outcome)
 
 
@@ -78,6 +81,20 @@ def _tasks(graph: Graph, wanted: list[tuple[str, str]], asked: bool, time: float
     there = [pair for pair in wanted if asked or pair[0] != "modes" or graph.scene.flexible()]
     with run.in_file(graph.scene.path):
         return [graph.picture(what, kind, time) for what, kind in there]
+
+
+def _beside(graphs: list[Graph]) -> Task:
+    """The mode sets of several scenes on one page."""
+    bundles = {f"bundle/{graph.scene.name}: {body}": task for graph in graphs for body, task in graph.bundle.items()}
+    return Task(
+        stage="render",
+        scene=graphs[-1].scene.name,
+        part="modes of all",
+        run="flexclear.stages.s6_render:run",
+        params={"what": "modes", "format": "html", "title": "Mode sets beside each other"},
+        inputs=bundles,
+        folder=f"compare/{run.joined([graph.scene.name for graph in graphs])}",
+    )
 
 
 def _tell(place: run.Workplace, folder: str, files: list[str]) -> None:

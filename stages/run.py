@@ -108,6 +108,11 @@ def told(folder: Path, files: Mapping[str, str]) -> None:
         print(f"{near(folder)}: {', '.join(there)}")
 
 
+def joined(names: Sequence[str]) -> str:
+    """The name of the folder of what is made of several scenes."""
+    return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)
+
+
 def near(path: Path) -> str:
     """A path as seen from the current folder, where it lies below it."""
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 FORMATS: dict[str, tuple[str, ...]] = {
     "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
     "modes": ("png", "gif", "mp4", "html", "gltf", "pvd"),
-    "joint": ("png", "gif", "mp4"),
-    "vibrations": ("html",),
+    "joint": ("png", "gif", "mp4", "html"),
+    "vibrations": ("png", "gif", "mp4", "html"),
 }
 #: keys of `[view]` that pictures of solids heed
 SEEN = ("direction", "up", "zoom", "exaggeration", "duration", "impact_slowdown")
@@ -41,7 +41,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     Raises InputError for files of shapes that are not there.
     """
     found: dict[str, Any] = {"what": what, "format": kind}
-    if what == "motion" and kind in ("png", "gif", "mp4"):
+    if what in ("motion", "vibrations") and kind in ("png", "gif", "mp4"):
         found["gl"] = gl_state()
     if kind == "html":
         found["title"] = scene.title
@@ -50,7 +50,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     if scene.view is not None and what != "modes":
         asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
         found |= {"view": asked} if asked else {}
-    if what == "joint" or (what == "motion" and kind in ("gif", "mp4")):
+    if (what == "joint" and kind in ("png", "html")) or (what == "motion" and kind in ("gif", "mp4")):
         found["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
     return found
 

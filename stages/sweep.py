@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import pickle
+import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -15,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
-from flexclear.stages import limit, run, sweep_plan
+from flexclear.stages import limit, run, sweep_large, sweep_plan
 from flexclear.stages.run import Workplace
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.points import Point
     from flexclear.pipeline.core.scene.schema import Scene
 
+#: of the shown files, without their endings
+NAME = "sweep"
 #: finished points are stored after so many seconds, later after that share of the time so far
 OFTEN, SHARE = 2.0, 0.01
 
@@ -34,7 +37,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
     parser.add_argument("--workers", type=int, metavar="N", help="processes of this machine (default: its cores)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
-    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep)")
+    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep); .zarr: as Zarr")
     limit.argument(parser)
 
 
@@ -43,10 +46,15 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None:
         if len(options.sweeps) > 1:
             raise InputError("--out", f"takes one sweep, not {len(options.sweeps)}", "run the sweeps one by one")
-        run.check_target(options.out)
+        if options.out.suffix == sweep_large.SUFFIX:
+            sweep_large.require_zarr(f"--out {options.out}")
+        else:
+            run.check_target(options.out)
     place = run.workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
     wanted = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
+    if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(wanted[0]):
+        raise InputError(f"--out {options.out}", "the dataset is larger than memory", "let its name end in .zarr")
     with engine(width(options.workers), options.scheduler) as workers, place.limited():
         for path, plan in zip(paths, wanted, strict=True):
             folder = place.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
@@ -91,6 +99,7 @@ class _Desk:
     total: int
     done: dict[str, Point]
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
+    large: bool = False  #: values are left out of `done`: they are in the store, and memory does not hold them
     begun: float = field(default_factory=now)
     stored: float = field(default_factory=now)
     fresh: int = 0
@@ -102,7 +111,7 @@ class _Desk:
     def take(self, finished: Sequence[tuple[Job, Point]], tell: Callable[[float, str], None]) -> None:
         """Note finished points."""
         self.waiting += finished
-        self.done |= {job.key: point for job, point in finished}
+        self.done |= {job.key: sweep_large.stripped(point) if self.large else point for job, point in finished}
         self.fresh += len(finished)
         self.refused += sum(bool(point.refused) for _, point in finished)
         since = now() - self.begun
@@ -125,27 +134,39 @@ class _Desk:
 def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path | None = None) -> xr.Dataset:
     """The dataset of a sweep, brought up to date point by point.
 
-    folder: where dataset and figures are shown; on Ctrl-C it is left there with the points that are finished.
+    folder: where dataset and figures are shown; on Ctrl-C it is left there with the points that are finished. A dataset
+    that memory does not hold is in Zarr's form there, and what is returned reads from it.
     Raises FlexclearError.
     """
+    large = folder is not None and sweep_large.is_large(plan)
+    if folder is None:
+        sweep_large.require_small(plan)
     ready = sweep_plan.prepare(plan, place)
     with ExitStack() as locks:
         for family in ready.families:
             locks.enter_context(
                 place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep"))
             )
-        found = {key: point for family in ready.families for key, point in family.find(place.store, plan.kept).items()}
+        if folder is not None:
+            shown = str(folder.relative_to(place.store.root))
+            place.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
+        kept = () if large else plan.kept
+        found = {key: point for family in ready.families for key, point in family.find(place.store, kept).items()}
         wanted = {job.key: job for job in ready.jobs}
-        desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found})
+        desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found}, large=large)
         missing = [job for key, job in wanted.items() if key not in desk.done]
         try:
             if missing:
                 _run(desk, workers, missing)
         finally:
             desk.store()
-            result = ready.dataset(desk.done)
-            if folder is not None:
-                _publish(result, folder)
+            if folder is not None and large:
+                result = sweep_large.written(ready, place.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
+                (folder / f"{NAME}.nc").unlink(missing_ok=True)
+            else:
+                result = ready.dataset(desk.done)
+                if folder is not None:
+                    _publish(result, folder)
     return result
 
 
@@ -166,7 +187,8 @@ def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
 def _publish(result: xr.Dataset, folder: Path) -> None:
     with disk_limits(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        write_dataset(folder / "sweep.nc", result)
+        write_dataset(folder / f"{NAME}.nc", result)
+        shutil.rmtree(folder / f"{NAME}{sweep_large.SUFFIX}", ignore_errors=True)
 
 
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
@@ -174,20 +196,29 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
     from flexclear.pipeline.core.artifacts.store import publish
     from flexclear.pipeline.post.sweep import figures
 
-    for name, content in figures(result).items():
+    file = next(
+        path for path in (folder / f"{NAME}{suffix}" for suffix in (sweep_large.SUFFIX, ".nc")) if path.exists()
+    )
+    drawn = figures(result) if file.suffix != sweep_large.SUFFIX else {}
+    for name, content in drawn.items():
         publish(folder / name, content)
-    if out is not None:
+    for path in folder.glob(f"{NAME}.*g"):
+        if path.name not in drawn:  # of an earlier state of the sweep
+            path.unlink()
+    if out is not None and out.suffix == sweep_large.SUFFIX:
+        sweep_large.write_copy(out, result)
+    elif out is not None:
         with disk_limits(out.parent):
             write_dataset(out, result)
-    print("\n".join(summary(plan, result, folder)))
+    print("\n".join(summary(plan, result, file)))
     if not (result["status"] == 0).any():
         raise SolverError(f"{plan.sweep.name}: every point was refused; the reasons are above")
 
 
-def summary(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path) -> Iterator[str]:
+def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:
     """Points, refusals by their reason, and where the dataset is."""
     refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
-    yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {folder / 'sweep.nc'}"
+    yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {file}"
     kinds: dict[str, list[str]] = {}
     for reason in refused:
         # the same refusal at another time or size is the same to who reads the summary

@@ -19,6 +19,8 @@ from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 SHARE, MOST, QUEUED = 0.5, 1000, 2
+#: towards the end less is handed out, a share of what is left, so that all workers finish together; least seconds of it
+LEAST = 0.02
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
 #: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
@@ -71,7 +73,7 @@ class Engine:
             # nothing is compiled twice: until the first point is there nothing else begins
             width = self.width()
             while waiting and len(running) < (QUEUED * width if pace else 1):
-                mine = _take(waiting, min(MOST, max(1, int(max(SHARE, PER_WORKER * width) / pace))) if pace else 1)
+                mine = _take(waiting, _portion(sum(map(len, waiting)), pace, width) if pace else 1)
                 keep = self.here and not 0.0 < pace < LONG
                 running[self._given(mine, families, alone=not pace, keep=keep)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
@@ -111,6 +113,13 @@ def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     for job in jobs:
         found.setdefault(job.family, []).append(job)
     return [list(reversed(mine)) for mine in reversed(found.values())]
+
+
+def _portion(left: int, pace: float, width: int) -> int:
+    """Points that are handed out at a time. left: those that wait; pace: seconds of each."""
+    asking = PER_WORKER * width
+    seconds = min(max(SHARE, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    return min(MOST, max(1, int(seconds / pace)))
 
 
 def _take(waiting: list[list[Job]], count: int) -> list[Job]:
@@ -178,6 +187,8 @@ def _cluster(address: str) -> Iterator[Engine]:
         raise ResourceError(told) from None
     except (CancelledError, FutureCancelledError):
         raise ResourceError(f"{place}: the scheduler has gone; what was finished is kept") from None
+    except ImportError as error:  # of a worker that has joined since
+        raise InputError(place, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
         client.close()
 
@@ -208,10 +219,10 @@ def _threads(client: Any, place: str) -> int:
     threads = sum(client.nthreads().values())
     if not threads:
         raise InputError(place, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
-    try:
-        found = client.run(source_digest)
-    except ImportError as error:
-        raise InputError(place, f"its workers cannot import flexclear: {error}", "install it where they run") from None
+    found = client.run(source_digest, on_error="return")
+    for worker, digest in found.items():
+        if isinstance(digest, Exception):
+            raise InputError(place, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
     others = [worker for worker, digest in found.items() if digest != source_digest()]
     if others:
         raise InputError(place, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")

@@ -5,15 +5,18 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import prod
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.kept import Kept, parse_kept
 from flexclear.pipeline.core.scene.load import edited, with_numbers
+from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
 from flexclear.pipeline.core.workflow.workers import without_main
 from flexclear.stages import s4_simulate
@@ -23,10 +26,11 @@ from flexclear.stages.sweep_engine import Job
 from flexclear.stages.sweep_points import Family as Work
 
 if TYPE_CHECKING:
+    import numpy as np
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.artifacts.store import Store
+    from flexclear.pipeline.core.artifacts.store import Record, Store
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.scene.sweep import Sweep
 
@@ -55,7 +59,7 @@ class Family:
     @property
     def folder(self) -> tuple[str, str]:
         """Stage of its batches in the store, and a name there that no batch has."""
-        return f"sweep/{self.key}", "family"
+        return f"sweep/{self.key}", FAMILY
 
     def keep(self, points: Mapping[str, Point], store: Store, kept: Sequence[Kept]) -> None:
         """Store finished points as one artifact."""
@@ -65,42 +69,75 @@ class Family:
         store.put(self.folder[0], name, {"nc": batch(points, kept)}, self.facts)
 
     def find(self, store: Store, kept: Sequence[Kept]) -> dict[str, Point]:
-        """All points of the family that are stored and sound."""
+        """All points of the family that are stored and sound, with their values of what is `kept`."""
         from flexclear.pipeline.core.artifacts.points import unpacked
 
         found: dict[str, Point] = {}
+        for _, batch in self.batches(store):
+            found |= unpacked(batch, kept)
+        return found
+
+    def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
+        """What `keep` has stored, as far as it is sound."""
         for path in sorted((store.root / "cache" / self.folder[0]).glob("*.json")):
             record = store.find(self.folder[0], path.stem)
             if record is not None:
-                found |= unpacked(store.load(record), kept)
-        return found
+                yield record, store.load(record)
 
 
 @dataclass(frozen=True)
 class Plan:
     """A sweep whose places, values and quantities are known to fit its scene.
 
-    scene: with what is set, at the first point.  families, jobs: once the flexible bodies are there; see `prepare`.
+    scene: with what is set, at the first point.  turning: names of the quantities that are about an axis, not along.
+    families, jobs: once the flexible bodies are there; see `prepare`.
     """
 
     sweep: Sweep
     scene: Scene
     design: Design
     kept: tuple[Kept, ...]
+    turning: frozenset[str]
     families: tuple[Family, ...] = ()
     jobs: tuple[Job, ...] = ()
 
     def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
         """The sweep's dataset of the points that are finished."""
         from flexclear.pipeline.core.artifacts import points as results
-        from flexclear.pipeline.core.quantities import regular_times
 
         attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
         attributes |= {"title": self.sweep.title} if self.sweep.title else {}
         attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
-        keys, time = [job.key for job in self.jobs], regular_times(self.scene.time, self.scene.output)
-        return results.dataset(self.design, self.kept, keys, points, time, attributes)
+        keys = [job.key for job in self.jobs]
+        return results.dataset(
+            self.design, self.kept, keys, points, self.time, self.sections, self.turning, attributes, self.shares
+        )
+
+    def rows(self, first: int, last: int) -> Plan:
+        """The part of the plan with these entries of the first dimension, up to the last one or the end."""
+        axes, each = self.design.axes, prod(self.design.shape[1:])
+        cut = [replace(axis, values=axis.values[first:last]) for axis in (axes[:1] if self.design.grid else axes)]
+        made = Design((*cut, *axes[len(cut) :]), self.design.grid)
+        return replace(self, design=made, jobs=self.jobs[first * each : last * each])
+
+    @property
+    def time(self) -> np.ndarray:
+        """Of the series that are kept [s]."""
+        from flexclear.pipeline.core.quantities import regular_times
+
+        return regular_times(self.scene.time, self.scene.output)
+
+    @property
+    def sections(self) -> int:
+        """How many there are of each point, where they are kept."""
+        return (self.scene.sections or Sections()).periods
+
+    @property
+    def shares(self) -> list[str]:
+        """Of `points.SHARES`, those that are asked for."""
+        asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
+        return [share for share, wanted in asked.items() if wanted]
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
@@ -118,7 +155,7 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     base = edited(base, made.points()[0])
     kept = tuple(_kept(base, name, where) for name in sweep.keep)
     _check_kept(sweep, base, made, kept, where)
-    return Plan(sweep, base, made, kept)
+    return Plan(sweep, base, made, kept, _turning(base, made, kept, where))
 
 
 def _placed(place: str, error: InputError) -> InputError:
@@ -191,7 +228,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
     if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
         raise InputError(
             f"{where} [keep]",
-            "a motion that is looked at once in each period goes on from period to period: neither runs of one period, "
+            "sections follow one motion over many periods: neither runs of one period, "
             "nor members, nor an estimated error go with it",
             "keep sections alone, or make two sweeps of it",
         )
@@ -205,6 +242,32 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
         raise InputError(
             f"{where} [error]", "the scene has steps of fixed length, which no tolerance changes", "vary solver.step"
         )
+
+
+def _turning(base: Scene, made: Design, kept: Sequence[Kept], where: str) -> frozenset[str]:
+    """Names of the quantities that are about an axis; InputError for one that is so at some of the points only."""
+    from flexclear.pipeline.dynamics.model.driving import turns
+
+    found = frozenset(one.quantity.name for one in kept if turns(base, one.quantity))
+    for axis, scene in _worded(base, made):
+        for one in kept:
+            if turns(scene, one.quantity) != (one.quantity.name in found):
+                raise InputError(
+                    f"{where} [vary.{axis.name}]",
+                    f"'{one.name}' is a force at some points and a torque at others",
+                    "make two sweeps of it",
+                )
+    return found
+
+
+def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
+    """The scene at a point with each value that is no number, and so may name other parts."""
+    points = made.points()
+    for axis in made.axes:
+        texts = list(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else []
+        for k in (texts.index(text) for text in dict.fromkeys(texts)):
+            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if made.grid else points[k]
+            yield axis, edited(base, chosen)
 
 
 def prepare(wanted: Plan, place: Workplace) -> Plan:
@@ -264,10 +327,8 @@ def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict
 def _modules(wanted: Plan) -> tuple[str, ...]:
     """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
     found = set(s4_simulate.modules(wanted.scene))
-    for axis in wanted.design.axes:
-        for value in dict.fromkeys(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else ():
-            original = next(v for v in axis.values if str(v) == value)
-            found |= set(s4_simulate.modules(edited(wanted.scene, dict.fromkeys(axis.places, original))))
+    for _, scene in _worded(wanted.scene, wanted.design):
+        found |= set(s4_simulate.modules(scene))
     return tuple(sorted(found))
 
 

@@ -27,7 +27,7 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 BODY = "platform"
 #: shares of the largest speed for which the times needed are compared
 LEVELS = (1e-2, 1e-3, 1e-4)
-REPEATS = 3
+REPEATS = 5
 #: Exudyn runs longer than this are not repeated [s]
 LONG = 1.0
 SMOOTH = (1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
@@ -140,24 +140,29 @@ def _name(rung: Rung) -> str:
     return f"{rung.integrator} {rung.rtol:g}"
 
 
-def _match(rung: Rung, theirs: float, ours: float) -> dict[str, Any]:
-    error = 1e6 * rung.error.position
-    return {"run": _name(rung), "position_um": error, "s": ours, "ratio": theirs / ours}
+def _match(rung: Rung, theirs: float, ours: Sequence[float]) -> dict[str, Any]:
+    whole, bare, *straight = ours
+    found = {"run": _name(rung), "position_um": 1e6 * rung.error.position, "s": whole, "bare_s": bare}
+    return found | ({"straight_s": straight[0]} if straight else {}) | {"ratio": theirs / whole}
 
 
 def _reaches(level: float, error: Error) -> bool:
     return error.relative <= level
 
 
-def _side_by_side(again: Callable[[], Outcome], first: Outcome, rungs: list[Rung]) -> tuple[float, dict[str, float]]:
-    """Median times [s] of theirs, and of ours by name, measured in turns."""
-    theirs, ours = [first.seconds], {_name(rung): [rung.time()] for rung in rungs}
-    for _ in range(REPEATS - 1):
-        if first.seconds < LONG:
+def _side_by_side(
+    again: Callable[[], Outcome], first: Outcome, rungs: list[Rung]
+) -> tuple[float, dict[str, list[float]]]:
+    """Median times [s] of theirs, and by name of ours: whole, integration alone, by straight code; in turns."""
+    theirs, mine = [first.seconds], {_name(rung): rung for rung in rungs}
+    timers = {name: [t for t in (rung.time, rung.bare, rung.straight) if t] for name, rung in mine.items()}
+    ours: dict[str, list[list[float]]] = {name: [] for name in mine}
+    for number in range(REPEATS):
+        if number and first.seconds < LONG:
             theirs.append(again().seconds)
-        for rung in {_name(rung): rung for rung in rungs}.values():
-            ours[_name(rung)].append(rung.time())
-    return float(np.median(theirs)), {name: float(np.median(times)) for name, times in ours.items()}
+        for name, mine_of in timers.items():
+            ours[name].append([timer() for timer in mine_of])
+    return float(np.median(theirs)), {name: np.median(times, axis=0).tolist() for name, times in ours.items()}
 
 
 def show(records: list[Record]) -> str:
@@ -173,6 +178,8 @@ def show(records: list[Record]) -> str:
         "our run",
         "our position [um]",
         "Exudyn / ours",
+        "integration alone",
+        "straight code",
     )
     columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")
     texts = [pipe_table(head, levels)]
@@ -203,12 +210,14 @@ def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     done = [r for r in runs if "s" in r and str(level) in r["ours"]]
     reaching = [r for r in done if r["relative"] <= level]
     if not done:
-        return [name, *[""] * 7]
+        return [name, *[""] * 9]
     best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
     mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
     theirs = [seconds, f"{best['method']}, {best['step']:g} s", short(best["position_um"])]
-    return [name, *theirs, f"{ours['s']:.3g}", ours["run"], short(ours["position_um"]), ratio]
+    # records from before these were measured say nothing about them
+    others = [f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("bare_s", "straight_s")]
+    return [name, *theirs, f"{ours['s']:.3g}", ours["run"], short(ours["position_um"]), ratio, *others]
 
 
 def _run_row(run: Record) -> list[str]:

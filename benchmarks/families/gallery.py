@@ -17,6 +17,7 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post import derive
+from flexclear.stages import s6_render
 from flexclear.stages.run import bundles, find_scene
 
 PICTURES = DOCS / "gallery"
@@ -254,8 +255,9 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
 
     from flexclear.pipeline.post.render import film, mechanism
 
-    direction = scene.view.direction if scene.view is not None else None
-    drawn = mechanism.mechanism(run, reduced, mechanism.Looks(direction=direction))
+    told = s6_render.params(scene, "motion", "html")
+    looks = mechanism.Looks(bodies=told["bodies"], **told.get("view", {}))
+    drawn = mechanism.mechanism(run, reduced, looks)
     row = round(entry.at * (run.sizes["time"] - 1))
     picture = Image.fromarray(film.still(drawn, row))
     small = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)

@@ -1,4 +1,4 @@
-"""What absent effects cost, and how the cost grows with the number of loops.
+"""What absent effects cost, and how the cost grows with the number of loops and of modes.
 
 The N-four-bar: N + 1 upright rods on revolute joints, their tops joined by N rods. In space, planar loops with
 revolute joints alone are redundant; here the joining rods have a spherical joint at each end and may spin about their
@@ -8,6 +8,7 @@ own axes, which leaves the planar motion as it is and every closure independent.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,18 @@ from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states,
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, slope
 from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.specialised import specialise
+from flexclear.stages.run import bundles
 
 LOOPS = (5, 10, 20, 40, 80)
+#: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies
+MODES, FLEXIBLE = (6, 13, 24, 48), "far_cb"
+#: of its run from which a state is taken [s]
+MOMENT = 1e-3
 #: what the fullest scene loses, and the scene that never had it
 ABSENT = {"clearance and flexibility": "ideal", "flexibility": "csj", "clearance": "far_cb"}
 ROUNDS = 25
@@ -29,16 +38,18 @@ EVALUATIONS = 4000
 
 
 def cases() -> list[Case]:
-    """Absent effects, then numbers of loops."""
-    return [Case(effect) for effect in ABSENT] + [Case(f"{n} loops", n) for n in LOOPS]
+    """Absent effects, then numbers of loops and of modes."""
+    grown = [Case(f"{n} {what}", n) for what, numbers in (("loops", LOOPS), ("modes", MODES)) for n in numbers]
+    return [Case(effect) for effect in ABSENT] + grown
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each; numbers of loops take turns."""
+    """A record for each; numbers of loops take turns, and so do those of modes."""
     for case in cases:
         if case.name in ABSENT:
             yield case, [_absent(case.name)]
-    yield from _loops([case for case in cases if case.name not in ABSENT])
+    yield from _loops([case for case in cases if case.name.endswith("loops")])
+    yield from _modes([case for case in cases if case.name.endswith("modes")])
 
 
 def _absent(effect: str) -> Record:
@@ -75,6 +86,37 @@ def _loops(cases: Sequence[Case]) -> Measured:
     for case in cases:
         if case.name in times:
             yield case, [{"loops": case.of, **times[case.name].told("us")}]
+
+
+def _modes(cases: Sequence[Case]) -> Measured:
+    """Evaluations by the kernels and, where there is such, by straight code."""
+    tasks, known = dict[str, Callable[[], float]](), dict[str, Record]()
+    full = mechanism(FLEXIBLE)
+    for case in cases:
+        engine = with_modes(full, case.of).engine()
+        arrays = engine.model.arrays
+        known[case.name] = {
+            "modes": case.of,
+            "held": int(arrays.table(m.FLEXES)["n_held"][0]),
+            "products": len(arrays.table(m.MOMENTS)),
+        }
+        state = states(engine, trajectory(engine))["free"]
+        tasks[case.name] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
+        specialise(engine)
+        if engine.h[m.RATES] != engine.h[m.EVALUATE]:
+            tasks[f"{case.name}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS // 4, straight=True)
+    times = interleaved(tasks, ROUNDS)
+    for case in cases:
+        straight = times.get(f"{case.name}, straight")
+        told = {"straight": straight.told("us")} if straight else {}
+        yield case, [known[case.name] | times[case.name].told("us") | told]
+
+
+def with_modes(full: Mechanism, count: int) -> Mechanism:
+    """The mechanism with so many modes of its flexible body."""
+    (body,) = full.scene.flexible()
+    scene = edited(full.scene, {f"body.{body}.modes.count": count, "time.end": MOMENT})
+    return Mechanism(f"{count} modes", scene, bundles(scene))
 
 
 def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
@@ -130,8 +172,8 @@ def four_bars(loops: int, lean: float = 0.0) -> Scene:
 
 
 def show(records: list[Record]) -> str:
-    """Both tables, with the exponent of the growth."""
-    loops = [r for r in records if "us" in r]
+    """All tables, with the exponents of the growth."""
+    loops, modes = ([r for r in records if "us" in r and what in r] for what in ("loops", "modes"))
     absent: Columns = {
         "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
         "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
@@ -149,12 +191,38 @@ def show(records: list[Record]) -> str:
     if len(loops) > 1:
         exponent = slope([r["loops"] for r in loops], [r["us"] for r in loops])
         parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
+    if modes:
+        parts.append(_of_modes(modes))
     return "\n\n".join(parts + [f"{r['case']} skipped: {r['reason']}" for r in records if "reason" in r])
 
 
+def _of_modes(records: list[Record]) -> str:
+    """The table over numbers of modes, with exponents from each one to the next."""
+
+    def to_here(r: Record, of: Callable[[Record], Any]) -> str:
+        before = records[records.index(r) - 1] if r is not records[0] else r
+        if before is r or not (of(before) and of(r)):
+            return ""
+        return f"{slope([before['modes'], r['modes']], [of(before), of(r)]):.2f}"
+
+    def straight(r: Record) -> Any:
+        return r.get("straight", {}).get("us")
+
+    columns: Columns = {
+        "modes": lambda r: str(r["modes"]),
+        "of them held": lambda r: str(r["held"]),
+        "integrals of two modes": lambda r: str(r["products"]),
+        "us per evaluation": lambda r: spread(r, "us", 2),
+        "exponent": lambda r: to_here(r, lambda one: one["us"]),
+        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "its exponent": lambda r: to_here(r, straight),
+    }
+    return table(records, columns)
+
+
 FAMILY = Family(
-    what="what absent effects cost, and growth with the number of loops",
-    takes="2 min",
+    what="what absent effects cost, and growth with the number of loops and of modes",
+    takes="4 min",
     page="benchmarks.md",
     cases=cases,
     measure=measure,

@@ -36,7 +36,7 @@ class Plan:
 
     modes: elastic coordinates of kept flexible bodies that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
-    the plan has run.  runs: how many.
+    the plan has run.  runs: how many.  apart: places of parts that nothing couples to what is asked for.
     """
 
     decisions: tuple[Decision, ...]
@@ -47,6 +47,7 @@ class Plan:
     modes: Mapping[str, int]
     evaluations: int
     runs: int
+    apart: tuple[str, ...] = ()
 
     @property
     def gone(self) -> tuple[Effect, ...]:

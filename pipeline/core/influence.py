@@ -6,8 +6,10 @@ to its standard error only:
 
 .. math:: d(t) = \sqrt{\max(0, |\bar a - \bar b|^2 - (k\,s)^2)}, \quad s^2 = (s_a^2 + s_b^2)/n
 
-with as many standard errors k taken as chance as Student's t says for so few members. Without spread d is the distance
-of the two motions.
+with as many standard errors k taken as chance as Student's t says for so few members. No s(t) counts for less than the
+root mean square over a twentieth of the series about it: a few members that have parted agree at some output by
+accident, and of hundreds of outputs a few would look like differences. Without spread d is the distance of the two
+motions.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
+#: share of a series over which the spread of members is pooled
+POOLED = 0.05
 #: by how much members start apart: a share of the clearance, and the least [m]
 SHARE, LEAST = 1e-3, 1e-8
 #: what is kept of a quantity to compare it by: the series, and of what impacts make large its extreme, which is read
@@ -109,9 +113,18 @@ def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Inf
         distance, error = rotation_between(one, two), 2.0 * error  # a quaternion changes by half the angle
     else:
         distance = np.linalg.norm(one - two, axis=1)
-    error = chance(members) * error
+    error = chance(members) * _pooled(error)
     told = np.sqrt(np.maximum(0.0, distance**2 - error**2))
     return Influence(float(told.max(initial=0.0)), float(error.max(initial=0.0)))
+
+
+def _pooled(error: np.ndarray) -> np.ndarray:
+    """Errors of a series, none below the root mean square of its neighbours."""
+    width = max(1, round(POOLED * len(error)))
+    around = np.convolve(
+        np.pad(error**2, (width // 2, (width - 1) // 2), mode="edge"), np.full(width, 1.0 / width), "valid"
+    )
+    return np.maximum(error, np.sqrt(around))
 
 
 def _impact_times(a: Point, b: Point, name: str) -> Influence:

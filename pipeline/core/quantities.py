@@ -35,6 +35,21 @@ def series(run: xr.Dataset, quantity: Quantity) -> np.ndarray:
     return values.reshape(len(values), -1)
 
 
+#: where a run says of each part whether it pushes or turns, where that is not the quantity's own variable
+PUSHES = {"peak_force": "contact_normal_force"}
+
+
+def unit(run: xr.Dataset, quantity: Quantity) -> str:
+    """The SI unit of a quantity in a run: of drives and contacts along a rotation that of a torque or its impulse."""
+    kind = KINDS[quantity.kind]
+    name = PUSHES.get(quantity.kind, kind.variable)
+    if kind.owner not in ("drive", "contact") or quantity.kind == "impact_times" or name not in run:
+        return quantity.unit
+    if f"{name}_units" in run.coords:
+        return str(run[f"{name}_units"].sel({kind.owner: quantity.owner}).values)
+    return str(run[name].attrs.get("units") or quantity.unit)
+
+
 def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.ndarray:
     """Impact times [s] or the largest contact force [N] of contacts that begin up to a time [s], shape (n,).
 

@@ -184,6 +184,19 @@ def _product(text: str) -> tuple[float, Exponents] | None:
     return factor, (kg, m, s, rad)
 
 
+def udunits(text: str) -> str:
+    """A unit as UDUNITS reads it, ``N m-1 s-1`` for ``N/m s``; empty for broken powers, which it has not."""
+    factors = []
+    for k, side in enumerate(_plain(text).split("/")):
+        for part in side.split():
+            found = _FACTOR.fullmatch(part)
+            power = float(found[2] or 1.0) * (-1.0 if k else 1.0) if found is not None else 0.5
+            if power != int(power):
+                return ""
+            factors.append(f"{found[1] if found else part}{int(power) if power != 1.0 else ''}")
+    return " ".join(factors)
+
+
 def coefficient(value: object, dimension: str, order: int) -> float:
     """SI value of the coefficient of t^order in a law whose values have a dimension; ValueError in words.
 

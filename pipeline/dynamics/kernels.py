@@ -6,21 +6,28 @@ Kernels become code without being optimised: the function that Python calls is, 
 Left to itself Numba optimises each function together with copies of all that it calls, and makes machine code of it,
 before it compiles the next one up: what lies n calls deep is optimised n times. But only compiled code calls kernels
 (`lowering`).
+
+Numba is imported when something is compiled: a process that finds all code on disk (`compile.machine_code`) does
+without it, and starts in half the time.
 """
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any
-
-import numba
-from numba import njit
 
 #: releases of Numba with which `lowering` has been looked at
 LOOKED_AT = ("0.67.", "0.68.")
+#: for debugging: kernels are the functions of Python that they look like, as Numba's own setting has it
+INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
 
 
 def lowering() -> dict[str, Any]:
-    """Options of the decorator: the step of `lowering`, where the release of Numba is known to take it."""
+    """Options of the compiler: the step of `lowering`, where the release of Numba is known to take it."""
+    import numba
+
     if not numba.__version__.startswith(LOOKED_AT):
         return {}
     from flexclear.pipeline.dynamics.lowering import KernelCompiler
@@ -28,13 +35,35 @@ def lowering() -> dict[str, Any]:
     return {"pipeline_class": KernelCompiler}
 
 
-# No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and C
-# took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
-kernel = njit(
-    error_model="numpy",
-    fastmath={"contract", "reassoc", "nsz"},
-    _nrt=False,
-    no_cfunc_wrapper=True,
-    no_cpython_wrapper=True,
-    **lowering(),
-)
+class Kernel:
+    """A function that compiled code calls; what Numba knows of it comes to be when it is first asked for."""
+
+    def __init__(self, py_func: Any) -> None:
+        self.py_func = py_func
+        self.__name__, self.__doc__, self.__module__ = py_func.__name__, py_func.__doc__, py_func.__module__
+
+    # No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and
+    # C took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
+    @cached_property
+    def dispatcher(self) -> Any:
+        """What compiles it, by the types of its arguments."""
+        from numba import njit
+
+        return njit(
+            error_model="numpy",
+            fastmath={"contract", "reassoc", "nsz"},
+            _nrt=False,
+            no_cfunc_wrapper=True,
+            no_cpython_wrapper=True,
+            **lowering(),
+        )(self.py_func)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """What Numba takes it for where other kernels name it."""
+        return self.dispatcher._numba_type_
+
+
+def kernel(function: Callable) -> Any:
+    """The function, to be called by compiled code."""
+    return function if INTERPRETED else Kernel(function)

@@ -19,7 +19,10 @@ Words: a *link* is a body after rigidly joined ones are merged (link 0 is the gr
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
 speed; free ones come first, in the order of elimination (descendants before ancestors), prescribed ones after. A
 *column* is the twist (angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
-coordinate has one, and every port one more per mode.
+coordinate has one, and every port one more per moving shape of its body.
+
+Modes stand in X, U and the state as eigenmodes, in all else that has coordinates (DU, BIAS, COLUMNS, MASS, JACOBIAN,
+...) in their body's interface basis (`bodies.interface`).
 """
 
 from __future__ import annotations
@@ -154,10 +157,12 @@ EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
 SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
-#: the mass matrix
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled")
+#: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
+#: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled n_held basis0 n_basis moving0 interface0")
+BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
 MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
-PORTS = wiring("flex column shapes")  # column, shapes: first of them
+PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
 ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
@@ -202,10 +207,13 @@ SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
 FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
 FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
 MOMENT_VALUES = numbers("value")
+BASIS_VALUES = numbers("value")
+INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
-PORT_DATA = numbers("value")  # per port: translation shape (3n), rotation shape (3n)
-#: radius: of the inner surface; shape: what else its kind of surfaces has
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2")
+PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
+#: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
+#: of surfaces has
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
 #: along the axis and per moment about it; preload: normal force that is always there
 BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
@@ -221,6 +229,8 @@ FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutel
 _FRAME = "origin:3 axes:3x3 omega:3 velocity:3 alpha:3 acceleration:3"
 FRAME = layout(_FRAME)
 X, U, DU = _places(3)
+#: as X and U, but of coordinates: those of moving shapes
+INTERFACE_X, INTERFACE_U = _places(2)
 LINK_FRAMES, SITE_FRAMES = work(_FRAME), work(_FRAME)
 #: the motion subspace S of one joint: a twist per freedom, axes of its first frame
 SUBSPACE = work("angular:3 linear:3")
@@ -228,6 +238,7 @@ SUBSPACE = work("angular:3 linear:3")
 OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
+#: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _places(9)
 #: wrenches of the closure rows; then, of the couplings, those on their first joints
 ROWS = work("moment:3 force:3")

@@ -210,11 +210,8 @@ def turn_symmetric(s, v):
 
 
 @kernel
-def exponential(v):
-    """Rotation matrix of a rotation vector below about one radian (Rodrigues, in series)."""
-    s = dot(v, v)
-    a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
-    b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
+def _about(v, a, b):
+    """The matrix that takes x to x + a v x x + b v x (v x x)."""
     x, y, z = v
     return (
         1.0 - b * (y * y + z * z),
@@ -227,6 +224,15 @@ def exponential(v):
         b * y * z + a * x,
         1.0 - b * (x * x + y * y),
     )
+
+
+@kernel
+def exponential(v):
+    """Rotation matrix of a rotation vector below about one radian (Rodrigues, in series)."""
+    s = dot(v, v)
+    a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
+    b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
+    return _about(v, a, b)
 
 
 @kernel
@@ -246,6 +252,14 @@ def tangent(v, x):
     vx = cross(v, x)
     vvx = cross(v, vx)
     return add(x, add(scale(a, vx), scale(b, vvx)))
+
+
+@kernel
+def tangent_matrix(v):
+    """The matrix of `tangent`: x to angular velocity."""
+    s = dot(v, v)
+    a, b, _, _ = _tangent_series(s)
+    return _about(v, a, b)
 
 
 @kernel

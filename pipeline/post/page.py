@@ -56,7 +56,7 @@ def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: S
         Part("variants", "Variants", prose(("scene", "what it is"), content.variants)),
         Part(
             "assumptions",
-            "Assumptions, those on which most hangs first",
+            "Assumptions, the most influential first",
             prose(("value", "assumption", "scenes"), assumptions),
         ),
         Part(
@@ -65,7 +65,7 @@ def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: S
             prose(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
         ),
         Part("versions", "How it was computed, and by which versions", _versions(content)),
-        Part("downloads", "To take away", _downloads(content)),
+        Part("downloads", "Downloads", _downloads(content)),
     ]
     title = "Rod flexibility and joint clearance: the paper, reproduced"
     return page(title, CITATION, parts, _answer(content)).decode()

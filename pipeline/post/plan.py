@@ -30,6 +30,7 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
         "modes": dict(plan.modes),
         "integrator": plan.integrator,
         "rtol": plan.rtol,
+        "apart": list(plan.apart),
     }
     found = xr.Dataset(
         {
@@ -101,6 +102,8 @@ def table(found: xr.Dataset) -> Table:
     told = json.loads(found.attrs["planned"])
     notes = [words(found)]
     notes += [f"{name} keeps {count} modes: its static ones do the same." for name, count in told["modes"].items()]
+    if told["apart"]:
+        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
     notes.append(
         f"The planned run is integrated by {told['integrator']} at a relative tolerance of {told['rtol']:.0e}. "
         f"The plan rests on {found.attrs['runs']} short runs, {found.attrs['evaluations']:,} evaluations."

@@ -49,7 +49,7 @@ def collect(
     folder = results / "runs" / rendered
     films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]
     still = folder / "mechanism.png"
-    pages = [*folder.glob("motion.html"), *sorted(folder.glob("modes_*.html"))]
+    pages = [path for path in (folder / "motion.html", folder / "modes.html") if path.is_file()]
     return Content(
         figures=tuple(drawn),
         tables=tables,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Collection
 from math import ceil
 from pathlib import PurePath
 
@@ -20,18 +21,23 @@ DECADE = 8.0
 #: factors that make the numbers of an axis handy
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
+#: share of the largest component of a vector below which another one is zero but for rounding
+ZERO = 1e-9
 
 
 def figures(sweep: xr.Dataset) -> dict[str, bytes]:
-    """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, or text along them."""
+    """``sweep.png`` and ``.svg``; nothing for sweeps with more dimensions than paper has, text along them, no point."""
     parameters = [str(name) for name in sweep["status"].dims]
+    # values may stand in any order in a sweep; along an axis they go up
+    sweep = sweep.sortby([name for name in parameters if name in sweep.coords and sweep[name].dtype.kind in "fiu"])
     draw = _drawn(sweep, parameters)
     panels = _panels(sweep, sections=draw is _curve)
-    if draw is None or not panels:
+    if draw is None or not panels or not (sweep["status"] == 0).any():
         return {}
-    rows = ceil(len(panels) / COLUMNS)
+    columns = min(COLUMNS, len(panels))
+    rows = ceil(len(panels) / columns)
     with style():
-        figure, axes = grid(rows, COLUMNS, (9.6, 1.0 + 2.9 * rows))
+        figure, axes = grid(rows, columns, (9.6, 1.0 + (2.9 if columns > 1 else 4.2) * rows))
         for ax, name in zip(axes.ravel(), panels, strict=False):
             draw(figure, ax, panels[name], name)
             ax.set_title(name)
@@ -42,6 +48,7 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
         told = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
         told += [f"{refused} refused"] if refused else []
         told += [f"{missing} not run"] if missing else []
+        told += _still(sweep, panels)
         heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(told))
         return files(NAME, figure)
 
@@ -63,8 +70,30 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
         if inner in ((), ("section",)):
             found[name] = sweep
         elif inner in (("axis",), ("section", "axis")):
-            for k, axis in enumerate(sweep["axis"].values):
-                found[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].isel(axis=k, drop=True)})
+            for axis in _moving(sweep[name]):
+                found[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].sel(axis=axis, drop=True)})
+    return found
+
+
+def _moving(vector: xr.DataArray) -> list[str]:
+    """Components that are not zero at all points, but for rounding; all of them where nothing moves."""
+    sizes = abs(vector).max([dim for dim in vector.dims if dim != "axis"])
+    told = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
+    return told or list(map(str, vector["axis"].values))
+
+
+def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
+    """What is said of components without a panel."""
+    found = []
+    for name in map(str, sweep.data_vars):
+        there = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
+        if there:
+            away = [str(axis) for axis in sweep["axis"].values if axis not in there]
+            found += (
+                [f"{' and '.join(away)} of {name} are 0" if len(away) > 1 else f"{away[0]} of {name} is 0"]
+                if away
+                else []
+            )
     return found
 
 
@@ -138,7 +167,7 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     x, y = (sweep[dim].values * _scale(sweep, dim)[0] for dim in (columns, rows))
     mesh = ax.pcolormesh(x, y, sweep[name].values, shading="nearest", cmap="viridis")
     bar = figure.colorbar(mesh, ax=ax)
-    bar.set_label(sweep[name].attrs["units"], color=SOFT)
+    bar.set_label(_written(sweep[name].attrs["units"]), color=SOFT)
     bar.outline.set_visible(False)
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
@@ -167,13 +196,21 @@ def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:
     ax.set_xlabel(_axis(sweep, parameter))
-    units = sweep[name].attrs["units"]
-    ax.set_ylabel("" if units == "1" else units)
+    ax.set_ylabel(_written(sweep[name].attrs["units"]))
 
 
 def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:
     unit = sweep[parameter].attrs.get("units", "")
-    return HANDY.get(unit, (1.0, unit))
+    return HANDY.get(unit, (1.0, _written(unit)))
+
+
+def _written(units: str) -> str:
+    """Units of a dataset as one writes them: ``m/s`` of ``m s-1``, nothing of ``1``."""
+    parts = [] if units == "1" else units.split()
+    over, under = ([p for p in parts if ("-" in p) == below] for below in (False, True))
+    powers = re.compile(r"(?<=[A-Za-z])-?(\d+)")
+    written = [powers.sub(lambda m: "" if m[1] == "1" else f"$^{m[1]}$", " ".join(some)) for some in (over, under)]
+    return "/".join([written[0] or "1", *written[1:]] if under else written[:1])
 
 
 def _axis(sweep: xr.Dataset, parameter: str) -> str:

@@ -171,7 +171,7 @@ def test_rate_floor_changes_nothing(floor: str) -> None:
 
 def test_a_ledger_that_does_not_close_is_no_result() -> None:
     coarse = (("solver.rtol", 1e-3), ("solver.ledger_tolerance", 1e-9))
-    with pytest.raises(SolverError, match="ledger of energy does not close"):
+    with pytest.raises(SolverError, match="energy balance does not close"):
         run(BOUNCE, coarse)
 
 

@@ -90,8 +90,10 @@ def test_a_guess_that_runs_correct_is_not_repeated() -> None:
     suit = known()
     suit.learn(1e-4, "exponential", xr.Dataset(attrs={"method": "dop853", "evaluations": 1}))
     assert suit.best(1e-4) == "dop853"
+    assert "began with exponential" in suit.why(1e-4)
     suit.learn(1e-4, "dop853", xr.Dataset(attrs={"method": "radau", "evaluations": 1}))
     assert suit.best(1e-4) == "radau"
+    assert "stability limited the steps of dop853 in a run before" in suit.why(1e-4)
 
 
 @pytest.mark.parametrize("given, chosen", [(True, True), (False, False)])

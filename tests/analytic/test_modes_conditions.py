@@ -193,7 +193,7 @@ def _quiet(share: float) -> None:
         ("cantilever", {"interfaces": ()}, "clamped at an interface"),
         ("craig-chang", {"interfaces": ()}, "need an interface"),
         ("craig-chang", {"count": 11}, r"12 .*modes"),
-        ("mean-axis", {}, "mean axes of which shapes"),
+        ("mean-axis", {}, "shapes of another condition, and none is named"),
         ("mean-axis", {"of": "craig"}, r"no reference condition is called 'craig'"),
     ],
 )

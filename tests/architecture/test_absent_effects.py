@@ -36,7 +36,7 @@ APPLIED = (
     "flexclear.pipeline.dynamics.linear",
 )
 BODIES = "flexclear.pipeline.dynamics.bodies"
-FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.ports", "flexclear.pipeline.structure")
+FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.pipeline.structure")
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 

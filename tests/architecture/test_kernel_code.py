@@ -48,7 +48,8 @@ def test_what_python_calls_is_optimised_once_however_deep_it_is(monkeypatch: pyt
     assert called(3.0) == 14.0 * 6.0 - 14.0
     assert [name for name in optimised if "tower" in name] == []
     assert len([name for name in optimised if "called" in name]) == 1
-    libraries = [next(iter(k.overloads.values())).library for k in (low, middle, high)]  # type: ignore[attr-defined]
+    dispatchers = [k.dispatcher for k in (low, middle, high)]  # type: ignore[attr-defined]
+    libraries = [next(iter(d.overloads.values())).library for d in dispatchers]
     assert all(isinstance(library, Part) for library in libraries)
 
 

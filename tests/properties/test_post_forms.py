@@ -11,18 +11,22 @@ import meshio
 import numpy as np
 import pytest
 
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.post.overview.answer import number
-from flexclear.pipeline.post.render import forms, pace, player, shape_files, surfaces
+from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, shape_files, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat
-from flexclear.pipeline.post.render.mechanism import Looks, mechanism, placed
+from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.solids import equivalent
+from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.rod_shape import AROUND
 from flexclear.stages import s4_simulate, s6_render
 from tests.paper import synthetic
 
+needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
 #: points are kept in single precision by files and pages
 SINGLE = 1e-6
 
@@ -220,7 +224,7 @@ def test_a_series_for_paraview_names_files_that_are_there(shown: Shown):
 
 
 def test_all_modes_of_a_body_are_in_its_page(shown: Shown):
-    page = make("modes", "html", shown)["modes_rod1.html"].decode()
+    page = make("modes", "html", shown)["modes.html"].decode()
     told = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
     assert len(told["shapes"]) == 7
     assert all(
@@ -228,10 +232,75 @@ def test_all_modes_of_a_body_are_in_its_page(shown: Shown):
         for f, shape in zip(synthetic.bundle().frequency.values, told["shapes"], strict=True)
         if f > 0
     )
-    assert "<title>A scene: modes of rod1</title>" in page
+    assert "<title>A scene: modes</title>" in page
 
 
-@pytest.mark.parametrize("what, kind", [("joint", "html"), ("vibrations", "pvd")])
+def test_the_mode_sets_of_several_bodies_stand_beside_each_other():
+    sets = {f"{scene}: rod1": synthetic.bundle() for scene in ("free", "fixed")}
+    page = make("modes", "html", Shown(bundles=sets))["modes.html"].decode()
+    assert page.count("<div class='viewer'") == 2
+    assert all(f"{name}: 7 modes" in page for name in sets)
+    assert "<div class='beside'>" in page
+
+
+def test_a_joint_is_shown_in_space_with_its_gap_and_force(shown: Shown):
+    page = make("joint", "html", shown)["joint.html"].decode()
+    told = json.loads(page.split("<script type='application/json'>")[1].split("</script>")[0])
+    run, name = shown.run, str(shown.run["contact"].values[0])
+    gap, force = (reading["values"] for reading in told["readings"])
+    steps = np.searchsorted(run["time"].values, np.array(told["times"]) - 1e-9)
+    np.testing.assert_allclose(gap, 1e6 * run["contact_gap"].values[steps, 0], rtol=1e-3)  # four digits are written
+    assert max(force) <= float(run["contact_normal_force"].max()) * 1.001
+    assert f"{name}: path of the centre" in page
+    clearance = json.loads(run.attrs["parameters"])["joint"][name]["clearance"]
+    room = joint_view.shown(run, 0).room
+    np.testing.assert_allclose(np.linalg.norm(room.points, axis=1), clearance, rtol=1e-12)
+
+
+def test_a_path_is_a_round_tube_that_does_not_twist():
+    turn = np.linspace(0.0, 4.0 * np.pi, 200)
+    helix = np.column_stack([np.cos(turn), np.sin(turn), 0.1 * turn])
+    tube = surfaces.tube(helix, 0.01, corners=8)
+    rings = tube.points.reshape(200, 9, 3)
+    np.testing.assert_allclose(np.linalg.norm(rings - helix[:, None], axis=-1), 0.01, rtol=1e-9)
+    # neighbouring rings face each other: no corner goes further than the path and its own size
+    assert (
+        np.linalg.norm(np.diff(rings, axis=0), axis=-1).max() < 1.1 * np.linalg.norm(np.diff(helix, axis=0), axis=1)[0]
+    )
+    still = surfaces.tube(np.tile(helix[:1], (5, 1)), 0.01)
+    assert np.linalg.norm(still.points - helix[0], axis=1).max() < 0.0101
+
+
+@pytest.fixture(scope="module")
+def swinging() -> tuple[Mechanism, Vibrations]:
+    """A pendulum about its lowest place, and how it is drawn vibrating."""
+    linear = dynamics.frequencies(load_scene("scenes/checks/pendulum.toml"), {}, silent)
+    drawn = mechanism(vibrations.as_run(linear), {}, Looks())
+    return drawn, vibrations.vibrations(drawn, linear)
+
+
+def test_a_vibrating_pendulum_turns_about_its_pin_and_is_not_drawn_too_far(swinging: tuple[Mechanism, Vibrations]):
+    drawn, told = swinging
+    assert len(told.labels) == 1
+    pin = drawn.run["frame_position"].values[0, 0]
+    for piece in told.pieces:
+        way, arm = told.scale[0] * piece.moved[0, 0], piece.surface.points - pin
+        np.testing.assert_allclose(np.einsum("ij,ij->i", way, arm), 0.0, atol=1e-12)  # a rotation, linearised
+        assert (np.linalg.norm(way, axis=1) <= (vibrations.TURN + 1e-9) * np.linalg.norm(arm, axis=1)).all()
+
+
+@needs_gl
+def test_a_film_of_vibrations_goes_through_whole_periods(swinging: tuple[Mechanism, Vibrations]):
+    from flexclear.pipeline.post.render import vibration_film
+
+    pictures = np.array(list(vibration_film.frames(*swinging, 8)))
+    assert pictures.shape == (12, 540, 960, 3)  # 1.5 s of 8 pictures
+    np.testing.assert_array_equal(pictures[:6], pictures[6:])
+    assert np.abs(pictures[3].astype(int) - pictures[0]).max() > 50  # of 255: the other side half a period later
+    assert vibration_film.sheet(*swinging).shape == (360, 480, 3)
+
+
+@pytest.mark.parametrize("what, kind", [("joint", "gltf"), ("vibrations", "pvd")])
 def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
     from flexclear.pipeline.post.render.pictures import MAKERS
 

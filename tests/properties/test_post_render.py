@@ -210,7 +210,7 @@ def test_a_film_moves():
     drawn = mechanism(run, {"rod1": synthetic.bundle()})
     scene = film.plotter((200, 160))
     actors = film._build(scene, drawn)
-    film._look(scene, drawn)
+    film.look(scene, drawn)
     last = run.sizes["time"] // 2
     seen = []
     for body in (replace(drawn, parts=()), replace(drawn, flexible=())):

@@ -198,7 +198,7 @@ def test_an_axis_stands_alone(other: str) -> None:
 
 
 def test_an_axis_of_no_length_is_refused() -> None:
-    with pytest.raises(ValidationError, match="must point somewhere"):
+    with pytest.raises(ValidationError, match="must not have the length zero"):
         Pose(axis=(0, 0, 0))
 
 

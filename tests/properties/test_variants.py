@@ -107,3 +107,21 @@ def test_a_difference_of_means_within_their_standard_errors_is_chance():
 def test_a_quantity_that_one_side_lacks_is_infinitely_far():
     empty = Point({}, {}, {}, 1)
     assert influence(_point(np.zeros((2, 3))), empty, Quantity("b", "position"), 4).difference == np.inf
+
+
+def test_members_that_have_parted_and_agree_at_one_output_by_accident_tell_no_difference():
+    """Three members each of the same noise: of 600 outputs some have a spread far below the noise."""
+    random = np.random.default_rng(3)
+    points = []
+    for _ in range(2):
+        members = random.standard_normal((3, 600, 3))
+        values, spread = members.mean(axis=0), members.std(axis=0, ddof=1)
+        spread[100], values[100] = 1e-6, [1.0, 0.0, 0.0] if points else [0.0, 1.0, 0.0]
+        points.append(Point({"a.velocity.series": values}, {}, {"a.velocity.series": spread}, 0))
+    a, b = (Point({**p.values, "a.velocity.largest": np.array(1.0)}, {}, p.deviation, 0) for p in points)
+    assert influence(a, b, Quantity("a", "velocity"), 3).difference == 0.0
+    # before members part a difference is told as it is
+    early = {"a.velocity.series": np.where(np.arange(600)[:, None] < 200, 1e-9, a.deviation["a.velocity.series"])}
+    calm = [Point(p.values, {}, early, 0) for p in (a, b)]
+    apart = np.linalg.norm(a.values["a.velocity.series"] - b.values["a.velocity.series"], axis=1)[:180].max()
+    assert influence(*calm, Quantity("a", "velocity"), 3).difference == pytest.approx(apart, rel=1e-6)

@@ -19,9 +19,9 @@ def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
     return Store(tmp_path / "results")
 
 
-def put(store: Store, letter: str, **facts: str) -> Record:
-    made = store.put("simulate", letter * 32, {"nc": letter.encode() * 1000}, {"parameter c": letter, **facts})
-    os.utime(store.path("simulate", letter * 32, "json"), (0.0, 0.0))
+def put(store: Store, letter: str, stage: str = "simulate", **facts: str) -> Record:
+    made = store.put(stage, letter * 32, {"nc": letter.encode() * 1000}, {"parameter c": letter, **facts})
+    os.utime(store.path(stage, letter * 32, "json"), (0.0, 0.0))
     return made
 
 
@@ -62,6 +62,24 @@ def test_pruning_keeps_what_is_shown_what_that_was_made_from_and_what_is_young(
     assert main(["cache", "prune", "--days", "0"]) == 0
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*.nc")) == ["a", "b"]
     assert main(["cache", "prune", "--days", "-1"]) == 2
+
+
+def test_points_of_sweeps_are_looked_at_as_well(store: Store, capsys: pytest.CaptureFixture[str]):
+    """All batches of a family that a sweep shows stay, with the bundle that they were run with; others grow old."""
+    bundle, other = put(store, "a", "bundle"), put(store, "b", "bundle")
+    for letter, family, one in (("c", "x", bundle), ("d", "x", bundle), ("e", "y", other)):
+        put(store, letter, f"sweep/{family}", **{"input rod": one.digest})
+    store.show_families("sweeps/clearance", {"sweep/y": {}})
+    store.show_families("sweeps/clearance", {"sweep/x": {"input rod": bundle.digest}})
+    assert main(["cache", "size"]) == 0
+    assert "sweep             3 artifacts" in capsys.readouterr().out
+    assert main(["cache", "prune"]) == 0
+    assert sorted(path.name[0] for path in (store.root / "cache").rglob("*.nc")) == ["a", "c", "d"]
+    assert main(["cache", "check"]) == 0
+    assert "3 artifacts, 0 faults" in capsys.readouterr().out
+    store.path("sweep/x", "d" * 32, "nc").write_bytes(b"e" * 1000)
+    assert main(["cache", "check"]) == 4
+    assert f"sweep/x/{'d' * 32}.nc is corrupt" in capsys.readouterr().out
 
 
 def test_what_an_artifact_was_made_from_is_told(store: Store, capsys: pytest.CaptureFixture[str]):

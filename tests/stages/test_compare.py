@@ -78,7 +78,7 @@ def test_a_twin_differs_in_the_effect_alone(crank: Path):
 
 def test_what_is_ideal_has_no_twin(tmp_path: Path):
     scene = load_scene(write("pendulum", tmp_path)[0])
-    with pytest.raises(InputError, match="nothing to take away"):
+    with pytest.raises(InputError, match="that could be taken away"):
         ideal(scene)
     with pytest.raises(InputError, match="one scene alone is compared with nothing"):
         compare.bring([scene], compare.run.workplace())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import subprocess
 import sys
@@ -18,13 +19,15 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.dynamics.compile import compiler_process, folder, functions
-from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, take
+from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, loaded, take
 from tests.stages.conftest import PATIENCE
 
-SOURCE = """from numba import njit, types
+SOURCE = """from numba import cfunc
+
+from flexclear.pipeline.dynamics.compile.files import compiles
 
 
-@njit(types.int64(types.int64), cache=True)
+@compiles(cfunc("int64(int64)"))
 def add(x):
     return x + {k}
 """
@@ -59,7 +62,8 @@ def nothing(path: Path) -> None:
 
 
 def results(files: list[Path]) -> list[int]:
-    return [sys.modules[path.stem].add(10) for path in files]
+    add = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
+    return [add(loaded[path.stem].address)(10) for path in files]
 
 
 def test_a_second_process_leaves_the_code_on_disk(files: list[Path]) -> None:

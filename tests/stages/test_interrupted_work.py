@@ -15,11 +15,12 @@ from numba import config
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError, StoppedError
 from flexclear.pipeline.core.integrators import INTEGRATORS
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores, journal, stopping
-from flexclear.pipeline.dynamics.run import pieces, specialised, trajectory
+from flexclear.pipeline.dynamics.run import pace, pieces, specialised, trajectory
+from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.overview import comparison
@@ -125,6 +126,34 @@ def test_a_killed_run_goes_on_to_the_same_bits_whatever_it_has(
     assert found.identical(whole)
 
 
+@pytest.mark.usefixtures("often")
+@pytest.mark.parametrize("straight_from", [specialised.MANY, 500], ids=["kernels", "straight code"])
+def test_a_run_that_is_killed_before_and_after_it_was_handed_over_goes_on_to_the_same_bits(
+    straight_from: int, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact; its twin does so, too."""
+    monkeypatch.setattr(pace, "TRIAL", 1000)
+    monkeypatch.setattr(pace, "HOPELESS", 1100)
+    monkeypatch.setattr(specialised, "MANY", straight_from)
+    made: list[bool] = []
+    proper = specialised._make
+
+    def noted(engine: Engine, progress: Progress) -> None:
+        proper(engine, progress)
+        made.append(bool(engine.straight.addresses) and all(engine.straight.addresses.values()))
+
+    monkeypatch.setattr(specialised, "_make", noted)
+    scene = check(root, "socket_rolling", **{"time.end": 3e-3})
+    whole = dynamics.simulate(scene, {}, silent)
+    assert (whole.attrs["method"], bool(whole.attrs["switched"])) == ("radau", True)
+    # some 70 looks at each method, and as many at the twin
+    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 9)
+    assert kills >= 4
+    assert found.identical(whole)
+    assert bool(made) is (straight_from == 500)
+    assert all(made) or config.DISABLE_JIT
+
+
 #: five closure rows of six, and others of them from 1.2 s on: code is made for both choices
 CHANGING = {"time.end": 1.4, "solver.rtol": 1e-8}
 
@@ -162,7 +191,7 @@ def test_a_killed_ensemble_goes_on_to_the_same_bits(
     monkeypatch.setattr(cores, "cores", lambda: 1)
     whole = dynamics.ensemble(scene, {}, silent)
     monkeypatch.setattr(cores, "cores", lambda: threads)
-    cores.tell(True)
+    monkeypatch.setattr(cores, "_told", True)
     found, kills = interrupted(lambda: dynamics.ensemble(scene, {}, silent), tmp_path, monkeypatch)
     assert kills >= 3
     assert found.identical(whole)

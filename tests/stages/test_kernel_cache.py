@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
-import sys
 import time
 from pathlib import Path
 
 import pytest
-from numba import config
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.dynamics.compile import files, folder
-from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled
+from flexclear.pipeline.dynamics.compile import files, folder, machine_code
+from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, loaded
 
 #: a constant that a flipped bit of the code would change
-SOURCE = """from numba import njit, types
+SOURCE = """from numba import cfunc
+
+from flexclear.pipeline.dynamics.compile.files import compiles
 
 
-@njit(types.float64(types.float64), cache=True)
+@compiles(cfunc("float64(float64)"))
 def scaled(x):
     return 0.123456789 * x
 """
@@ -37,27 +38,28 @@ def kernel(tmp_path: Path) -> Path:
 
 def used(path: Path) -> bool:
     """Load it as a new process would, and use it; whether it had to be compiled."""
-    sys.modules.pop(path.stem, None)
+    loaded.pop(path.stem, None)
     told: list[Path] = []
     bring([path], told.append)
-    assert sys.modules[path.stem].scaled(2.0) == 2.0 * 0.123456789
+    scaled = ctypes.CFUNCTYPE(ctypes.c_double, ctypes.c_double)(loaded[path.stem].address)
+    assert scaled(2.0) == 2.0 * 0.123456789
     assert compiled(path)
     return bool(told)
 
 
 def parts(path: Path) -> list[Path]:
-    return [path.with_suffix(".sum"), *(path.parent / "__pycache__").glob(f"{path.stem}.*")]
+    return [found for found in (path.with_suffix(".sum"), path.with_suffix(files.CODE)) if found.is_file()]
 
 
 def test_what_is_whole_is_fetched(kernel: Path) -> None:
-    assert {part.suffix for part in parts(kernel)} == {".sum", ".nbi", ".nbc"}
+    assert {part.suffix for part in parts(kernel)} == {".sum", ".code"}
     assert not used(kernel)
     assert not list(kernel.parent.rglob("*.pyc"))  # bytecode would be taken without a look at what it holds
     assert not list(kernel.parent.rglob("*.lock"))
 
 
 def test_every_flipped_bit_and_every_cut_is_found_before_anything_is_loaded(kernel: Path) -> None:
-    """Also in the compiler's index, and in the file of digests itself; then it is compiled again, and whole."""
+    """Also in the file of digests itself; then it is compiled again, and whole."""
     for k in range(3):
         for name in (part.name for part in parts(kernel)):
             part = next(found for found in parts(kernel) if found.name == name)
@@ -75,15 +77,31 @@ def test_a_source_that_differs_is_compiled_and_not_fetched(kernel: Path) -> None
     assert used(kernel)
 
 
-@pytest.mark.parametrize("suffix", [".nbi", ".nbc"])
-def test_what_cannot_be_loaded_is_compiled_again(kernel: Path, suffix: str) -> None:
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"neither names nor code",
+        b'{"name": "scaled", "foreign": ["a_function_that_nobody_has"]}\n',
+        b'{"name": "scaled", "foreign": []}\nno object file',
+    ],
+)
+def test_what_cannot_be_loaded_is_compiled_again(kernel: Path, content: bytes) -> None:
     """Its digest is right: it was written so, by whatever mistake."""
-    (part,) = (found for found in parts(kernel) if found.suffix == suffix)
-    part.write_bytes(b"no pickle")
+    kernel.with_suffix(files.CODE).write_bytes(content)
     publish(kernel.with_suffix(".sum"), checked(files._digests(kernel)))
     assert compiled(kernel)
     assert used(kernel)
     assert not used(kernel)
+
+
+@pytest.mark.parametrize(
+    "before, after", [(b'"name": "', b'"name": "x'), (b'"foreign": []', b'"foreign": ["a_function_that_nobody_has"]')]
+)
+def test_code_of_other_names_is_not_loaded(kernel: Path, before: bytes, after: bytes) -> None:
+    """LLVM would end the process over a function that it does not find."""
+    content = kernel.with_suffix(files.CODE).read_bytes()
+    with pytest.raises(ValueError, match=r"no function|is not known"):
+        machine_code.load(content.replace(before, after, 1))
 
 
 def test_what_was_interrupted_is_not_taken_for_whole(kernel: Path) -> None:
@@ -91,25 +109,15 @@ def test_what_was_interrupted_is_not_taken_for_whole(kernel: Path) -> None:
     assert used(kernel)
 
 
-def test_the_compilers_own_settings_lead_nowhere_else(
-    kernel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "elsewhere"))
-    files.set_aside(kernel)
-    assert used(kernel)
-    assert not (tmp_path / "elsewhere").exists()
-
-
 @pytest.mark.parametrize("mode", [0o777, 0o775, 0o1777])
-@pytest.mark.parametrize("inner", [".", "__pycache__"])
-def test_a_folder_that_others_can_write_is_refused(tmp_path: Path, mode: int, inner: str) -> None:
+def test_a_folder_that_others_can_write_is_refused(tmp_path: Path, mode: int) -> None:
     """To load what lies there would run their code."""
     made = folder.writable(tmp_path / "kernels", lambda _: None)
-    (made / inner).chmod(mode)
+    made.chmod(mode)
     with pytest.raises(InputError, match=r"others can write to .*\n.*chmod go-w") as caught:
         folder.writable(tmp_path / "kernels", lambda _: None)
     assert caught.value.exit_code == 2
-    (made / inner).chmod(0o755)
+    made.chmod(0o755)
     assert folder.writable(tmp_path / "kernels", lambda _: None) == made
 
 

@@ -6,16 +6,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import flexclear as fc
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.coupling import uncoupled
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.dynamics.linear.play import Bounds, bounds
-from flexclear.pipeline.dynamics.run.run import integrate
+from flexclear.pipeline.dynamics.linear.play import RANK, Bounds, bounds, lever_of
+from flexclear.pipeline.dynamics.model.constraints import constraints
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.run.run import Run, integrate
 from flexclear.stages import plan, run, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
@@ -34,14 +38,19 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def _bounds(scene: Scene, chosen: list[Quantity]) -> Bounds:
     """Of a scene, from the run of its ideal twin."""
+    ideal, inputs = _ideal(scene)
+    return bounds(scene, ideal, s4_simulate.bundles(inputs), chosen)
+
+
+def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
+    """The run of a scene's ideal twin, and what is known of its bodies."""
     place, task = run.workplace(), s8_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
     gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
     bare = s4_watched.plain(variants.without(scene, gone))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
-    ideal = s4_simulate.rebuild(s4_simulate.params(bare), rigid)
-    return bounds(scene, integrate(ideal, {}, silent), s4_simulate.bundles(inputs), chosen)
+    return integrate(s4_simulate.rebuild(s4_simulate.params(bare), rigid), {}, silent), inputs
 
 
 def _standing_leg(tmp_path: Path) -> Scene:
@@ -119,7 +128,7 @@ def test_the_planned_scene_is_a_file_that_runs_and_verifies(tmp_path: Path, caps
 def test_bad_plans_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture, results: Path):
     path = write("pendulum", tmp_path)[0]
     assert main(["plan", str(path), "-q", "--jobs", "1"]) == 2
-    assert "nothing is wanted" in capsys.readouterr().err
+    assert "asks for no accuracy" in capsys.readouterr().err
     path.write_text(path.read_text() + '\n[accuracy]\nnobody.position = "10 um"\n')
     assert main(["plan", str(path), "-q", "--jobs", "1"]) == 2
     assert "nobody" in capsys.readouterr().err
@@ -132,7 +141,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
-    with pytest.raises((InputError, run.FailedTasksError), match="drop everything") as refused:
+    with pytest.raises((InputError, run.FailedTasksError), match="leave out everything") as refused:
         plan.bring(scene, run.workplace())
     assert refused.value.exit_code == 2
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
@@ -153,3 +162,72 @@ def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path):
     if np.linalg.norm(fc.run(scene)["velocity"].sel(body=body).values[0]) < 1e-12:
         # runs of one tolerance, the same integration but for the size of the load: 1e-8 of the way
         assert float(alone.sel(quantity=name)) == pytest.approx(way, rel=1e-6)
+
+
+def test_what_nothing_couples_to_what_is_asked_for_is_not_integrated(tmp_path: Path):
+    """A pendulum beside the leg moves by itself: the leg's motion is the same without it, to the last tolerance."""
+    leg = _tight(load_scene(write("leg", tmp_path)[0]))
+    rigid = variants.without(leg, [e for e in variants.effects(leg) if e.name.startswith("body.")])
+    parts = rigid.model_dump(mode="json", exclude_none=True)
+    bob = {
+        "type": "rigid",
+        "mass": 1.0,
+        "inertia": [0.01, 0.01, 0.01],
+        "pose": {"position": [0.1, 0.0, 0.0]},
+        "frames": {"pivot": {"position": [-0.1, 0.0, 0.0]}},
+    }
+    hinge = {"type": "spherical", "between": ["ground.base", "bob.pivot"]}
+    scene = edited(
+        rigid,
+        {
+            "body": parts["body"] | {"bob": bob},
+            "joint": parts["joint"] | {"hinge": hinge},
+            "time.end": 0.01,
+            "accuracy": {"quantities": {"platform.position": {"absolute": 1e-6}}},
+        },
+    )
+    assert uncoupled(scene, {"platform"}) == ("body.bob", "joint.hinge")
+    assert set(uncoupled(scene, {"bob"})).isdisjoint({"body.bob", "joint.hinge", "load.gravity"})
+    planned, found = fc.plan(scene)
+    assert "bob" not in planned.body
+    assert "hinge" not in planned.joint
+    assert "body.bob" in found.attrs["planned"]
+    full, less = (
+        fc.run(edited(s, {"accuracy": None}))["position"].sel(body="platform").values for s in (scene, planned)
+    )
+    # what was asked for; both runs are of a smooth motion, in which the plan's tolerance errs by far less
+    assert np.abs(full - less).max() < 1e-6
+
+
+def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(tmp_path: Path):
+    """Beside the pseudoinverse of the joints' rates, which has no closed form but another computation."""
+    scene = _standing_leg(tmp_path)
+    found, _ = _ideal(scene)
+    poses = [Placement(frame["origin"], frame["axes"]) for frame in found.observed.links[0]]
+    lever = lever_of(found.model, constraints(found.model.mechanism), poses)
+    G = lever.gradient.toarray()
+    shown = np.random.default_rng(0).standard_normal((3, G.shape[0])) @ G
+    expected = -shown @ np.linalg.pinv(G)
+    adjoint = lever.adjoint(shown)
+    # the shift that makes the factors exist, 1e-13 of the largest squared singular value, beside the smallest
+    values = np.linalg.svd(G, compute_uv=False)
+    shift = RANK * (values[0] / values[values > 1e-8 * values[0]][-1]) ** 2
+    assert np.abs(adjoint.rows - expected).max() < 100.0 * shift * np.abs(expected).max()
+    assert adjoint.free < 1e-6 * np.abs(shown).max()
+
+
+def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, results: Path):
+    """Thrown about by its drive at 1e9 rad/s^2 the rod turns faster than it vibrates; rigid, it could."""
+    scene = load_scene(write("slider-crank", tmp_path)[0])
+    law = {"type": "polynomial", "coefficients": [0.0, 0.0, 1e9]}
+    wild = edited(
+        scene,
+        {
+            "drive.motor": {"joint": "main", "law": law},
+            "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
+        },
+    )
+    with pytest.raises(run.FailedTasksError, match="cannot be run as it stands") as refused:
+        plan.bring(wild, run.workplace())
+    assert refused.value.exit_code == 3
+    assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]

@@ -276,3 +276,14 @@ def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, monkeypatc
     publish(tmp_path / "a.bin", b"content")
     assert forced[0].endswith(".tmp")
     assert forced[1:] == [str(tmp_path)]
+
+
+def test_what_was_just_written_is_parsed_once_and_given_once(store: Store) -> None:
+    """Whoever loads it may change it: the next one gets it from the file."""
+    record = put(store)
+    first, second = store.load(record), store.load(record)
+    assert first.identical(second)
+    name = next(str(n) for n, v in first.data_vars.items() if v.dtype.kind == "f" and v.size)
+    first[name].values[...] = -1.0
+    assert not first.identical(second)
+    assert store.load(record).identical(second)

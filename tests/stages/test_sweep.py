@@ -10,13 +10,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.special import ellipk
 
 from flexclear import pipeline
+from flexclear.pipeline.core.artifacts.points import unit
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.pipeline.core.units import udunits
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.pipeline.post.sweep import figures
@@ -59,7 +62,7 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
     # the speed is largest between outputs 5 ms apart: within (2.5 ms omega)^2/2 of it, omega < 9 rad/s; 2.5e-4
     assert speed.values == pytest.approx(expected, rel=3e-4)
     assert (found["status"] == 0).all()
-    assert speed.attrs["units"] == "m/s"
+    assert speed.attrs["units"] == "m s-1"
     assert found.attrs["complete"] == 1
 
 
@@ -153,8 +156,15 @@ def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fr
 def test_a_sweep_of_refusals_only_is_no_success(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
     path = tmp_path / "none.toml"
     path.write_text('scene = "checks/pendulum"\nkeep = ["bob.velocity.final"]\nvary."solver.evaluations" = [50, 60]\n')
+    shown = fresh / "sweeps" / "none"
+    shown.mkdir(parents=True)
+    (shown / "sweep.png").write_bytes(b"of an earlier state")
     assert main(["sweep", str(path), "--workers=1"]) == 3
     assert "2 refused" in capsys.readouterr().out
+    with xr.open_dataset(shown / "sweep.nc") as found:
+        assert found["bob.velocity.final"].dims == ("solver.evaluations", "axis")
+        assert np.isnan(found["bob.velocity.final"].values).all()
+    assert [path.name for path in shown.glob("sweep.*")] == ["sweep.nc"]
 
 
 def test_members_give_mean_and_deviation(root: Path):
@@ -213,6 +223,29 @@ def test_what_cannot_be_is_refused_before_anything_runs(
     assert asked == []
 
 
+def test_what_turns_is_told_in_the_units_of_turning(root: Path):
+    def units(scene: str, *keep: str) -> list[str]:
+        table = {"scene": scene, "vary": {"time.end": [0.1, 0.2]}, "keep": keep}
+        plan = sweep_plan.plan(read_sweep(table, "sweep"), load_scene(root / f"scenes/checks/{scene}.toml"), "sweep")
+        return [unit(one, plan.turning) for one in plan.kept]
+
+    ends = [f"{stop}.upper.{what}" for stop in "AC" for what in ("peak_force", "impulse", "impact_times.count")]
+    assert units("stops", *ends) == ["N", "N s", "1", "N m", "N m s", "1"]
+    kept = ("turning.drive_force.rms", "axis.force.largest", "axis.moment.final", "rotor.orientation.final")
+    assert units("spindle", *kept) == ["N m", "N", "N m", "1"]
+
+
+def test_a_force_at_some_points_that_is_a_torque_at_others_is_refused(root: Path):
+    vary = {"drive.turning.coordinate": ["rotation", "translation"]}
+    with pytest.raises(InputError, match="a force at some points and a torque at others"):
+        pipeline.sweep(root / "scenes/checks/spindle.toml", vary, ["turning.drive_force.rms"], workers=1)
+
+
+def test_units_of_parameters_are_read_by_other_programs():
+    written = ["m", "rad/s", "kg m^2", "N/m s", "N m s/rad", "N/m^1.5"]
+    assert [udunits(text) for text in written] == ["m", "rad s-1", "kg m2", "N m-1 s-1", "N m s rad-1", ""]
+
+
 def test_a_latin_hypercube_has_one_point_in_every_row_and_column():
     table = {"vary": {"a": {"from": 0.0, "to": 8.0}, "b": {"from": 1.0, "to": 256.0, "spacing": "log"}}}
     table |= {"scene": "x", "keep": ["y"], "sample": {"method": "latin-hypercube", "points": 8, "seed": 3}}
@@ -264,6 +297,12 @@ def test_the_example_with_an_optimiser_finds_the_closed_form(root: Path):
     example = runpy.run_path(str(root / "docs/examples/optimise.py"))
     # the velocity is right to 1e-8 or so, and changes by 0.01 m/s per N/m; measured 1e-6
     assert example["best"]() == pytest.approx(2.0 * ((np.pi / 0.5) ** 2 + 1.0), abs=1e-4)
+
+
+def test_the_example_of_an_optimal_start_finds_the_steady_motion(root: Path):
+    example = runpy.run_path(str(root / "docs/examples/optimal_start.py"))
+    # the integrator's tolerance is 1e-10 of 0.25 m and 0.27 m/s; measured 6e-13
+    assert example["best"]() == pytest.approx(example["steady"](), abs=1e-10)
 
 
 def test_the_example_of_a_sensitivity_has_shares_of_a_whole(root: Path, tmp_path: Path):

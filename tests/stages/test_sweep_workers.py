@@ -122,6 +122,28 @@ def test_processes_that_keep_dying_end_the_sweep_in_words():
     assert pool.renewed == sweep_engine.LOSSES
 
 
+def test_two_workers_finish_together():
+    """Of batches as they are given out, each to the worker that is free first, one worker has hardly more than half.
+
+    80 points of 36 ms are a sweep of three seconds: batches of half a second to its end would leave a worker idle for
+    a sixth of the time.
+    """
+    busy, sizes = [0.0, 0.0], list[int]()
+
+    def submit(family: str, packed: bytes, points: list[dict[str, Any]], *_: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        busy[busy.index(min(busy))] += 0.036 * len(points)
+        sizes.append(len(points))
+        future.set_result(([Point({}, {}, {}, 0) for _ in points], 0.036 * len(points)))
+        return future
+
+    jobs = [sweep_engine.Job(str(n), "family", {}, Path(str(n))) for n in range(80)]
+    sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
+    assert sum(sizes) == 80
+    assert sum(busy) / max(busy) >= 1.9  # found 2.00; without the smaller ones at the end 1.86
+    assert max(sizes) >= 10
+
+
 def _dask(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
     """A scheduler or a worker of Dask on this machine."""
     environment = os.environ | {"PYTHONPATH": str(cwd), "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "5"}

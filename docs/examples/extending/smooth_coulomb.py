@@ -41,6 +41,11 @@ class SmoothCoulomb:
         return 0.0
 
     @staticmethod
+    def kinks(law: clearance.SmoothCoulomb) -> tuple[float, float]:
+        """The law is smooth."""
+        return (0.0, 0.0)
+
+    @staticmethod
     def bristle(law: clearance.SmoothCoulomb) -> float | None:
         """No memory."""
         return None

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
+from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION, RUN
 from flexclear.pipeline.core.scene.design import Axis, Design
 from flexclear.pipeline.core.scene.kept import Kept
+from flexclear.pipeline.core.scene.wanted import KINDS
+from flexclear.pipeline.core.units import udunits
 
 Values = dict[str, np.ndarray]
 #: what became of a point
@@ -66,21 +69,37 @@ def variable(one: Kept, share: str) -> str:
     return one.name if share == "values" else f"{one.name}.{share}"
 
 
+def unit(one: Kept, turning: Collection[str]) -> str:
+    """Unit of what is kept, as UDUNITS reads it. turning: names of the quantities that are about an axis, not along."""
+    declared = RUN[KINDS[one.quantity.kind].variable]
+    along = declared.turning if one.quantity.name in turning else declared.units
+    return "1" if one.reduction == "count" else along
+
+
 def dataset(
     design: Design,
     kept: Sequence[Kept],
     keys: Sequence[str],
     points: Mapping[str, Point],
     time: np.ndarray,
+    sections: int,
+    turning: Collection[str],
     attributes: Mapping[str, str | int],
+    shares: Sequence[str] = SHARES[:1],
 ) -> xr.Dataset:
     """All points of a sweep on its own dimensions; nan where there is no value.
 
     keys: of the points, in their order.  points: the finished ones.  time: of the series that are kept [s].
+    sections: how many there are of each point.  turning: as of `unit`.  shares: of `SHARES`, those that are asked for.
     """
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
+    lengths = dimensions(time, sections)
     variables = _arrays(every, kept, dims, shape)
+    for one, share in itertools.product(kept, shares):  # where no point is done
+        if variable(one, share) not in variables:
+            inner = [lengths[dim] for dim in one.dims]
+            variables[variable(one, share)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
         "status": (np.array(status, dtype=np.int8), "what became of the point"),
@@ -101,12 +120,17 @@ def dataset(
     coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}
     coordinates |= {"time": time} if "time" in sizes else {}
     result = xr.Dataset(variables, coords=coordinates)
-    _describe(result, design.axes, kept)
+    _describe(result, design.axes, kept, turning)
     for name, (_, meaning) in plain.items():
         result[name].attrs = {"long_name": meaning}
     result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
     finished = int(NOT_RUN not in status)
     return result.assign_attrs({"Conventions": CONVENTIONS, "complete": finished, **attributes})
+
+
+def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
+    """Lengths of the dimensions that what is kept of a point may have."""
+    return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 
 def _arrays(
@@ -128,7 +152,7 @@ def _arrays(
     return arrays
 
 
-def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept]) -> None:
+def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept], turning: Collection[str]) -> None:
     """Units and meanings."""
     words = {
         "values": "",
@@ -138,9 +162,9 @@ def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept]) ->
     for one in kept:
         for share, more in words.items():
             if variable(one, share) in result:
-                result[variable(one, share)].attrs = {"units": one.unit, "long_name": f"{one.meaning}{more}"}
+                result[variable(one, share)].attrs = {"units": unit(one, turning), "long_name": f"{one.meaning}{more}"}
     for axis in axes:
-        units = {"units": axis.unit} if axis.unit else {}
+        units = {"units": udunits(axis.unit)} if udunits(axis.unit) else {}
         result[axis.name].attrs = {"long_name": ", ".join(axis.places), **units}
     if "time" in result.coords:
         result["time"].attrs = {"units": "s", "long_name": "time"}

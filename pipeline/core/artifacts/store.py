@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 _PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
+#: stands for the key of all artifacts of a stage, such as the batches of a sweep's points
+FAMILY = "family"
 #: attributes of the main file that a command tells, without opening the file
 TOLD = ("warnings", "accuracy_verdict")
 #: bytes of a dataset from which on room on the disk counts for more than time
@@ -52,6 +54,8 @@ COMPRESSED = 1 << 26
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
+#: what this process has written last and read back, by its sha256, until it is loaded
+_READ_BACK: dict[str, xr.Dataset] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -125,13 +129,19 @@ class Store:
         return record
 
     def load(self, record: Record) -> xr.Dataset:
-        """The main file as a Dataset in memory. The bytes that were checked are those that are parsed."""
+        """The main file as a Dataset in memory. The bytes that were checked are those that are parsed.
+
+        The last one that this process has written was parsed already; that is given once.
+        """
         import xarray as xr
 
         path = self.path(record.stage, record.key, MAIN)
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
+        written = _READ_BACK.pop(record.files[MAIN], None)
+        if written is not None:
+            return written
         try:
             return xr.load_dataset(content, engine="netcdf4", decode_times=False)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
@@ -194,6 +204,20 @@ class Store:
         """What `outdated` has noted, if it has."""
         table = read_checked(self._facts(folder, label, "failed")) if folder else None
         return None if table is None else str(table.get("why"))
+
+    def show_families(self, folder: str, families: Mapping[str, Mapping[str, str]]) -> None:
+        """Note in ``folder/.facts`` what is shown there in a dataset of its own: stages with all their artifacts.
+
+        families: facts of each stage.
+        """
+        paths = {self._facts(folder, stage.replace("/", ".")): (stage, facts) for stage, facts in families.items()}
+        with disk_limits(self.root / folder):
+            (self.root / folder / ".facts").mkdir(parents=True, exist_ok=True)
+            for path, (stage, facts) in paths.items():
+                publish(path, checked(asdict(Record(stage, FAMILY, {}, dict(facts)))))
+            for path in (self.root / folder / ".facts").glob("*.json"):
+                if path not in paths:
+                    path.unlink(missing_ok=True)
 
     def _tell_outdated(self, folder: str) -> None:
         path = self.root / folder / OUTDATED
@@ -258,7 +282,7 @@ def read_record(path: Path) -> Record | None:
         return None
     # a record of somebody else's must not lead out of its folder: what is pruned is removed
     inside = all(_PART.fullmatch(name) for name in (*found.stage.split("/"), found.key, *found.files))
-    return found if inside and found.files else None
+    return found if inside and (found.files or found.key == FAMILY) else None
 
 
 def _texts(table: Mapping[object, object]) -> dict[str, str]:
@@ -278,6 +302,7 @@ def _attributes(product: Product) -> Mapping[str, object]:
 def write_dataset(path: Path, dataset: xr.Dataset) -> str:
     """Write NetCDF-4 atomically, read back and compared before it takes its name; returns its sha256.
 
+    What was read is kept for `Store.load`, until the next one is written.
     Equal datasets give equal bytes: no times or names of this machine.  Numeric arrays carry fletcher32 sums, so that
     other programs notice damage too; they are compressed from `COMPRESSED` bytes on, since what a run records has few
     digits to spare: deflating it takes longer than making it, and leaves half of it.
@@ -297,7 +322,12 @@ def write_dataset(path: Path, dataset: xr.Dataset) -> str:
             made.write_bytes(bytes(dataset.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         content = made.read_bytes()
-        if not xr.load_dataset(content, engine="netcdf4", decode_times=False).equals(dataset):
+        read = xr.load_dataset(content, engine="netcdf4", decode_times=False)
+        if not read.equals(dataset):
             raise OSError(errno.EIO, "what was written does not read back", str(path))
         settle(made, path)
-    return sha256(content)
+    digest = sha256(content)
+    _READ_BACK.clear()
+    if read.nbytes < COMPRESSED:
+        _READ_BACK[digest] = read
+    return digest

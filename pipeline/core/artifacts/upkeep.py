@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked
-from flexclear.pipeline.core.artifacts.store import Record, Store, read_record
+from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store, read_record
 
 #: what stands beside artifacts and is none of their files
 BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
@@ -52,7 +52,7 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
             damaged.append(fault)
         there = [file.stat() for file in files if file.is_file()]
         artifacts.append(Artifact(record, sum(s.st_size for s in there), time.time() - path.stat().st_mtime))
-    unreadable += [path for path in (store.root / "cache").glob("*/*.names") if read_checked(path) is None]
+    unreadable += [path for path in (store.root / "cache").rglob("*.names") if read_checked(path) is None]
     damaged += [f"{_below(store, path)} is no record, or damaged" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
@@ -60,7 +60,8 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
 def prunable(store: Store, found: Inventory, older: float) -> list[Artifact]:
     """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
 
-    What the shown ones were made from stays as well: without it they would be made again.
+    What the shown ones were made from stays as well: without it they would be made again. A sweep shows its families,
+    all of whose points stay, since it goes on with them.
     """
     made = {artifact.record.digest: artifact.record for artifact in found.artifacts}
     kept, waiting = set(), list(_shown(store))
@@ -70,7 +71,9 @@ def prunable(store: Store, found: Inventory, older: float) -> list[Artifact]:
             kept.add((record.stage, record.key))
             above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
             waiting += [made[digest] for digest in above if digest in made]
-    return [a for a in found.artifacts if a.age > older and (a.record.stage, a.record.key) not in kept]
+    of_sweeps = {stage for stage, key in kept if key == FAMILY}
+    mine = [a for a in found.artifacts if a.age > older and a.record.stage not in of_sweeps]
+    return [a for a in mine if (a.record.stage, a.record.key) not in kept]
 
 
 def remove(store: Store, artifact: Artifact) -> None:
@@ -101,7 +104,8 @@ def _same(path: Path, other: Path) -> bool:
 
 
 def _records(store: Store) -> list[Path]:
-    return sorted((store.root / "cache").glob("*/*.json"))
+    """Of all stages; those of a sweep's points have a folder for each family."""
+    return sorted((store.root / "cache").rglob("*.json"))
 
 
 def _shown(store: Store) -> Iterator[Record]:
@@ -113,7 +117,7 @@ def _shown(store: Store) -> Iterator[Record]:
 
 def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
     """Files of artifacts whose record is gone: a process died between them. Young ones may be about to get one."""
-    for path in sorted((store.root / "cache").glob("*/*")):
+    for path in sorted((store.root / "cache").rglob("*")):
         ours = path.is_file() and path not in known and not path.name.endswith(BESIDE)
         if ours and time.time() - path.stat().st_mtime > YOUNG:
             yield path

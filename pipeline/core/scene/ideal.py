@@ -36,7 +36,7 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
     if not changes:
         raise InputError(
             str(scene.path or scene.name),
-            f"has nothing to take away: no {' and no '.join(effects)}",
+            f"has no {' and no '.join(effects)} that could be taken away",
             "compare it with another scene: flexclear compare A B",
         )
     if "flexibility" in effects and scene.output.stress is not None:

@@ -52,11 +52,6 @@ class Kept:
         return f"{self.quantity.name}.{self.reduction}"
 
     @property
-    def unit(self) -> str:
-        """SI unit of its values."""
-        return "1" if self.reduction == "count" else self.quantity.unit
-
-    @property
     def meaning(self) -> str:
         """In words."""
         return f"{self.quantity.name}: {reductions(self.quantity.kind)[self.reduction]}"

@@ -158,7 +158,7 @@ class View(Part):
     def _points(self) -> View:
         for asked in (self.direction, self.up):
             if asked is not None and not any(asked):
-                raise ValueError("a direction of length zero points nowhere")
+                raise ValueError("a direction must not have the length zero")
         return self
 
 

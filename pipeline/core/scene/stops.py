@@ -36,7 +36,7 @@ class Stop(Part):
         mass = (self.normal.restitution, self.normal.delivered_restitution) != (None, None)
         if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
             raise ValueError(
-                "what meets a stop depends on the pose: a linear stop takes a damping, "
+                "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
                 "or a restitution with the effective_mass [kg or kg m^2] that is to rebound with it"
             )
         return self

@@ -24,6 +24,8 @@ from flexclear.pipeline.core.artifacts.paths import TREE
 __all__ = ["TREE", "Sources", "imported", "library_version", "library_versions", "parents", "source_file"]
 
 OWN = ("flexclear", "benchmarks")
+#: what modules import, by name, with the digest of the text that says so: what one `Sources` has learnt no other parses
+KNOWN: dict[str, tuple[str, list[str], list[str]]] = {}
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
 
@@ -94,8 +96,10 @@ class Sources:
         source = path.read_bytes()
         digest = hashlib.sha256(source).hexdigest()
         if self.imports.get(name, [""])[0] != digest:
-            own, libraries = imported(source, name, path.name == "__init__.py")
-            self.imports[name] = (digest, sorted(own), sorted(libraries))
+            if KNOWN.get(name, [""])[0] != digest:
+                own, libraries = imported(source, name, path.name == "__init__.py")
+                KNOWN[name] = (digest, sorted(own), sorted(libraries))
+            self.imports[name] = KNOWN[name]
         _, own_names, library_names = self.imports[name]
         return Module(digest, frozenset(own_names), frozenset(library_names))
 
@@ -103,6 +107,7 @@ class Sources:
         """Read the memo, once; one that is damaged is as good as none."""
         if self.memo is not None and not self.imports:
             self.imports.update(read_checked(self.memo) or {})
+            KNOWN.update(self.imports)
 
 
 def source_file(root: Path, name: str) -> Path | None:

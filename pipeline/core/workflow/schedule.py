@@ -3,7 +3,6 @@ their inputs are there."""
 
 from __future__ import annotations
 
-import os
 import time
 import traceback
 from collections.abc import Mapping
@@ -17,7 +16,6 @@ from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, Resource
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.workflow import cores, stopping, workers
 from flexclear.pipeline.core.workflow.execute import execute, find, key_of
-from flexclear.pipeline.core.workflow.family import follow
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import Task, in_order
@@ -148,33 +146,14 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
 
 def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
     """In worker processes."""
-    # imported here, because a run that finds everything fresh must start quickly
-    import multiprocessing
-    from multiprocessing.managers import SyncManager
-
-    context = multiprocessing.get_context("spawn")
-    server = SyncManager(ctx=context)
-    server.start(follow, (os.getpid(),))
-    with server:
-        reports = server.Queue()
-        bell = workers.Bell.made()
-        pool = workers.pool(width, bell)
-        running: dict[Future[Record | Failure], _Running] = {}
-        try:
-            with stopping.heeded():
-                while (plan.waiting or running) and not stopping.requested():
-                    _submit(plan, running, pool, width, (store, sources, reports), monitor)
-                    _collect(plan, running, monitor)
-                    _relay(reports, monitor)
-                if stopping.requested():
-                    _end_in_good_order(plan, running, bell, monitor)
-        except BaseException:
-            workers.kill(pool)
-            raise
+    running: dict[Future[Record | Failure], _Running] = {}
+    with workers.crew(width) as crew, stopping.heeded():
+        while (plan.waiting or running) and not stopping.requested():
+            _submit(plan, running, crew.pool, width, (store, sources, crew.reports), monitor)
+            _collect(plan, running, monitor)
+            _relay(crew.reports, monitor)
         if stopping.requested():
-            workers.kill(pool)
-        else:
-            pool.shutdown()
+            _end_in_good_order(plan, running, crew.bell, monitor)
 
 
 def _end_in_good_order(

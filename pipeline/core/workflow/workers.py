@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.workflow import stopping
+from flexclear.pipeline.core.workflow import cores, stopping
 from flexclear.pipeline.core.workflow.family import follow
 
 if TYPE_CHECKING:
@@ -70,6 +70,77 @@ def kill(workers: ProcessPoolExecutor) -> None:
     for process in list((workers._processes or {}).values()):
         process.kill()
     workers.shutdown(wait=False, cancel_futures=True)
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Workers, what asks them to stop, and the queue of their progress, which a process of its own keeps."""
+
+    width: int
+    pool: ProcessPoolExecutor
+    bell: Bell
+    server: Any
+    reports: Any
+
+    @staticmethod
+    def begun(width: int) -> Crew:
+        """That many workers at most; each is started when there is something for it to do."""
+        from multiprocessing.managers import SyncManager
+
+        server, bell = SyncManager(ctx=_context()), Bell.made()
+        server.start(follow, (os.getpid(),))
+        return Crew(width, pool(width, bell), bell, server, server.Queue())
+
+    def end(self) -> None:
+        """Let them go, who have nothing to do any more."""
+        self.pool.shutdown()
+        self.server.shutdown()
+
+    def kill(self) -> None:
+        """End them at once, whatever they do."""
+        kill(self.pool)
+        self.server.shutdown()
+
+
+#: the crew that has nothing to do at the moment, where it is kept for the next call
+_idle: list[Crew] = []
+_keeping = 0
+
+
+@contextmanager
+def kept() -> Iterator[None]:
+    """Meanwhile workers are not let go between one call of `crew` and the next: starting and importing take a second.
+
+    They have the environment of when they were started, so this is for one command.
+    """
+    global _keeping
+    _keeping += 1
+    try:
+        yield
+    finally:
+        _keeping -= 1
+        while _idle and not _keeping:
+            _idle.pop().end()
+
+
+@contextmanager
+def crew(width: int) -> Iterator[Crew]:
+    """Workers, that many at least; killed where the block fails, or ends because all is to stop."""
+    with ExitStack() as stack:
+        while _idle and _idle[-1].width < width:
+            _idle.pop().end()
+        # one that is kept may serve a wider call next; who is never needed is never started
+        mine = _idle.pop() if _idle else Crew.begun(max(width, cores.cores()) if _keeping else width)
+        stack.callback(mine.kill)
+        while not mine.reports.empty():  # of the last call
+            mine.reports.get()
+        yield mine
+        if not stopping.requested():
+            stack.pop_all()
+            if _keeping:
+                _idle.append(mine)
+            else:
+                mine.end()
 
 
 @contextmanager

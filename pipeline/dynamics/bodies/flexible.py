@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.interface import deform, in_interface, modal_rates
 from flexclear.pipeline.dynamics.bodies.modal_terms import (
     RATE,
     body_mass_matrix,
@@ -31,7 +32,6 @@ from flexclear.pipeline.dynamics.bodies.modal_terms import (
 from flexclear.pipeline.dynamics.bodies.ports import make_ports
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
-    accumulate,
     add,
     at,
     at9,
@@ -62,12 +62,15 @@ def plain(f, data, n, j):
 class FlexibleBodies:
     """Kernels of all flexible bodies.
 
-    site(h, f, w, s), inboard(h, f, w, i, ...): of frames on them (see `ports`).  inertia(h, f, w, n): spatial inertias,
-    wrenches and modal forces, modal accelerations taken as zero.  mass_matrix(h, f, w): modal blocks, right after it.
-    modal_inertia(h, f, w, n): what these add to the wrenches.  port_load(h, w, i): a link on a flexible parent loads
-    its modes, too.  modal_forces(h, w): generalised forces of the modes.  energies(h, f, w): kinetic and elastic [J].
+    deform(h, f, w): X and U in the interface basis, before all else.  site(h, f, w, s), inboard(h, f, w, i, ...): of
+    frames on them (see `ports`).  inertia(h, f, w, n): spatial inertias, wrenches and modal forces, modal accelerations
+    taken as zero.  mass_matrix(h, f, w): modal blocks, right after it.  modal_inertia(h, f, w, n): what these add to
+    the wrenches.  port_load(h, w, i): a link on a flexible parent loads its moving shapes, too.  modal_forces(h, w):
+    generalised forces of the modes.  modal_rates(h, f, w, dy): their accelerations into the state's rates.
+    energies(h, f, w): kinetic and elastic [J].
     """
 
+    deform: Callable
     site: Callable
     inboard: Callable
     inertia: Callable
@@ -75,6 +78,7 @@ class FlexibleBodies:
     modal_inertia: Callable
     port_load: Callable
     modal_forces: Callable
+    modal_rates: Callable
     energies: Callable
 
 
@@ -131,25 +135,36 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         return c, v
 
     @kernel
-    def modes(h, f, w, k, R, p, a, alpha, omega):
-        """Inertial forces on the modes, and the momentum that each mode's rate carries."""
-        n = m.FLEXES.n_modes(h, k)
-        c0, P = m.FLEXES.c0(h, k), h[m.MODAL]
-        V = P + 9 * n
+    def modes(h, f, w, k, a, alpha, omega):
+        """Inertial forces on the modes, and int rho r x S_j of each, into MODAL, as eigenmodes."""
+        n, P = m.FLEXES.n_modes(h, k), h[m.MODAL]
+        V, bias, S = P + 9 * n, P + 18 * n, P + 19 * n
         x, y, z = omega
         xx, yy, zz = y * y + z * z, x * x + z * z, x * x + y * y
         for j in range(n):
-            C = shape(h, f, w, k, j)
             angular = spin(w, P, n, j)
             centrifugal = x * y * (w[P + n + j] + w[P + 3 * n + j]) + x * z * (w[P + 2 * n + j] + w[P + 6 * n + j])
             centrifugal += y * z * (w[P + 5 * n + j] + w[P + 7 * n + j])
             centrifugal -= xx * w[P + j] + yy * w[P + 4 * n + j] + zz * w[P + 8 * n + j]
             coriolis = 2.0 * dot(spin(w, V, n, j), omega)
-            w[h[m.MODAL_BIAS] + c0 + j] = dot(C, a) + dot(angular, alpha) + centrifugal + coriolis
-            linear = turn(R, C)
-            o = m.MOMENTA.row(h, c0 + j)
-            put(w, o, add(turn(R, angular), cross(p, linear)))
-            put(w, o + 3, linear)
+            w[bias + j] = dot(shape(h, f, w, k, j), a) + dot(angular, alpha) + centrifugal + coriolis
+            w[S + j], w[S + n + j], w[S + 2 * n + j] = angular
+
+    @kernel
+    def shapes(h, f, w, k, R, p):
+        """Forces on the shapes of the interface basis, and the momentum that each one's rate carries."""
+        n, x, c0 = m.FLEXES.n_modes(h, k), h[m.X] + m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
+        bias, C = h[m.MODAL] + 18 * n, h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k)
+        S, T = bias + n, bias + 4 * n
+        in_interface(h, f, w, k, bias, h[m.MODAL_BIAS] + c0)
+        for e in range(3):
+            in_interface(h, f, w, k, S + e * n, T + e * n)
+        for j in range(n):
+            drawn = first_moment(h, f, w, k, j, x)  # if not zero, shapes are eigenmodes
+            linear = turn(R, (f[C + j] + drawn, f[C + n + j], f[C + 2 * n + j]))
+            angular = turn(R, (w[T + j], w[T + n + j], w[T + 2 * n + j]))
+            put(w, m.MOMENTA.row(h, c0 + j), add(angular, cross(p, linear)))
+            put(w, m.MOMENTA.row(h, c0 + j) + 3, linear)
         if m.FLEXES.inboard(h, k):
             carried(h, w, k)
 
@@ -183,24 +198,19 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         o, force = m.WRENCH.row(h, i), turn(R, force)
         put(w, o, add(turn(R, moment), cross(p, force)))
         put(w, o + 3, force)
-        modes(h, f, w, k, R, p, a, alpha, omega)
+        modes(h, f, w, k, a, alpha, omega)
         stiffness(h, f, w, k)
+        shapes(h, f, w, k, R, p)
 
     @kernel
     def body_modal_inertia(h, f, w, k):
-        """Add what the modal accelerations in DU demand to the wrench on the body's link (after `inertia`)."""
-        n = m.FLEXES.n_modes(h, k)
-        i, du, P = m.FLEXES.link(h, k), h[m.DU] + m.FLEXES.c0(h, k), h[m.MODAL]
-        invariants(h, f, w, k)
-        frame = m.LINK_FRAMES.row(h, i)
-        R, p = at9(w, frame + m.FRAME.axes), at(w, frame + m.FRAME.origin)
-        force, moment = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-        for j in range(n):
-            force = add(force, scale(w[du + j], shape(h, f, w, k, j)))
-            moment = add(moment, scale(w[du + j], spin(w, P, n, j)))
-        force = turn(R, force)
-        accumulate(w, m.WRENCH.row(h, i), add(turn(R, moment), cross(p, force)))
-        accumulate(w, m.WRENCH.row(h, i) + 3, force)
+        """Add what the modal accelerations in DU demand to the wrench on the body's link (right after `inertia`)."""
+        c0, o = m.FLEXES.c0(h, k), m.WRENCH.row(h, m.FLEXES.link(h, k))
+        for j in range(c0, c0 + m.FLEXES.n_modes(h, k)):
+            # not that of the body frame, which such shapes move: it is in the frame's own acceleration
+            momentum = m.DEFORMATION.row(h, j) if m.FLEXES.inboard(h, k) else m.MOMENTA.row(h, j)
+            for e in range(6):
+                w[o + e] += w[h[m.DU] + j] * w[momentum + e]
 
     @kernel
     def body_energies(h, f, w, k):
@@ -246,4 +256,5 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
             elastic += bent
         return kinetic, elastic
 
-    return FlexibleBodies(site, inboard, inertia, mass_matrix, modal_inertia, port_load, modal_forces, energies)
+    before = (deform, site, inboard, inertia, mass_matrix, modal_inertia)
+    return FlexibleBodies(*before, port_load, modal_forces, modal_rates, energies)

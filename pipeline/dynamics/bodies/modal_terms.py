@@ -55,27 +55,28 @@ def spatial(w, o, mass, p, c, J):
 
 @kernel
 def carried(h, w, k):
-    """Modes that also move the body frame: their columns carry the body's own wrench and inertia."""
-    i, c0 = m.FLEXES.link(h, k), m.FLEXES.c0(h, k)
+    """Shapes that also move the body frame: their columns carry the body's own wrench and inertia."""
+    i, c0, held = m.FLEXES.link(h, k), m.FLEXES.c0(h, k), m.FLEXES.n_held(h, k)
     own = m.OWN.row(h, i)
     c, J = at(w, own + 1), at6(w, own + 4)
     for j in range(c0, c0 + m.FLEXES.n_modes(h, k)):
         s, o = m.COLUMNS.row(h, j), m.MOMENTA.row(h, j)
-        w[h[m.MODAL_BIAS] + j] += dot6(w, s, w, m.WRENCH.row(h, i))
-        omega, v = at(w, s), at(w, s + 3)
         # momentum of the deformation alone stays for the mass matrix
         for e in range(6):
             w[m.DEFORMATION.row(h, j) + e] = w[o + e]
+        if j < c0 + held:
+            continue
+        w[h[m.MODAL_BIAS] + j] += dot6(w, s, w, m.WRENCH.row(h, i))
+        omega, v = at(w, s), at(w, s + 3)
         accumulate(w, o, add(turn_symmetric(J, omega), cross(c, v)))
         accumulate(w, o + 3, add(scale(w[own], v), cross(omega, c)))
 
 
 @kernel
 def stiffness(h, f, w, k):
-    """Elastic and damping forces join the modal forces; the power lost to damping joins the ledger."""
+    """Elastic and damping forces join those on the modes; the power lost to damping joins the ledger."""
     n, x, u, data = places(h, k)
-    K = data + 12 * n + n * n
-    bias, rate = h[m.MODAL_BIAS] + m.FLEXES.c0(h, k), h[m.POSITION_RATE] + m.FLEXES.q0(h, k)
+    K, bias, rate = data + 12 * n + n * n, h[m.MODAL] + 18 * n, h[m.POSITION_RATE] + m.FLEXES.q0(h, k)
     for j in range(n):
         speed = w[u + j]
         damping = f[K + n + j] * speed
@@ -87,27 +88,29 @@ def stiffness(h, f, w, k):
 @kernel
 def body_mass_matrix(h, f, w, k):
     """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
-    n, _, _, data = places(h, k)
-    c0, moves = m.FLEXES.c0(h, k), m.FLEXES.inboard(h, k)
+    n, c0, held, moves = m.FLEXES.n_modes(h, k), m.FLEXES.c0(h, k), m.FLEXES.n_held(h, k), m.FLEXES.inboard(h, k)
+    mass = h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k) + 3 * n
     for i in range(n):
         start = h[m.MASS] + m.ENVELOPE.start(h, c0 + i) - m.ENVELOPE.first(h, c0 + i) + c0
-        for j in range(0 if m.FLEXES.coupled(h, k) else i, i + 1):
-            value = f[data + 12 * n + i * n + j]
-            if moves:
+        for j in range(0 if m.FLEXES.coupled(h, k) and i >= held else i, i + 1):
+            value = f[mass + i * n + j]
+            if moves and j >= held:
                 value += dot6(w, m.MOMENTA.row(h, c0 + i), w, m.COLUMNS.row(h, c0 + j))
+            if moves and i >= held:
                 value += dot6(w, m.COLUMNS.row(h, c0 + i), w, m.DEFORMATION.row(h, c0 + j))
             w[start + j] += value
 
 
 @kernel
 def port_load(h, w, i):
-    """A link on a flexible parent also loads the parent's modes, through its port."""
+    """A link on a flexible parent also loads the parent's moving shapes, through its port."""
     p = m.LINKS.carried_by(h, i)
     if p < 0:
         return
     b = m.PORTS.flex(h, p)
-    c0, first = m.FLEXES.c0(h, b), m.PORTS.column(h, p)
-    for j in range(m.FLEXES.n_modes(h, b)):
+    held, first = m.FLEXES.n_held(h, b), m.PORTS.column(h, p)
+    c0 = m.FLEXES.c0(h, b) + held
+    for j in range(m.FLEXES.n_modes(h, b) - held):
         k = first + j
         carry(h, w, i, k)
         accumulate(w, m.MOMENTA.row(h, c0 + j), at(w, m.MOMENTA.row(h, k)))

@@ -1,4 +1,4 @@
-"""Frames on flexible bodies: deformation, its rates, and the twists that the modes give them.
+"""Frames on flexible bodies: deformation, its rates, and the twists that the moving shapes give them.
 
 A frame turns by the rotation vector theta = Psi q and moves by Phi q; its rotation is exp(theta)
 in full, so that angular velocity and energy agree to rounding.
@@ -23,6 +23,7 @@ from flexclear.pipeline.dynamics.vectors import (
     scale,
     sub,
     tangent,
+    tangent_matrix,
     tangent_rate,
     transpose,
     turn,
@@ -35,6 +36,13 @@ def _shape(f, first, n, j):
     return (f[first + j], f[first + n + j], f[first + 2 * n + j])
 
 
+@kernel
+def moving(h, k):
+    """Number of moving shapes of body k, and the first of their coordinates."""
+    held = m.FLEXES.n_held(h, k)
+    return m.FLEXES.n_modes(h, k) - held, m.FLEXES.c0(h, k) + held
+
+
 def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
     """The kernels `site` and `inboard`; shortening(h, f, w, p, j, vector) is what bending adds along x, or zero."""
 
@@ -45,8 +53,8 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
         Body components.  The accelerations hold what the known modal accelerations give.
         """
         k = m.PORTS.flex(h, p)
-        n, x, c0 = m.FLEXES.n_modes(h, k), h[m.X] + m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
-        u, du = h[m.U] + c0, h[m.DU] + c0
+        n, first = moving(h, k)
+        x, u, du = h[m.INTERFACE_X] + first, h[m.INTERFACE_U] + first, h[m.DU] + first
         move = h[m.PORT_DATA.place] + m.PORTS.shapes(h, p)
         spin = move + 3 * n
         zero = (0.0, 0.0, 0.0)
@@ -67,16 +75,18 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
 
     @kernel
     def modal_columns(h, f, w, p, R, origin, theta, sign, first):
-        """Twist of port p's frame relative to the body, per modal rate, about the kernels' origin.
+        """Twist of port p's frame relative to the body, per rate of a moving shape, about the kernels' origin.
 
         Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port.
         """
         k = m.PORTS.flex(h, p)
-        n, move, x = m.FLEXES.n_modes(h, k), h[m.PORT_DATA.place] + m.PORTS.shapes(h, p), h[m.X] + m.FLEXES.q0(h, k)
+        n, c = moving(h, k)
+        move, x = h[m.PORT_DATA.place] + m.PORTS.shapes(h, p), h[m.INTERFACE_X] + c
+        spin = product(R, tangent_matrix(theta))
         for j in range(n):
             phi = _shape(f, move, n, j)
             bent = (phi[0] + shortening(h, f, w, p, j, x), phi[1], phi[2])
-            angular = scale(sign, turn(R, tangent(theta, _shape(f, move + 3 * n, n, j))))
+            angular = scale(sign, turn(spin, _shape(f, move + 3 * n, n, j)))
             linear = scale(sign, turn(R, bent))
             o = m.COLUMNS.row(h, first + j)
             accumulate(w, o, angular)
@@ -101,10 +111,11 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
         put(w, o + m.FRAME.velocity, add(at(w, frame + m.FRAME.velocity), add(swing, sliding)))
         put(w, o + m.FRAME.alpha, add(alpha, add(turn(R, alpha_l), cross(omega, turning))))
         put(w, o + m.FRAME.acceleration, a)
-        moves, first, c0 = m.FLEXES.inboard(h, k), m.PORTS.column(h, p), m.FLEXES.c0(h, k)
-        for j in range(m.FLEXES.n_modes(h, k)):
+        moves, first = m.FLEXES.inboard(h, k), m.PORTS.column(h, p)
+        n, c = moving(h, k)
+        for j in range(n):
             for e in range(6):
-                w[m.COLUMNS.row(h, first + j) + e] = w[m.COLUMNS.row(h, c0 + j) + e] if moves else 0.0
+                w[m.COLUMNS.row(h, first + j) + e] = w[m.COLUMNS.row(h, c + j) + e] if moves else 0.0
         modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
 
     @kernel
@@ -129,11 +140,11 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
         v_B = sub(v, add(swing, sliding))
         a_B = sub(a, add(cross(alpha_B, arm), cross(omega_B, swing)))
         a_B = sub(a_B, add(scale(2.0, cross(omega_B, sliding)), turn(R_WB, a_l)))
-        c0 = m.FLEXES.c0(h, k)
-        for j in range(m.FLEXES.n_modes(h, k)):
+        n, c = moving(h, k)
+        for j in range(n):
             for e in range(6):
-                w[m.COLUMNS.row(h, c0 + j) + e] = 0.0
-        modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c0)
+                w[m.COLUMNS.row(h, c + j) + e] = 0.0
+        modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c)
         return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
 
     return site, inboard

@@ -86,7 +86,8 @@ def apply_wrench(h, w, s, moment, force):
     p = m.SITES.port(h, s)
     if p >= 0:
         b = m.PORTS.flex(h, p)
-        bias, first = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b), m.PORTS.column(h, p)
-        for j in range(m.FLEXES.n_modes(h, b)):
+        held, first = m.FLEXES.n_held(h, b), m.PORTS.column(h, p)
+        bias = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b) + held
+        for j in range(m.FLEXES.n_modes(h, b) - held):
             o = m.COLUMNS.row(h, first + j)
             w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)

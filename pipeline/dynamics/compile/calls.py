@@ -8,40 +8,30 @@ once, and so is the integrator, for all mechanisms. A call costs some nanosecond
 from __future__ import annotations
 
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 from llvmlite import ir
-from numba import cfunc, config, njit, types
+from numba import carray, cfunc, types
 from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel
 
 _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
-#: C signatures of what is called: (h, f, w, n, t, y, dy), with tolerance; (h, w, y, retractment, out, total)
+_FLOAT, _INTEGER = types.float64, types.int64
+_TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
+#: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, w, y, retractment, out,
+#: total). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and columns, tolerance, out); (h, f,
+#: w, n, t, repeat, outputs with their number, rows, events)
 SIGNATURES = {
     "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(_INTEGERS, _FLOATS, _PLACE, _PLACE, _PLACE, _PLACE),
+    "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, *_TABLE),
+    "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
 }
-_ARRAYS = (types.int64[::1], types.float64[::1], types.float64[::1], types.int64[::1])
-_TABLE = types.float64[:, ::1]
-#: signatures of what Python calls: (h, f, w, n, rows, pieces, tolerance, out); (h, f, w, n, t, repeat, outputs, rows,
-#: events)
-OBSERVE = types.void(*_ARRAYS, _TABLE, types.int64[:, ::1], types.float64, _TABLE)
-ADVANCE = types.void(*_ARRAYS, types.float64, types.int64, types.float64[::1], _TABLE, _TABLE)
-
-
-@intrinsic
-def flat(typingctx: Any, array: Any) -> Any:
-    """Where the entries of an array are."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return context.make_array(signature.args[0])(context, builder, values[0]).data
-
-    return types.CPointer(array.dtype)(array), generate
 
 
 @intrinsic
@@ -60,33 +50,18 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
     return types.int64(address, arguments), generate
 
 
-def exported(name: str) -> Callable[[Callable], Any]:
-    """Decorator: a C function with an `address`, fetched from disk or compiled at once."""
-    return cfunc(SIGNATURES[name], cache=True, error_model="numpy")
+def exported(name: str) -> Callable[[Callable], int]:
+    """Decorator: compiles a C function; its address."""
+    return compiles(cfunc(SIGNATURES[name], error_model="numpy"))
 
 
-def called(signature: Any) -> Callable[[Callable], Any]:
-    """Decorator: a function that Python calls, fetched from disk or compiled at once."""
-    return njit(signature, cache=True, nogil=True)
-
-
-if config.DISABLE_JIT:  # for debugging: the same calls between functions of Python
-    interpreted: dict[int, Callable] = {}
+if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for places
 
     def call(address, arguments):
         """What the function known by this number returns."""
         return interpreted[int(address)](*arguments)
 
-    def exported(name: str) -> Callable[[Callable], Any]:
-        """Decorator: the function itself, under a number."""
-
-        def number(function: Callable) -> Any:
-            interpreted[id(function)] = function
-            return SimpleNamespace(address=id(function))
-
-        return number
-
-    def flat(array):
+    def carray(array, shape):
         """Itself."""
         return array
 

@@ -15,10 +15,9 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from numba import config
-
 from flexclear.pipeline.core.workflow.cores import free
 from flexclear.pipeline.dynamics.compile.files import claimed, take
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
 # started by a command, since multiprocessing would run the user's script again in the child
 COMMAND = """import json, sys
@@ -49,7 +48,7 @@ def wanted() -> bool:
     """Whether a second process is of use, and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)
-    return startable and not config.DISABLE_JIT and free()
+    return startable and not INTERPRETED and free()
 
 
 def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:

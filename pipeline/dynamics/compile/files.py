@@ -1,54 +1,54 @@
-"""Generated files, imported: the function of each is compiled as that is done, or fetched from disk.
+"""Generated files, brought: the function of each is compiled, or its code is fetched from disk.
 
-To load what was compiled is to run it, so it is loaded only if every file of it, the compiler's index included, has
-the digest that was noted when it was made. What is damaged, half written or cannot be loaded is set aside and compiled
-again. A file belongs to whoever holds its lock, so that no two processes compile the same. The second process
-(`compiler_process`) imports this module and little else.
+To load what was compiled is to run it, so it is loaded only if source and code have the digests that were noted when
+it was made. What is damaged, half written or cannot be loaded is set aside and compiled again. A file belongs to
+whoever holds its lock, so that no two processes compile the same. The second process (`compiler_process`) imports this
+module and little else.
 """
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
-import itertools
 import os
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
-from types import ModuleType
-
-from numba import config
-from numba.core.bytecode import FunctionIdentity
+from typing import Any
 
 from flexclear.pipeline.core.artifacts.disk import checked, locked, publish, read_checked
+from flexclear.pipeline.dynamics.compile import machine_code
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 
 #: told the file that has to be compiled, or waited for
 Tell = Callable[[Path], None]
+#: functions of this process by the name of their file
+loaded: dict[str, machine_code.Code] = {}
+#: functions of Python by their numbers, where nothing is compiled
+interpreted: dict[int, Callable] = {}
+CODE = ".code"  #: what was compiled of a file
 
 
 def bring(paths: list[Path], tell: Tell) -> None:
-    """Import files, compiling them in this order; those that another process is compiling come last."""
+    """Load files, compiling them in this order; those that another process is compiling come last."""
     left = list(paths)
     while left:
         path = next((path for path in left if take(path, tell)), left[0])
-        if path.stem not in sys.modules:
+        if path.stem not in loaded:
             tell(path)
             take(path, lambda _: None, wait=True)
         left.remove(path)
 
 
 def take(path: Path, tell: Tell, *, wait: bool = False) -> bool:
-    """Import a file; False, and nothing done, when another process has its lock and it is not to be waited for."""
+    """Load a file; False, and nothing done, when another process has its lock and it is not to be waited for."""
     if _fetched(path):
         return True
     with claimed(path, wait=wait) as mine:
         if mine and not _fetched(path):
             tell(path)
             set_aside(path)
-            _import(path)
-            if not config.DISABLE_JIT:
-                publish(path.with_suffix(".sum"), checked(_digests(path)))
+            _compile(path)
     return mine
 
 
@@ -60,16 +60,16 @@ def compiled(path: Path) -> bool:
 
 def set_aside(path: Path) -> None:
     """Remove what was compiled of a file."""
-    for found in (path.with_suffix(".sum"), *_code(path)):
-        found.unlink(missing_ok=True)
+    for suffix in (".sum", CODE):
+        path.with_suffix(suffix).unlink(missing_ok=True)
 
 
 def _fetched(path: Path) -> bool:
-    """Import a file whose code is on disk; False when it is not, or cannot be loaded for whatever reason."""
-    if not compiled(path):
+    """Load a file whose code is on disk; False when it is not, or cannot be loaded for whatever reason."""
+    if INTERPRETED or not compiled(path):
         return False
     try:
-        _import(path)
+        loaded[path.stem] = machine_code.load(path.with_suffix(CODE).read_bytes())
     except Exception:
         return False
     with contextlib.suppress(OSError):
@@ -77,14 +77,10 @@ def _fetched(path: Path) -> bool:
     return True
 
 
-def _code(path: Path) -> list[Path]:
-    """What the compiler has written of a file: index and code."""
-    return sorted((path.parent / "__pycache__").glob(f"{path.stem}.*"))
-
-
 def _digests(path: Path) -> dict[str, str]:
-    """Of the source and of all that was compiled of it, by name."""
-    return {found.name: hashlib.sha256(found.read_bytes()).hexdigest() for found in (path, *_code(path))}
+    """Of the source and of the code that was made of it, by name."""
+    there = (found for found in (path, path.with_suffix(CODE)) if found.is_file())
+    return {found.name: hashlib.sha256(found.read_bytes()).hexdigest() for found in there}
 
 
 def claimed(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
@@ -92,36 +88,33 @@ def claimed(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
     return locked(path.with_suffix(".lock"), wait=wait)
 
 
-def _import(path: Path) -> None:
-    """Run the source itself: Python would keep bytecode of it, and take that without looking."""
-    code = compile(path.read_bytes(), str(path), "exec")
-    sys.modules[path.stem] = module = ModuleType(path.stem)  # what is on disk refers to it
-    module.__file__ = str(path)
-    _number_apart()
-    try:
-        with _kept_beside():
-            exec(code, module.__dict__)
-    except BaseException:  # interrupted, or no room on the disk: not to be taken for whole later
-        del sys.modules[path.stem]
-        raise
+def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
+    """Decorator of the function of a generated file: it is compiled at once; its address.
 
-
-@contextmanager
-def _kept_beside() -> Iterator[None]:
-    """Let Numba look for code beside the source and nowhere else, whatever its own settings say."""
-    before = config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES
-    config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = "", "InTreeCacheLocator"
-    try:
-        yield
-    finally:
-        config.CACHE_DIR, config.CACHE_LOCATOR_CLASSES = before
-
-
-def _number_apart() -> None:
-    """Let Numba's names be those of no other process.
-
-    It names the code of a function by its qualified name and a counter of the process. Files that
-    two processes compiled would share names for different code, and a third process that loads
-    both would mix them up (numba issue 10486); so the counter starts anywhere.
+    compiler: what makes a C function of it (`numba.cfunc`).
     """
-    FunctionIdentity._unique_ids = itertools.count(int.from_bytes(os.urandom(6), "big") << 16)
+
+    def compiled_function(function: Callable) -> int:
+        if INTERPRETED:
+            interpreted[id(function)] = function
+            made = machine_code.Code(id(function), function)
+        else:
+            done = compiler(function)
+            made = machine_code.Code(done.address, done)
+        loaded[function.__globals__["__name__"]] = made
+        return made.address
+
+    return compiled_function
+
+
+def _compile(path: Path) -> None:
+    """Compile a file and leave its code on disk."""
+    try:
+        # the source itself: Python would keep bytecode of it, and take that without looking
+        exec(compile(path.read_bytes(), str(path), "exec"), {"__name__": path.stem, "__file__": str(path)})
+        if not INTERPRETED:
+            publish(path.with_suffix(CODE), machine_code.image(loaded[path.stem].keeper))
+            publish(path.with_suffix(".sum"), checked(_digests(path)))
+    except BaseException:  # interrupted, or no room on the disk: not to be taken for whole later
+        loaded.pop(path.stem, None)
+        raise

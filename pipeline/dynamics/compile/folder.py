@@ -13,13 +13,10 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import llvmlite.binding
-from numba import config
-
 from flexclear.pipeline.core.artifacts.disk import sweep
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.system import others_can_write
-from flexclear.pipeline.dynamics.compile.files import claimed, set_aside
+from flexclear.pipeline.dynamics.compile.files import CODE, claimed, set_aside
 
 #: kernels that nobody fetched for so long are removed [s], and the oldest ones beyond so many bytes
 UNUSED, LARGEST = 90 * 86400.0, 2 << 30
@@ -33,7 +30,6 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
     folder = root / processor()
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        (folder / "__pycache__").mkdir(exist_ok=True, mode=0o700)
         problem = "" if os.access(folder, os.W_OK) else "not writable"
     except OSError as error:
         problem = error.strerror or str(error)
@@ -46,8 +42,8 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
 
 def refuse_shared(folder: Path) -> None:
     """InputError when anybody but this user (and the system's) can write to a folder of kernels, or replace it."""
-    for place in (folder / "__pycache__", folder, *folder.parents):
-        if others_can_write(place, inside=place in (folder / "__pycache__", folder)):
+    for place in (folder, *folder.parents):
+        if others_can_write(place, inside=place == folder):
             raise InputError(
                 str(folder),
                 f"compiled kernels are not loaded from there, since others can write to {place}",
@@ -57,10 +53,12 @@ def refuse_shared(folder: Path) -> None:
 
 @cache
 def processor() -> str:
-    """A name for what code is compiled for: processor, its features and what the compiler was told of them."""
-    features = llvmlite.binding.get_host_cpu_features().flatten()
-    told = (llvmlite.binding.get_host_cpu_name(), features, config.CPU_NAME, config.CPU_FEATURES, config.OPT)
-    return hashlib.sha256(repr(tuple(map(str, told))).encode()).hexdigest()[:12]
+    """A name for what code is compiled for: processor, its features and what the compiler is told of them."""
+    import llvmlite.binding as llvm
+
+    told = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
+    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *told)
+    return hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
 
 
 def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
@@ -77,7 +75,7 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
 
 def size(path: Path) -> int:
     """Bytes of a generated file and of what was compiled of it."""
-    return sum(found.stat().st_size for found in (path, *(path.parent / "__pycache__").glob(f"{path.stem}.*")))
+    return sum(found.stat().st_size for found in (path, path.with_suffix(CODE)) if found.is_file())
 
 
 def _used(path: Path) -> float:

@@ -1,35 +1,34 @@
 """The compiled functions of a mechanism, cached on disk across processes.
 
 Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
-reach and of the versions of the compiler, because Numba's own cache looks at that file alone and
-would keep stale callees. The functions call each other by address (`calls`), so that mechanisms
-share those which are alike.
+reach and of the versions of the compiler. The functions call each other by address (`calls`), so
+that mechanisms share those which are alike.
 """
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
-import llvmlite
-import numba
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported, library_version
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
-from flexclear.pipeline.dynamics.compile.files import bring, compiled
+from flexclear.pipeline.dynamics.compile.files import bring, compiled, interpreted, loaded
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 SOURCES = Sources(TREE)
@@ -50,24 +49,40 @@ OURS = "advance"
 #: where the code of kernels stands, and what they number by
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
+_PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+_TABLES, _TABLE_AT = (_PLACE,) * 4, (_PLACE, _INTEGER, _INTEGER)
+#: C types of what Python calls, as `calls.SIGNATURES` has them
+PROTOTYPES = {
+    "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, *_TABLE_AT),
+    "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
+}
+
+
+def place(array: np.ndarray, kind: type = np.float64) -> Any:
+    """Where the entries of an array are, as C functions take it; TypeError for one that is not as they read it."""
+    if array.dtype != kind or not array.flags.c_contiguous:
+        raise TypeError(f"an array of {array.dtype}, {array.strides} bytes apart, instead of {kind.__name__} in a row")
+    return array if INTERPRETED else array.ctypes.data
 
 
 @dataclass(frozen=True)
 class Entry:
-    """The compiled functions of a mechanism; h must have been given their addresses."""
+    """The compiled functions of a mechanism, by their addresses; h must have been given those.
 
-    modules: dict[str, ModuleType]
+    Calls let other threads run.
+    """
+
+    addresses: Mapping[str, int]
 
     def connect(self, h: np.ndarray) -> None:
         """Write into the header where this process has put the functions that others call."""
-        for name, place in ADDRESSES.items():
-            module = self.modules.get(name)
-            h[place] = getattr(module, name).address if module else 0
+        for name, where in ADDRESSES.items():
+            h[where] = self.addresses.get(name, 0)
         h[m.RATES] = h[m.EVALUATE]
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
         """Slope of the state in Y at time t, into the first row of SLOPES."""
-        self.modules["advance"].advance(h, f, w, n, t, repeat, _FLOATS, _TABLE, _TABLE)
+        self._advance(_tables(h, f, w, n), t, repeat, _FLOATS, _TABLE, _TABLE)
 
     def advance(
         self,
@@ -80,7 +95,13 @@ class Entry:
         events: np.ndarray,
     ) -> None:
         """Step to the end of the segment or of the budget."""
-        self.modules["advance"].advance(h, f, w, n, 0.0, -1, outputs, rows, events)
+        self._advance(_tables(h, f, w, n), 0.0, -1, outputs, rows, events)
+
+    def _advance(
+        self, tables: tuple, t: float, repeat: int, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray
+    ) -> None:
+        record = (place(rows), *rows.shape, place(events), *events.shape)
+        self._functions["advance"](*tables, t, repeat, place(outputs), len(outputs), *record)
 
     def observe(
         self,
@@ -94,35 +115,46 @@ class Entry:
         out: np.ndarray,
     ) -> None:
         """Evaluate what is recorded of every row."""
-        self.modules["observe"].observe(h, f, w, n, rows, pieces, tolerance, out)
+        given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
+        self._functions["observe"](*_tables(h, f, w, n), *given, tolerance, place(out), *out.shape)
+
+    @cached_property
+    def _functions(self) -> dict[str, Callable]:
+        if INTERPRETED:
+            return {name: interpreted[self.addresses[name]] for name in PROTOTYPES}
+        return {name: prototype(self.addresses[name]) for name, prototype in PROTOTYPES.items()}
+
+
+def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
+    return place(h, np.int64), place(f), place(w), place(n, np.int64)
 
 
 def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     """The compiled functions for these parts; `tell` hears of what has to be compiled."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     with disk_limits(folder):
-        return Entry(_modules(folder, sources.sources(parts, scheme), tell, began))
+        return Entry(_addresses(folder, sources.sources(parts, scheme), tell, began))
 
 
 def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None]) -> int:
     """Address of the right-hand side for one wiring; UnsuitedError when there is none."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     with disk_limits(folder):
-        found = _modules(folder, {SPECIALISED: sources.specialised(parts, wiring)}, tell, began)
-    return int(found[SPECIALISED].specialised.address)
+        found = _addresses(folder, {SPECIALISED: sources.specialised(parts, wiring)}, tell, began)
+    return found[SPECIALISED]
 
 
-def _modules(folder: Path, texts: dict[str, str], tell: Callable[[str], None], began: float) -> dict[str, ModuleType]:
-    """The module of each source by its name, fetched from the folder or compiled into it."""
+def _addresses(folder: Path, texts: dict[str, str], tell: Callable[[str], None], began: float) -> dict[str, int]:
+    """Where the function of each source is, by its name, fetched from the folder or compiled into it."""
     files = {name: _file(folder, name, source) for name, source in texts.items()}
-    names = {path: name for name, path in files.items() if path.stem not in sys.modules}
+    names = {path: name for name, path in files.items() if path.stem not in loaded}
     ours_first = sorted(names, key=lambda path: names[path] != OURS)
     ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
     with second_process(ours_last):
         bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
     if ours_last:
         prune(folder)
-    return {name: sys.modules[path.stem] for name, path in files.items()}
+    return {name: loaded[path.stem].address for name, path in files.items()}
 
 
 def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
@@ -147,7 +179,7 @@ def _file(folder: Path, name: str, source: str) -> Path:
 def digest(source: str) -> str:
     """Digest of a generated source, of the kernel sources that it reaches, and of the compiler."""
     total = hashlib.sha256(source.encode())
-    total.update(f"{numba.__version__} {llvmlite.__version__} {sys.version_info[:2]}".encode())
+    total.update(f"{library_version('numba')} {library_version('llvmlite')} {sys.version_info[:2]}".encode())
     for name, source_digest in sorted(reached(source).items()):
         total.update(f"{name} {source_digest}".encode())
     return total.hexdigest()[:20]

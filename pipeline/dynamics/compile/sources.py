@@ -99,6 +99,7 @@ def _project(parts: Parts) -> str:
     if parts.flexible:
         stiffen = _import(imports, f"{DYNAMICS}.equations.projection", "make_stiffen")
         given["stiffen"] = f"{stiffen}({given['closures']})"
+        given["to_modes"] = _import(imports, f"{DYNAMICS}.bodies.interface", "to_modes")
     maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
     return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
 
@@ -238,17 +239,19 @@ def retract(h, w, y, displacement, out, total):
     retraction(h, w, y, displacement, out, total)
     return 0
 """
-OBSERVE = """@calls.called(calls.OBSERVE)
-def observe(h, f, w, n, rows, pieces, tolerance, out):
-    h, f, w, n = calls.flat(h), calls.flat(f), calls.flat(w), calls.flat(n)
-    observation(h, f, w, n, rows, pieces, tolerance, out)
+OBSERVE = """@calls.exported("observe")
+def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, out_count, out_width):
+    rows, out = calls.carray(rows, (count, width)), calls.carray(out, (out_count, out_width))
+    observation(h, f, w, n, rows, calls.carray(pieces, (lines, laws)), tolerance, out)
+    return 0
 """
 # one function for both tasks: each would be an object of its own to fetch
-ADVANCE = """@calls.called(calls.ADVANCE)
-def advance(h, f, w, n, t, repeat, outputs, rows, events):
-    h, f, w, n = calls.flat(h), calls.flat(f), calls.flat(w), calls.flat(n)
+ADVANCE = """@calls.exported("advance")
+def advance(h, f, w, n, t, repeat, outputs, times, rows, count, width, events, event_count, event_width):
     if repeat < 0:
-        steps(h, f, w, n, outputs, rows, events)
+        rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
+        steps(h, f, w, n, calls.carray(outputs, (times,)), rows, events)
     for _ in range(repeat):
         calls.evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
+    return 0
 """

@@ -6,8 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 
-from scipy.optimize import brentq
-
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution as closed_form
 
@@ -85,6 +83,8 @@ class Hysteresis:
                 f"the law '{self.name}' delivers no restitution below {lowest:.4g}; ask for more, or choose "
                 "'gonthier', 'hu-guo' or 'flores', which cover the whole range"
             )
+        from scipy.optimize import brentq  # slow to import, and most laws do without
+
         return float(brentq(lambda c: self.factor(c) - a, least, 1.0, xtol=1e-17, rtol=1e-15))
 
     def _warning(self, law: NormalLaw, delivered: float) -> str | None:

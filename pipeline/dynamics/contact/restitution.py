@@ -10,8 +10,7 @@ Zhang & Sharf (2009), J. Applied Mechanics 76, 034501.
 from __future__ import annotations
 
 import math
-
-from scipy.optimize import brentq
+from collections.abc import Callable
 
 #: nearest to 1 that psi(-y) may come; beyond it 1 - y is rounding
 NEAREST = 1.0 - 2.0**-53
@@ -33,7 +32,7 @@ def delivered(a: float) -> float:
     wanted = psi(a)
     if wanted >= psi(-NEAREST):
         return 1.0 / a
-    return float(brentq(lambda y: psi(-y) - wanted, 0.0, NEAREST, xtol=1e-300, rtol=1e-15)) / a
+    return _root(lambda y: psi(-y) - wanted, 0.0, NEAREST) / a
 
 
 def factor(e: float) -> float:
@@ -48,7 +47,14 @@ def factor(e: float) -> float:
 
     if defect(NEAREST) >= 0.0:
         return NEAREST / e
-    return float(brentq(defect, 0.5 * e * (1.0 - e), NEAREST, xtol=1e-300, rtol=1e-15)) / e
+    return _root(defect, 0.5 * e * (1.0 - e), NEAREST) / e
+
+
+def _root(f: Callable[[float], float], low: float, high: float) -> float:
+    """Root of f between two arguments where it has other signs, to rounding."""
+    from scipy.optimize import brentq  # slow to import, and scenes without such a law do without
+
+    return float(brentq(f, low, high, xtol=1e-300, rtol=1e-15))
 
 
 def linear_delivered(zeta: float) -> float:
@@ -73,4 +79,4 @@ def damping_ratio(e: float) -> float:
     if e <= 0.0:
         raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
     # beyond 1 the restitution falls below (2 zeta)^-2, so that this is enough
-    return float(brentq(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5, xtol=1e-300, rtol=1e-15))
+    return _root(lambda z: linear_delivered(z) - e, 0.0, 2.0 + e**-0.5)

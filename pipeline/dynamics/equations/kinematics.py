@@ -36,6 +36,11 @@ def rigid_site(h, f, w, s):
 
 
 @kernel
+def undeformed(h, f, w):
+    """No modes."""
+
+
+@kernel
 def rigid_inboard(h, f, w, i, p, R, omega, v, alpha, a):
     """A rigid link's frame is its inboard joint frame."""
     return p, R, omega, v, alpha, a
@@ -45,10 +50,12 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
     """The kernel kinematics(h, f, w) that moves everything.
 
     joints: modules of the joint types present.  flexible: kernels of the flexible bodies (`bodies.flexible`); their
+    `deform` is called first, their
     `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to the link's.
     """
     joint_motion = choose(tuple(joint.motion for joint in joints))
     position_rate = choose(tuple(joint.position_rate for joint in joints))
+    deform = undeformed if flexible is None else flexible.deform
     inboard = rigid_inboard if flexible is None else flexible.inboard
     port_site = rigid_site if flexible is None else flexible.site
 
@@ -98,6 +105,7 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
         whole of them, the accelerations. Gravity is an upward acceleration of the ground.
         """
         put(w, m.LINK_FRAMES.row(h, 0) + m.FRAME.acceleration, scale(-1.0, at(f, h[m.GRAVITY.place])))
+        deform(h, f, w)
         for i in range(1, h[m.N_LINKS]):
             locate(h, f, w, i - 1)
             place(h, f, w, i)

@@ -210,7 +210,8 @@ def make_observation(
             o = _copy(w, h[m.Y], h[m.NY], line, 0)
             o = _copy(w, h[m.X], h[m.NQ] + h[m.N_DRIVES], line, o)
             o = _copy(w, h[m.U], h[m.NV] + h[m.N_DRIVES], line, o)
-            o = _copy(w, h[m.DU], h[m.NV] + h[m.N_DRIVES], line, o)
+            o = _copy(w, h[m.SLOPES] + h[m.NQ], h[m.NV], line, o)
+            o = _copy(w, h[m.DU] + h[m.NV], h[m.N_DRIVES], line, o)
             frames = o
             o = joint_wrenches(h, f, w, n, line, o + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES]))
             frames = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], line, frames)

@@ -71,6 +71,11 @@ def rigid_bodies(h, f, w, n):
     """No mode."""
 
 
+@kernel
+def no_modes(h, f, w, b):
+    """No mode."""
+
+
 def make_stiffen(closures: Any) -> Callable:
     """The kernel stiffen(h, f, w, n): the factors of an evaluation, with the modal stiffness beside the mass.
 
@@ -82,11 +87,13 @@ def make_stiffen(closures: Any) -> Callable:
         rows, matrix, size = h[m.ENVELOPE.place], h[m.MASS], h[m.NV]
         multiply(h, rows, w, matrix, size)
         for k in range(h[m.N_FLEX]):
-            modes = m.FLEXES.n_modes(h, k)
-            stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + (12 + modes) * modes
-            for j in range(modes):
-                i = m.FLEXES.c0(h, k) + j
-                w[base(h, rows, matrix, i) + i] += SLOWLY**2 * f[stiffness + j]
+            modes, held, c0 = m.FLEXES.n_modes(h, k), m.FLEXES.n_held(h, k), m.FLEXES.c0(h, k)
+            stiffness = h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k) + (3 + modes) * modes
+            for i in range(modes):
+                row = base(h, rows, matrix, c0 + i) + c0
+                # without held shapes, shapes are eigenmodes
+                for j in range(0 if i >= held > 0 else i, i + 1):
+                    w[row + j] += SLOWLY**2 * f[stiffness + modes * i + j]
         factor(h, rows, w, matrix, size, 0.0)
         closures.complete(h, w, n)
 
@@ -94,12 +101,16 @@ def make_stiffen(closures: Any) -> Callable:
 
 
 def make_projection(
-    evaluate: Callable, joints: tuple[Any, ...], closures: Any, stiffen: Callable = rigid_bodies
+    evaluate: Callable,
+    joints: tuple[Any, ...],
+    closures: Any,
+    stiffen: Callable = rigid_bodies,
+    to_modes: Callable = no_modes,
 ) -> Callable:
     """The kernel project(h, f, w, n, t, y, dy, tolerance).
 
     evaluate: the right-hand side.  joints: modules of the joint types.  closures: the module of that name.
-    stiffen: of `make_stiffen`, where bodies are flexible.
+    stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, where bodies are flexible.
     """
     position_rates, correction = make_position_rates(joints), closures.correction
 
@@ -133,9 +144,11 @@ def make_projection(
             if n[m.EVALUATION] != m.OK:
                 return -1
             correction(h, w, h[m.RESIDUAL_RATE], step)
+            to_modes(h, f, w, step)
             for k in range(h[m.NV]):
                 w[y + h[m.NQ] + k] += w[step + k]
             correction(h, w, h[m.RESIDUAL], step)
+            to_modes(h, f, w, step)
             move(h, w, y, step)
             evaluate(h, f, w, n, t, y, dy)
             used += 1

@@ -38,6 +38,11 @@ def no_modal_forces(h, w):
 
 
 @kernel
+def no_modal_rates(h, f, w, dy):
+    """No modes."""
+
+
+@kernel
 def no_link_load(h, w, i):
     """No link is carried by a flexible one."""
 
@@ -149,6 +154,7 @@ def make_rates(
     forces = make_forces(flexible, contacts, loads, stops)
     port_load = no_link_load if flexible is None else flexible.port_load
     modal_mass = no_modal_mass if flexible is None else flexible.mass_matrix
+    modal_rates = no_modal_rates if flexible is None else flexible.modal_rates
     modal = no_modal_forces if flexible is None else flexible.modal_forces
     close = no_closures if closures is None else closures.close
     known_forces = no_known_forces if closures is None else closures.known_forces
@@ -179,7 +185,7 @@ def make_rates(
         modal(h, w)
 
     @kernel
-    def store_rates(h, w, dy):
+    def store_rates(h, f, w, dy):
         """Positions' rates, accelerations, and the ledger's powers."""
         power = 0.0
         for d in range(h[m.N_DRIVES]):
@@ -189,6 +195,7 @@ def make_rates(
             w[dy + k] = w[h[m.POSITION_RATE] + k]
         for k in range(h[m.NV]):
             w[dy + h[m.NQ] + k] = w[h[m.DU] + k]
+        modal_rates(h, f, w, dy)
         for k in range(h[m.N_LEDGER]):
             w[dy + h[m.NQ] + h[m.NV] + k] = w[h[m.LEDGER_RATE] + k]
 
@@ -217,6 +224,6 @@ def make_rates(
         drive_forces(h, w)
         known_forces(h, w)
         rub_drives(h, w)
-        store_rates(h, w, dy)
+        store_rates(h, f, w, dy)
 
     return rates

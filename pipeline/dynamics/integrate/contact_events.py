@@ -19,6 +19,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
+from flexclear.pipeline.dynamics.integrate.friction_kinks import make_end_on_kink
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event
 from flexclear.pipeline.dynamics.integrate.stepper import RESTART
@@ -340,6 +341,8 @@ def make_resolve_events(
             step += gap / rate
         return step, True
 
+    end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, regimes)
+
     @kernel
     def first_change(h, f, w, n, step):
         """Contact and share of the step of its first mode change, and whether the dense output is ready."""
@@ -376,6 +379,14 @@ def make_resolve_events(
         for shortened in range(MOST_SHORTENED + 1):
             watch_end(h, w)
             which, first, ready = first_change(h, f, w, n, step)
+            length = end_on_kink(h, f, w, n, step, first if which >= 0 else 1.0, ready)
+            if length < 0.0:
+                return give_up(n, m.LOST_CLOSURE, max(which, 0)), ready, t_new, step
+            if length > 0.0:
+                n[m.IMMEDIATE] = 0
+                watch_end(h, w)
+                extend(h, f, w, n, length)
+                return 0, follow_contacts(h, f, w, n, length, True, rows, events), t + length, length
             if which < 0:
                 n[m.IMMEDIATE] = 0
                 return 0, follow_contacts(h, f, w, n, step, ready, rows, events), t_new, step

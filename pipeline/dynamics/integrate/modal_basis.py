@@ -19,6 +19,7 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -153,7 +154,10 @@ def turn(h, w, o, pair):
 # Oscillators ----------------------------------------------------------------------------------------------------------
 @kernel
 def constrained(h, w, b):
-    """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers."""
+    """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers.
+
+    Modes are in the interface basis.
+    """
     forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)
     for c in range(h[m.N_CLOSURES]):
         rows, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
@@ -201,8 +205,10 @@ def responses(h, f, w, o):
             for c in range(nv):
                 w[b + c] = 0.0
             w[b + c0 + j] = w[root(h, o, e)]
+            to_interface(h, f, w, b)
             constrained(h, w, b)
             w[b + nv], w[b + nv + 1] = drive_power(h, w, b, h[m.U]), drive_power(h, w, b, h[m.DU])
+            to_modes(h, f, w, b)
             e += 1
     for i in range(e):
         j, b = 0, response(h, o, i) + nq

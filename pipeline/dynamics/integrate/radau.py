@@ -63,7 +63,7 @@ P = np.array(
 )
 MOST_ITERATIONS = 7
 #: corrections that fall slower than this ask for a new Jacobian at the next step
-SLOW = 0.05
+SLOW = 0.3
 
 # Memory between steps ------------------------------------------------------------------------------------------------
 # step of the factors, whether the Jacobian still holds, length of the step before (0: none); then vectors over the

@@ -11,6 +11,24 @@ from collections.abc import Callable
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
+#: recorded states are projected to this share of rtol times the mechanism's size; to more of a loose rtol, up to the
+#: second share, as it grows by so many times rtol: what a run left open itself need not cost an evaluation in every row
+RECORD_SHARE, MOST_SHARE, LOOSER = 1e-3, 0.1, 1e3
+
+
+def record_share(rtol: float) -> float:
+    """Share of rtol times the mechanism's size to which the loops of recorded states are closed."""
+    return min(MOST_SHARE, max(RECORD_SHARE, LOOSER * rtol))
+
+
+share_of_records = kernel(record_share)
+
+
+@kernel
+def holds_outputs(n, outputs, t):
+    """Whether there are several output times up to t that have not been recorded."""
+    return n[m.NEXT_OUTPUT] + 1 < outputs.shape[0] and outputs[n[m.NEXT_OUTPUT] + 1] <= t
+
 
 @kernel
 def hold_modes(h, w, n):

@@ -17,6 +17,7 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.gauges import angles
+from flexclear.pipeline.dynamics.model.interface_basis import modes_of
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import observation, singular
@@ -193,10 +194,11 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
-    L = engine.mass_factor()
+    modes = modes_of(engine.model.arrays)
+    L = modes @ engine.mass_factor()
     return Balance(
-        engine.view(m.BIAS)[: engine.model.nv].copy(),
+        modes @ engine.view(m.BIAS)[: engine.model.nv],
         L @ L.T,
-        engine.rows(m.JACOBIAN),
+        engine.rows(m.JACOBIAN) @ modes.T,
         engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)],
     )

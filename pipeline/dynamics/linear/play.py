@@ -4,7 +4,9 @@ Joints and drives hold the links: a small opening e of what they demand moves th
 
 .. math:: G\,x = -e, \qquad x = -G^{+} e
 
-where G holds the rates of all joints' residuals. Clearance lets two places part by up to its radius (and the depth to
+where G holds the rates of all joints' residuals. Of what is asked for, s x, only the adjoint solution
+:math:`\lambda^T = s G^{+}` is needed, which is one solve for all openings of all joints: the reactions of the joints to
+a unit load there. Clearance lets two places part by up to its radius (and the depth to
 which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there
 to the body that is asked for. A body that bends under the forces of its joints opens the joints at its ends by what its
 ends move, which is known. Both hold where joints and drives leave the body asked for no freedom; elsewhere masses
@@ -20,6 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
+from scipy import sparse
+from scipy.sparse.linalg import SuperLU, splu
 
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.clearance import Clearance
@@ -37,8 +41,9 @@ from flexclear.pipeline.dynamics.run.run import Run
 
 #: the motion is looked at so often
 LOOKS = 32
-#: singular values of the joints' rates below this share of the largest are zero, and motions of a body below this free
-RANK, FREE = 1e-8, 1e-6
+#: squared singular values of the joints' rates far below this share of the largest are zero, and what is shown may be
+#: free by this: where a pose comes within some 3e-4 of a singular one there is no bound
+RANK, FREE = 1e-13, 1e-6
 #: the force that presses a joint with clearance together is at least so many times the ideal one when it has been open
 KNOCK = 10.0
 #: quantities that the pose decides
@@ -78,18 +83,19 @@ def bounds(full: Scene, run: Run, bundles: Mapping[str, xr.Dataset], chosen: Seq
     whole = not model.scene.gear and len(joints) == _joined(model)
     for row in rows if asked else ():
         poses = [Placement(frame["origin"], frame["axes"]) for frame in seen.links[row]]
-        lever = _lever(model, joints, poses)
+        lever = lever_of(model, joints, poses)
         for q in asked:
             shown = _shown(model, poses, q)
-            if not whole or lever.free_motion(shown) > FREE:
+            adjoint = lever.adjoint(shown)
+            if not whole or adjoint.free > FREE:
                 for found in (*clearance.values(), *bending.values()):
                     found[q.name] = np.inf
                 continue
             for name in loose:
-                reach = lever.clearance(name, shown) * _play(full.contacts()[name], load[name])
+                reach = lever.clearance(name, adjoint.rows) * _play(full.contacts()[name], load[name])
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
             for name, bundle in bundles.items():
-                moved = _bent(model, motions, row, poses, lever, name, bundle, loads, shown, q)
+                moved = _bent(model, motions, row, poses, lever, name, bundle, loads, adjoint, q)
                 bending[name][q.name] = max(bending[name][q.name], moved)
     return Bounds(clearance, bending, load)
 
@@ -115,42 +121,53 @@ def _play(joint: Clearance, force: float) -> float:
 
 @dataclass(frozen=True)
 class Lever:
-    """Response of all links to openings of the joints, in one pose.
+    """How openings of the joints move the links, in one pose.
 
-    response: motions per opening, (6 (links - 1), rows); free: motions that open nothing, (6 (links - 1), n).  rows:
-    of each joint, where its demands begin.  wrenches: of each joint's demands and driven coordinates.  scale: by which
-    an opening counts, 1/size of lengths.
+    gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: of the least-squares solution, factored.
+    joints: of each joint, where its demands begin.  axes: wrenches of each joint's demands and driven coordinates.
+    length: by which openings are told as shares.
     """
 
-    response: np.ndarray
-    free: np.ndarray
+    gradient: sparse.csc_array
+    normal: SuperLU
     joints: Mapping[str, tuple[Constraint, slice]]
     length: float
     axes: Mapping[str, np.ndarray]
 
-    def free_motion(self, shown: np.ndarray) -> float:
-        """By how much of the free motions a body moves."""
-        return float(np.abs(shown @ self.free).max(initial=0.0))
+    def adjoint(self, shown: np.ndarray) -> Adjoint:
+        """The adjoint solution of what is shown, (3, 6 (links - 1)): what unit loads on it do in the joints."""
+        dual = self.normal.solve(np.ascontiguousarray(shown.T))
+        rows = self.gradient @ dual
+        return Adjoint(-rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0)))
 
-    def clearance(self, name: str, shown: np.ndarray) -> float:
-        """Largest motion of what is shown, per metre that the places of a joint part."""
-        constraint, rows = self.joints[name]
+    def clearance(self, name: str, rows: np.ndarray) -> float:
+        """Largest motion of what an adjoint solution tells of, per metre that the places of a joint part."""
+        constraint, mine = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
-        first = self.response[:, rows][:, :count] / self.length
-        return float(np.linalg.svd(shown @ first, compute_uv=False).max(initial=0.0))
+        first = rows[:, mine][:, :count] / self.length
+        return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
 
 
-def _lever(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
-    G = misfit(model.mechanism, list(joints), poses).gradient.toarray()
-    u, s, vt = np.linalg.svd(G)
-    rank = int(np.sum(s > RANK * s.max(initial=0.0)))
-    response = -(vt[:rank].T / s[:rank]) @ u[:, :rank].T
+@dataclass(frozen=True)
+class Adjoint:
+    """rows: motion of what is shown per opening, (3, rows).  free: by how much joints and drives leave it free."""
+
+    rows: np.ndarray
+    free: float
+
+
+def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placement]) -> Lever:
+    """The joints' rates in a pose of all links, and what solves with them."""
+    G = sparse.csc_array(misfit(model.mechanism, list(joints), poses).gradient())
+    normal = (G.T @ G).tocsc()
+    least = RANK * float(normal.diagonal().max(initial=1.0))
+    factored = splu(normal + least * sparse.eye_array(normal.shape[0], format="csc"))
     where, axes, row = {}, {}, 0
     for joint in joints:
         wrench = _wrenches(joint, poses)
         where[joint.name], axes[joint.name] = (joint, slice(row, row + len(wrench))), wrench
         row += len(wrench)
-    return Lever(response, vt[rank:].T, where, model.mechanism.length, axes)
+    return Lever(G, factored, where, model.mechanism.length, axes)
 
 
 def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
@@ -190,7 +207,7 @@ def _bent(
     name: str,
     bundle: xr.Dataset,
     loads: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    shown: np.ndarray,
+    adjoint: Adjoint,
     q: Quantity,
 ) -> float:
     """How far what is shown moves when a body bends under the forces of its joints and its own inertia."""
@@ -205,7 +222,7 @@ def _bent(
         moment, force = (sign * (place.R.T @ part[row]) for part in loads[joint])
         forces = forces + shapes[k].T @ force + turns[k].T @ moment
     q_modal = np.linalg.solve(bundle["modal_stiffness"].values, forces)
-    opening = np.zeros(lever.response.shape[1])
+    opening = np.zeros(adjoint.rows.shape[1])
     carried = _carried(model.scene, name)
     own = np.zeros(3)
     for body, frame in carried.items():
@@ -221,7 +238,7 @@ def _bent(
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
                 if _held_by(end, body, name, frame):
                     opening[rows] += sign * unit * (wrench @ twist)
-    return float(np.linalg.norm(shown @ (lever.response @ opening) + own))
+    return float(np.linalg.norm(adjoint.rows @ opening + own))
 
 
 def _acceleration(motions: Motions, link: int, row: int) -> np.ndarray:

@@ -178,7 +178,7 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
         f"[joint.{worst}.between]",
         f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}"
         + ("; several joints ask for nearly, but not exactly, the same" if slight else ""),
-        "write lengths, frames and poses with more digits, or let one of the joints give way"
+        "write lengths, frames and poses with more digits, or replace a joint by one that leaves more motion"
         if slight
         else "correct lengths, frames, poses, or the start of a drive",
     )

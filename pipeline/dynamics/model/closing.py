@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import csr_array, diags_array, eye_array
 
 from flexclear.pipeline.core.algebra import rotation_vector_to_matrix, skew
 from flexclear.pipeline.core.errors import InputError
@@ -14,6 +14,9 @@ from flexclear.pipeline.dynamics.model.constraints import Constraint, demands, p
 from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 #: a start further from closed than this share of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
@@ -32,18 +35,30 @@ LEAST_GYRATION = 0.01
 
 @dataclass(frozen=True)
 class Misfit:
-    """Residuals of all joints: `values` scaled by the mechanism's size, `gradient` against the links' motions.
+    """Residuals of all joints: `values` scaled by the mechanism's size, shape (rows,).
 
-    The gradient is sparse: a joint concerns two links.
+    blocks: of their gradient against the links' motions, shape (rows, columns), each with its first row and column;
+    what overlaps is added.
     """
 
     values: np.ndarray
-    gradient: csr_array
+    blocks: list[tuple[np.ndarray, int, int]]
+    columns: int
 
     @property
     def worst(self) -> float:
         """Largest residual."""
         return float(np.max(np.abs(self.values), initial=0.0))
+
+    def gradient(self) -> csr_array:
+        """Against the links' motions, shape (rows, columns); sparse, since a joint concerns two links."""
+        from scipy.sparse import csr_array  # slow to import, and most scenes give poses that fit
+
+        placed = [(np.indices(block.shape).reshape(2, -1), row, column) for block, row, column in self.blocks]
+        places = [np.add(inside, [[row], [column]]) for inside, row, column in placed]
+        entries = np.concatenate([*(block.ravel() for block, *_ in self.blocks), np.zeros(0)])
+        rows, columns = np.concatenate([*places, np.zeros((2, 0), dtype=np.int64)], axis=1)
+        return csr_array((entries, (rows, columns)), shape=(len(self.values), self.columns))
 
 
 def close(
@@ -61,13 +76,15 @@ def close(
     now = misfit(mechanism, joints, here)
     if now.worst <= exact:
         return here
-    from scipy.sparse.linalg import spsolve  # slow to import, and most scenes give poses that fit
+    from scipy.sparse import diags_array, eye_array  # slow to import, as is what solves
+    from scipy.sparse.linalg import spsolve
 
     mobility = diags_array(_mobilities(mechanism, here, still))
     damping = 1.0
     for _ in range(ITERATIONS):
-        G = now.gradient @ mobility
-        normal, rows = G @ now.gradient.T, len(now.values)
+        gradient = now.gradient()
+        G = gradient @ mobility
+        normal, rows = G @ gradient.T, len(now.values)
         scale = max(damping * float(np.linalg.norm(now.values)), ROUNDING) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
         there = _moved(mechanism, here, step)
@@ -111,16 +128,7 @@ def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
                 if link:  # the ground does not move
                     blocks.append((block, row, 6 * (link - 1)))
             row += len(wrench)
-    shape = (row, 6 * (len(mechanism.links) - 1))
-    return Misfit(np.concatenate([*values, np.zeros(0)]), _sparse(blocks, shape))
-
-
-def _sparse(blocks: list[tuple[np.ndarray, int, int]], shape: tuple[int, int]) -> csr_array:
-    """Matrix of dense blocks, each with its first row and column; what overlaps is added."""
-    places = [np.add(np.indices(block.shape).reshape(2, -1), [[row], [column]]) for block, row, column in blocks]
-    entries = np.concatenate([*(block.ravel() for block, *_ in blocks), np.zeros(0)])
-    rows, columns = np.concatenate([*places, np.zeros((2, 0), dtype=np.int64)], axis=1)
-    return csr_array((entries, (rows, columns)), shape=shape)
+    return Misfit(np.concatenate([*values, np.zeros(0)]), blocks, 6 * (len(mechanism.links) - 1))
 
 
 def _centre(link: Link) -> np.ndarray:

@@ -37,18 +37,19 @@ def fill(
     contacts = numbering.mechanism.contacts
     rows, reals = [], []
     for (name, joint, *_), law, sites, place in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
-        friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
+        friction_kind, numbers, stick, kinks = -1, (0.0,) * 6, 0.0, (0.0, 0.0)
         if joint.friction is not None:
             friction = _friction(name, joint)
             friction_kind = parts.frictions.index(joint.friction.law)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
+            kinks = friction.kinks(joint.friction)
         if isinstance(joint, End):
             surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         rows.append((*sites, *kinds_of, place))
-        reals.append([joint.clearance, joint.radius, joint.floor, stick, *law.numbers, *numbers, *shape])
+        reals.append([joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 

@@ -11,6 +11,7 @@ from flexclear.pipeline.core.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
@@ -84,6 +85,18 @@ def named_coordinate(scene: Scene, text: str, place: str) -> tuple[str, Coordina
         return joint, coordinate_of(scene, joint, coordinate or None, place)[2]
     except InputError as error:  # the joint and its coordinate stand in one text here
         raise InputError(place, error.problem, error.remedy) from None
+
+
+def turns(scene: Scene, quantity: Quantity) -> bool:
+    """Whether a quantity of a drive or a stop belongs to an angle, so that its forces are torques."""
+    owner, kind = quantity.owner, KINDS[quantity.kind].owner
+    if kind == "drive":
+        return any(c.dimension == "angle" for c in prescribed(scene) if c.name == owner)
+    if kind == "contact" and owner in scene.stop_ends():
+        name = owner.rpartition(".")[0]
+        stop = scene.stop[name]
+        return coordinate_of(scene, stop.joint, stop.coordinate, f"[stop.{name}]")[2].turning
+    return False
 
 
 def joint_drives(scene: Scene) -> dict[str, tuple[str | None, ...]]:

@@ -10,19 +10,21 @@ import xarray as xr
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.interface_basis import (
+    NEGLIGIBLE,
+    InterfaceBasis,
+    frame_shapes,
+    mass_coupled,
+)
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
-#: a shape or moment below this share of the largest of its kind is rounding, not coupling
-NEGLIGIBLE = 1e-13
-#: so is a product of inertia of two modes, of unit modal mass, below this: it is a sum over all elements
-UNCOUPLED = 1e-11
-
 
 def fill(numbering: Numbering) -> dict[Any, Any]:
-    """The tables FLEXES, MOMENTS, PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
+    """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
     flex, flex_real, data, index, value = [], [], [], [], []
-    data0 = moment0 = 0
+    entry, entry_value, interface = list[tuple[int, int]](), list[float](), list[np.ndarray]()
+    data0 = moment0 = interface0 = 0
     mechanism, bodies = numbering.mechanism, numbering.mechanism.scene.flexible()
     any_shortened = any(b.stiffening is not None for b in bodies.values())
     for i in numbering.flexible:
@@ -32,8 +34,14 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         chunk = _data(bundle, _damping(name, bodies[name], bundle))
         if any_shortened:
             chunk = np.concatenate([chunk, *_forms(mechanism, i, len(q))])
-        moves = int(_inboard_moves(mechanism, i))
-        flex.append((i, len(q), q.start, c.start, data0, moment0, len(moments), moves, int(coupled(mechanism, i))))
+        basis, moves = numbering.bases[i], int(_inboard_moves(mechanism, i))
+        entries, places = basis.entries(), (i, len(q), q.start, c.start, data0, moment0, len(moments))
+        held = sum(j < basis.held for _, j in entries)
+        of_basis = (basis.held, len(entry), len(entries), len(entry) + held, interface0)
+        flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis))
+        entry += entries
+        entry_value += [basis.matrix[where_] for where_ in entries]
+        interface.append(_interface_data(bundle, basis))
         flex_real.append(
             [float(bundle["mass"]), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
         )
@@ -42,14 +50,18 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         index.append(where)
         data0 += len(chunk)
         moment0 += len(moments)
+        interface0 += len(interface[-1])
     port, port_real, port_data = _ports(numbering, any_shortened)
     return {
         m.FLEXES: flex,
         m.MOMENTS: np.concatenate([*index, np.zeros((0, 2), dtype=np.int64)]),
+        m.BASIS: entry,
         m.PORTS: port,
         m.FLEX_NUMBERS: flex_real,
         m.FLEX_DATA: np.concatenate([*data, np.zeros(0)]),
         m.MOMENT_VALUES: np.concatenate([*value, np.zeros(0)]),
+        m.BASIS_VALUES: entry_value,
+        m.INTERFACE_DATA: np.concatenate([*interface, np.zeros(0)]),
         m.PORT_NUMBERS: port_real,
         m.PORT_DATA: port_data,
     }
@@ -138,6 +150,14 @@ def _data(bundle: xr.Dataset, damping: np.ndarray) -> np.ndarray:
     return np.concatenate([c.ravel() for c in chunks])
 
 
+def _interface_data(bundle: xr.Dataset, basis: InterfaceBasis) -> np.ndarray:
+    """C1 (3n), modal mass (n n) and stiffness (n n) in the interface basis."""
+    T, mass = basis.matrix, bundle["modal_mass"].values
+    mixed = mass if mass_coupled(bundle) else np.diag(np.diag(T.T @ np.diag(np.diag(mass)) @ T))
+    stiffness = T.T @ (np.diag(bundle["modal_stiffness"].values)[:, None] * T)
+    return np.concatenate([(bundle["modal_first_moment"].values @ T).ravel(), mixed.ravel(), stiffness.ravel()])
+
+
 def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Nonzero int rho S_ki S_lj as values and (row (3k + l) n + j, i)."""
     F = bundle["mode_mode_moment"].values
@@ -147,18 +167,6 @@ def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     order = np.lexsort((i, row))
     where = np.stack([row[order], i[order]], axis=1).astype(np.int64)
     return F[k, l, i, j][order], where
-
-
-def frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
-    k = list(bundle["frame"].values).index(frame)
-    pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
-    shapes = [bundle[name].values[k].copy() for name in ("frame_translation_shape", "frame_rotation_shape")]
-    for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):
-        # what the reference condition holds still is exactly still
-        scale = np.abs(bundle[name].values).max()
-        shape[np.abs(shape) <= NEGLIGIBLE * 1e3 * scale] = 0.0
-    return pose, shapes[0], shapes[1]
 
 
 def _inboard_frame(mechanism: Mechanism, link: int) -> str | None:
@@ -182,8 +190,7 @@ def coupled(mechanism: Mechanism, link: int) -> bool:
 
     They do where they move the frame by which it hangs in the tree, and with it the whole body.
     """
-    mass = _body(mechanism, link)[1]["modal_mass"].values
-    return _inboard_moves(mechanism, link) or bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
+    return _inboard_moves(mechanism, link) or mass_coupled(_body(mechanism, link)[1])
 
 
 def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any], np.ndarray]:
@@ -194,14 +201,15 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
     for link, frame, column in [*ports, *((i, _inboard_frame(mechanism, i), -1) for i in numbering.flexible)]:
         n = len(numbering.modal_positions[link])
         if frame is None:
-            pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros(3 * n), np.zeros(3 * n)
+            pose, *shapes = np.concatenate([np.zeros(3), np.eye(3).ravel()]), np.zeros((3, n)), np.zeros((3, n))
         else:
             pose, *shapes = frame_shapes(_body(mechanism, link)[1], frame)
+        chunks: list[np.ndarray] = [(shape @ numbering.bases[link].moving).ravel() for shape in shapes]
         if shortened:
             drawn = None if frame is None else bow(mechanism, link, frame)
-            shapes.append(np.zeros(n * n) if drawn is None else drawn)
+            chunks.append(np.zeros(n * n) if drawn is None else drawn.ravel())
         rows.append((numbering.flexible.index(link), column, start))
         reals.append(pose)
-        data += [shape.ravel() for shape in shapes]
-        start += sum(shape.size for shape in shapes)
+        data += chunks
+        start += sum(len(chunk) for chunk in chunks)
     return rows, reals, np.concatenate([*data, np.zeros(0)])

@@ -193,7 +193,7 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
                 f"joints and drives do not allow this deformation: they change it by {apart:.3g} m",
-                "give another one, or let a joint give way",
+                "give another one, or replace a joint by one that leaves more motion",
             )
         if apart > WRITTEN * max(largest, WRITTEN * unit):
             found.append(

@@ -318,18 +318,19 @@ def require_bodies(scene: Scene) -> None:
     moving = [*scene.rigid(), *scene.flexible()]
     if not moving:
         raise InputError("[body]", "the scene has no body that could move", "add a rigid or flexible body")
-    frames = [f for part in (scene.joint, scene.load, scene.drive) for p in part.values() for f in _named_frames(p)]
+    frames = [f for part in (scene.joint, scene.load, scene.drive) for p in part.values() for f in named_frames(p)]
     held = {f.partition(".")[0] for f in frames}
     for name in moving:
         if scene.joint and name not in held:
             raise InputError(
                 f"[body.{name}]",
                 f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
-                'join it; that a body shall fly freely is said by a joint of type "free"',
+                'join it to another body; if it is to fly freely, add a joint of type "free"',
             )
 
 
-def _named_frames(part: object) -> tuple[str, ...]:
+def named_frames(part: object) -> tuple[str, ...]:
+    """Frames that a joint, load or drive names."""
     between = getattr(part, "between", None)
     frame = getattr(part, "frame", None)
     return tuple(between) if between is not None else (frame,) if frame is not None else ()

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 
 from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
 from flexclear.pipeline.core.errors import InputError
@@ -205,7 +204,7 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
         "[joint]",
         f"the mechanism is locked: {mobility.coordinates} free coordinates of its tree against {mobility.rank} "
         f"independent closure rows leave it no motion{hardly}",
-        "write frames and poses with more digits, or let one of the joints give way"
+        "write frames and poses with more digits, or replace a joint by one that leaves more motion"
         if hardly
         else "remove a joint, choose one with more freedom, or drive one",
     )
@@ -265,7 +264,9 @@ def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
     scaled = even / np.outer(sizes, sizes) if sizes.all() else np.zeros_like(even)
     if not np.linalg.eigvalsh(scaled)[0] > WEIGHTLESS:
         return None  # of links within a joint, which have no mass, in a singular pose: the engine says so
-    values, vectors = scipy.linalg.eigh(own / np.outer(sizes, sizes), scaled)
+    from scipy.linalg import eigh  # slow to import, and few links are looked at
+
+    values, vectors = eigh(own / np.outer(sizes, sizes), scaled)
     return vectors[:, 0] / sizes if values[0] <= WEIGHTLESS else None
 
 

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.interface_basis import InterfaceBasis, interface_basis
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, Site
 
 Route = list[tuple[int, int]]  #: (coordinate, column) pairs that move a site
@@ -26,7 +27,8 @@ class Numbering:
     """Numbering of a mechanism. Coordinates: free ones 0..nv-1 in elimination order, then prescribed ones.
 
     positions, coordinates: of each link's joint; prescribed ones after all free ones.
-    modal_positions, modal_coordinates: modes of flexible links.  Site k - 1 is the inboard site of link k.
+    modal_positions, modal_coordinates: modes of flexible links.  bases: theirs, by which coordinates are shapes; held
+    ones before moving ones.  Site k - 1 is the inboard site of link k.
     """
 
     mechanism: Mechanism
@@ -36,6 +38,7 @@ class Numbering:
     coordinates: list[range] = field(default_factory=list)
     modal_positions: dict[int, range] = field(default_factory=dict)
     modal_coordinates: dict[int, range] = field(default_factory=dict)
+    bases: dict[int, InterfaceBasis] = field(default_factory=dict)
     sites: list[Site] = field(default_factory=list)
     ports: list[Port] = field(default_factory=list)
     columns: int = 0
@@ -63,7 +66,7 @@ class Numbering:
         self.sites.append(site)
         if site.frame is not None:
             self.ports.append(Port(len(self.sites) - 1, site.frame, self.columns))
-            self.columns += len(self.modal_positions[site.link])
+            self.columns += len(self.moving(site.link))
         return len(self.sites) - 1
 
     def port_of(self, site: int) -> int:
@@ -74,11 +77,15 @@ class Numbering:
         """Port of a flexible link's own inboard frame: these follow those of the sites."""
         return len(self.ports) + self.flexible.index(link)
 
+    def moving(self, link: int) -> range:
+        """Coordinates of a flexible link's moving shapes."""
+        return self.modal_coordinates[link][self.bases[link].held :]
+
     def route(self, site: int) -> Route:
         """What moves a site, from itself to the ground."""
         link, port = self.sites[site].link, self.port_of(site)
-        modes = self.modal_coordinates[link] if port >= 0 else ()
-        return [(c, self.ports[port].column + j) for j, c in enumerate(modes)] + self.joint_route(link)
+        moving = self.moving(link) if port >= 0 else ()
+        return [(c, self.ports[port].column + j) for j, c in enumerate(moving)] + self.joint_route(link)
 
     def joint_route(self, link: int) -> Route:
         """What moves a link's inboard joint: its own coordinates, then its parent's."""
@@ -112,6 +119,7 @@ def _number_positions(numbering: Numbering, links: list[Link]) -> None:
             numbering.nq = numbering.positions[i].stop
         if link.bundle is not None:
             numbering.modal_positions[i] = range(numbering.nq, numbering.nq + link.bundle.sizes["mode"])
+            numbering.bases[i] = interface_basis(numbering.mechanism, i)
             numbering.nq = numbering.modal_positions[i].stop
     for i, link in enumerate(links):
         if link.drives:

@@ -166,6 +166,6 @@ def _isolated(mechanism: Mechanism, joints: list[Constraint], poses: list[Placem
     """Whether the joints, with what is prescribed of them, leave no motion."""
     free = [i for i, link in enumerate(mechanism.links) if i and not link.massless]
     columns = [6 * (i - 1) + k for i in free for k in range(6)]
-    gradient = misfit(mechanism, joints, poses).gradient.toarray()[:, columns]
+    gradient = misfit(mechanism, joints, poses).gradient().toarray()[:, columns]
     values = np.linalg.svd(gradient, compute_uv=False)
     return len(columns) <= len(values) and bool(values[len(columns) - 1] > LOOSE * values[0])

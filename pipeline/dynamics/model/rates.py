@@ -194,8 +194,9 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
         at[first : middle + len(slides)] = G.p
     for site, frame, first in numbering.ports:
         on = numbering.sites[site].link
-        mine = slice(first, first + len(numbering.modal_positions[on]))
-        turn[mine], shift[mine], at[mine] = _shape_motions(model, on, frame, poses[on])
+        mine, moving = slice(first, first + len(numbering.moving(on))), numbering.bases[on].moving
+        turns, slides, place = _shape_motions(model, on, frame, poses[on])
+        turn[mine], shift[mine], at[mine] = moving.T @ turns, moving.T @ slides, place
     return Motions(turn, shift, at)
 
 

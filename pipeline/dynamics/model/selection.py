@@ -157,6 +157,9 @@ def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.n
     for c in model.arrays.table(m.CLOSURES, h):
         if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
             found[support[c["support0"] : c["support0"] + c["n_support"]]] = True
+    for body in model.arrays.table(m.FLEXES):  # of which a closure may depend on some shapes
+        modes = slice(body["c0"], body["c0"] + body["n_modes"])
+        found[modes] = np.any(found[modes])
     return found
 
 

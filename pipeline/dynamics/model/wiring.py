@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import arrays, flexible_bodies
@@ -36,8 +34,10 @@ def mass_entries(numbering: Numbering) -> dict[Any, Any]:
         if c < numbering.nv and d < numbering.nv:
             first[max(c, d)] = min(first[max(c, d)], c, d)
     for link, modes in numbering.modal_coordinates.items():
-        for c in modes if flexible_bodies.coupled(numbering.mechanism, link) else ():
-            first[c] = min(first[c], modes.start)
+        # held shapes are coupled to moving ones where the body moves with these, and by stiffness (`projection`)
+        if numbering.bases[link].held or flexible_bodies.coupled(numbering.mechanism, link):
+            for c in numbering.moving(link):
+                first[c] = min(first[c], modes.start)
     start, rows = 0, []
     for i, f in enumerate(first):
         rows.append((f, start))
@@ -54,12 +54,12 @@ def mass_entries(numbering: Numbering) -> dict[Any, Any]:
 
 
 def _port_products(numbering: Numbering, i: int) -> list[tuple[int, int, int, int]]:
-    """Entries between the modes of a flexible parent through the link i that it carries."""
+    """Entries between the moving shapes of a flexible parent through the link i that it carries."""
     port = numbering.port_of(i - 1)
     if port < 0:
         return []
-    modes, first = numbering.modal_coordinates[numbering.sites[i - 1].link], numbering.ports[port].column
-    return [(first + j, first + k, modes[j], modes[k]) for j in range(len(modes)) for k in range(j + 1)]
+    moving, first = numbering.moving(numbering.sites[i - 1].link), numbering.ports[port].column
+    return [(first + j, first + k, moving[j], moving[k]) for j in range(len(moving)) for k in range(j + 1)]
 
 
 def closures(
@@ -130,6 +130,9 @@ def _order(supports: list[set[int]]) -> list[int]:
     n = len(supports)
     if n < 2:
         return list(range(n))
+    from scipy.sparse import csr_array  # slow to import, and open mechanisms need none of it
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
     graph = np.array([[bool(a & b) for b in supports] for a in supports], dtype=float)
     return [int(k) for k in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]
 

@@ -10,20 +10,49 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.influence import Influence, influence, kept, members_apart
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect, with_modes, without
 from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner
 
 #: starts of pilots with contacts: enough to see whether the motion parts
 MEMBERS = 3
-#: pilots are integrated to this tolerance; of motions without contact by the method for stiff ones to the second
+#: rigid pilots without contact are integrated to this tolerance; flexible ones by the method for stiff motions to the
+#: second
 RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
+#: tolerance of pilots with contacts: this share of the least clearance over the mechanism's size, between two limits
+#: (errors of places are the tolerance times that size, and must stay small beside the clearance)
+OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
+#: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
+#: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
+ALLOWED, LEAST_PART = 5e6, 0.0625
+#: the beginning that is run to know how long the rest takes
+BEGINNING = 0.03125
+#: a pilot is given up at so many times that, and is then as one that was refused
+GIVEN_UP = 4.0
+#: how refusals name that limit
+TAKES_LONG = "[solver.evaluations]"
 #: what a variant is: the effects that it lacks, and its solver
 Key = tuple[frozenset[str], str]
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What decides how dear a scene's runs are. size: of the mechanism [m].  variables: of its state."""
+
+    size: float
+    variables: int
+
+    @property
+    def most(self) -> int:
+        """Evaluations of one run at which it is given up."""
+        return int(GIVEN_UP * ALLOWED / (MEMBERS * self.variables))
 
 
 @dataclass
@@ -31,7 +60,7 @@ class Pilots:
     """Variants of a scene that have been run.
 
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such.  filled: fills in what
-    recipes tell of rigid bodies.  points: by what was run.
+    recipes tell of rigid bodies.  points: by what was run.  refused_loose: whether the loose tolerance was refused.
     """
 
     scene: Scene
@@ -42,6 +71,8 @@ class Pilots:
     progress: Progress
     points: dict[Key, Point] = field(default_factory=dict)
     evaluations: int = 0
+    refused_loose: bool = False
+    _extent: Extent | None = None
 
     def variant(self, gone: Collection[Effect], **solver: object) -> Scene:
         """The scene without some effects, integrated as `solver` says, else as pilots are."""
@@ -49,12 +80,48 @@ class Pilots:
         contacts = bool(bare.contacts() or bare.stop)
         smooth = bool(bare.flexible()) and not contacts
         usual: dict[str, object] = {"integrator": SMOOTH, "rtol": SMOOTH_RTOL} if smooth else {"rtol": RTOL}
+        if contacts:
+            usual = {"rtol": self.loose(bare), "evaluations": self.extent.most}
         return self.filled(edited(bare, {"solver": usual | solver}))
 
-    def point(self, gone: Collection[Effect], *, fewer: bool = False, share: float = 1.0, **solver: object) -> Point:
+    def loose(self, variant: Scene) -> float:
+        """The tolerance of a variant with contacts."""
+        clearances = [joint.clearance for joint in variant.contacts().values()]
+        if self.refused_loose:
+            return RTOL
+        if not clearances:
+            return LOOSEST
+        return float(np.clip(OF_CLEARANCE * min(clearances) / self.extent.size, TIGHTEST, LOOSEST))
+
+    @property
+    def extent(self) -> Extent:
+        """Of the full scene."""
+        if self._extent is None:
+            model = tabulate(build(self.scene, self.bundles))
+            self._extent = Extent(model.mechanism.length, model.nq + model.nv)
+        return self._extent
+
+    def part(self, gone: Collection[Effect]) -> float:
+        """The part of the time over which a variant is compared with others, so that it does not take too long.
+
+        Its beginning is run from one start to know.
+        """
+        begun = self.must_run(gone, BEGINNING, 0)
+        share = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
+        return LEAST_PART if begun.refused else float(np.clip(share, LEAST_PART, 1.0))
+
+    def point(
+        self,
+        gone: Collection[Effect],
+        *,
+        fewer: bool = False,
+        share: float = 1.0,
+        members: int = MEMBERS,
+        **solver: object,
+    ) -> Point:
         """What is watched of a variant over a share of its time; a refusal of the solver is in the point.
 
-        fewer: with fewer modes of those bodies that have a choice.
+        fewer: with fewer modes of those bodies that have a choice.  members: starts, where there are contacts.
         """
         scene = self.variant(gone, **solver)
         mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
@@ -64,14 +131,27 @@ class Pilots:
         if share < 1.0:
             scene = edited(scene, {"time.end": scene.time.start + share * (scene.time.end - scene.time.start)})
         names = frozenset(effect.name for effect in gone)
-        key = (names, json.dumps([scene.solver.model_dump(mode="json"), fewer, share]))
+        key = (names, json.dumps([scene.solver.model_dump(mode="json"), fewer, share, members]))
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
-            members = MEMBERS if scene.contacts() or scene.stop else 0
-            found = Runner(mine, kept(scene.owners(), self.chosen), members).run(members_apart(scene))
+            starts = members if scene.contacts() or scene.stop else 0
+            found = Runner(mine, kept(scene.owners(), self.chosen), starts).run(members_apart(scene))
             self.points[key] = found
             self.evaluations += found.evaluations
         return self.points[key]
+
+    def must_run(self, gone: Collection[Effect], share: float, members: int = MEMBERS) -> Point:
+        """What is watched of a variant that the decisions need, at a tight tolerance where the loose one is refused.
+
+        Raises SolverError where it is refused then, too, for another reason than that it takes long.
+        """
+        found = self.point(gone, share=share, members=members)
+        if found.refused and TAKES_LONG not in found.refused:
+            self.refused_loose = True
+            found = self.point(gone, share=share, members=members, rtol=RTOL)
+        if found.refused and TAKES_LONG not in found.refused:
+            raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {found.refused}")
+        return found
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:
         """How far two of them are apart in each quantity; infinitely where one of them was refused."""

@@ -9,7 +9,7 @@ What is not shown to be small is kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
@@ -20,11 +20,12 @@ from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Deci
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.influence import Influence
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
 from flexclear.pipeline.dynamics.linear.play import OF_POSE, Bounds, bounds
-from flexclear.pipeline.dynamics.plan.pilots import RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.pilots import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import chosen_solver
 from flexclear.pipeline.dynamics.run.run import integrate
 
@@ -39,25 +40,28 @@ VIBRATION = 3.0
 OF_IMPACTS = 0.5
 #: what an influence measured with pilots' tolerance may be wrong by, as a share of it
 OF_PILOT = 0.15
-#: a loose run of the whole scene is only made where the clearance does no more than this many times what is wanted:
-#: bodies that bend change the time of impacts, and then all that these do
-WORTH_A_LOOK = 1.5
-#: tolerance and share of the time of runs with clearance and bending; and what the rest of the time may add, as a share
-LOOSE, PART, WHOLE = 1e-5, 0.25, 1.0
+#: what the rest of the time may add to what a run over a part of it shows, as a share
+WHOLE = 1.0
 #: peaks of forces between flexible bodies are at least this share of those between rigid ones
 SOFTER = 0.5
+#: where members part, static modes are only trusted that were seen over this part of the time
+LEAST_SEEN = 0.5
 #: effects that cost nothing to keep are dropped below this share of what is wanted
 NEGLIGIBLE = 0.02
+#: why parts go that the motion asked for never feels
+UNCOUPLED = "nothing couples it to what is asked for"
 
 
 @dataclass
 class Search:
-    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
+    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted.  modes: of bodies that
+    need fewer beside impacts."""
 
     pilots: Pilots
     wanted: dict[str, float]
     used: dict[str, float] = field(default_factory=dict)
     decisions: dict[str, Decision] = field(default_factory=dict)
+    modes: dict[str, int] = field(default_factory=dict)
 
     @property
     def gone(self) -> list[Effect]:
@@ -112,8 +116,13 @@ def plan(
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
-    pilots = Pilots(_plain(scene), bundles, fewer, filled, quantities, progress)
-    every = effects(scene)
+    apart = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
+    bare = lessened(_plain(scene), apart)
+    mine, less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, fewer))
+    pilots = Pilots(bare, mine, less, filled, quantities, progress)
+    _ = pilots.extent  # a scene that cannot be built is refused before anything is run
+    pilots.must_run((), BEGINNING, 0)
+    every = effects(bare)
     loose = [effect for effect in every if effect.kind == CLEARANCE]
     soft = [effect for effect in every if effect.kind == FLEXIBILITY]
     inner = [effect for effect in every if effect.within]
@@ -122,9 +131,11 @@ def plan(
     search = Search(pilots, _wanted(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
     found = _bounds(search, [*loose, *soft, *inner]) if loose or soft else Bounds({}, {}, {})
     _clearances(search, loose, [*soft, *inner], found, ideal)
+    _interactions(search, soft, inner)
     _flexibilities(search, soft, loose, inner, found)
+    _confirm(search, soft, inner)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
-    return _finished(search, every)
+    return _finished(search, effects(scene), apart)
 
 
 def _plain(scene: Scene) -> Scene:
@@ -164,8 +175,8 @@ def _wanted(scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: C
         q = quantities[0]
         raise InputError(
             f"{where} {q.name}",
-            f"{found[q.name]:.3g} {q.unit} is more than it changes at all ({sizes[q.name]:.3g} {q.unit}), and so it is "
-            "with all that is asked for: the plan would drop everything, the motion too",
+            f"{found[q.name]:.3g} {q.unit} is more than it changes ({sizes[q.name]:.3g} {q.unit}), "
+            "and so are all other accuracies that are asked for: the plan would leave out everything, even the motion",
             "ask for an accuracy below what the quantity does",
         )
     return found
@@ -212,6 +223,29 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
             left = most
     if dropped:
         search.spend(left)
+
+
+def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
+    """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
+
+    Rates and forces only: vibrations that impacts excite are small in places and large in these.
+    """
+    pilots = search.pilots
+    dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
+    if not soft or not dropped or all(q.kind in OF_POSE for q in pilots.chosen):
+        return
+    share = pilots.part(())
+    names = {effect.name for effect in dropped}
+    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], share=share)
+    apart = _with_doubt(
+        search, pilots.between(lacking, pilots.point((), share=share)), False, 0.0 if share == 1.0 else WHOLE
+    )
+    most = {name: i.most for name, i in apart.items()}
+    if all(most[name] <= BUDGET * wanted for name, wanted in search.wanted.items()):
+        return
+    search.used = {}
+    for effect in dropped:
+        search.judge(effect, False, "", most, apart)
 
 
 def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effect]) -> Point:
@@ -277,36 +311,79 @@ def _flexibilities(
         search.spend(left)
 
 
+def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
+    """Clearances that go beside bodies that stay flexible: one run of all tells whether they do as was estimated.
+
+    Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
+    """
+    pilots = search.pilots
+    dropped = [effect for effect in search.gone if effect.kind == CLEARANCE]
+    if not dropped or all(effect in search.gone for effect in soft):
+        return
+    share = min(1.0, MEMBERS * pilots.part(()))
+    names = {effect.name for effect in search.gone}
+    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], share=share)
+    apart = pilots.between(lacking, pilots.must_run((), share, 0))
+    most = {name: (1.0 if share == 1.0 else 1.0 + WHOLE) * i.difference for name, i in apart.items()}
+    if all(most[name] <= wanted for name, wanted in search.wanted.items()):
+        return
+    for effect in dropped:
+        search.judge(effect, False, "", most, apart)
+
+
 def _beside_impacts(
     search: Search, soft: Sequence[Effect], loose: Sequence[Effect], kept_loose: Sequence[Effect]
 ) -> None:
-    """Flexible bodies in a mechanism that stays loose: what they bend changes the impacts, and these everything."""
-    pilots = search.pilots
-    gone = search.gone
-    inner = [e for e in effects(pilots.scene) if e.within in {g.name for g in gone}]
-    softs = [*soft, *(e for e in effects(pilots.scene) if e.within in {s.name for s in soft})]
-    rigid = pilots.point([*gone, *inner, *softs])
-    tight = {e.name for e in loose}
-    held = [e for e in effects(pilots.scene) if e.name in tight or e.within in tight]
-    play = pilots.between(rigid, pilots.point([*held, *softs], rtol=RTOL))
-    worth = all(
-        search.wanted[name] * WORTH_A_LOOK >= (i.difference if np.isfinite(i.difference) else np.inf)
-        for name, i in play.items()
-    )
-    if not worth:
-        for effect in soft:
-            reason = f"{kept_loose[0].owner} stays loose, and bodies that bend change the times of its impacts"
-            search.decide(effect, True, NONE, reason)
-        return
-    whole = pilots.point([*gone, *inner], rtol=LOOSE, share=PART)
-    part = pilots.point([*gone, *inner, *softs], share=PART)
-    apart = _with_doubt(search, pilots.between(part, whole), False, WHOLE)
+    """Flexible bodies in a mechanism that stays loose: what they bend changes the impacts, and these everything.
+
+    Runs of the whole mechanism at a loose tolerance, over as much of the time as they may take, tell what rigid bodies
+    and what static modes alone would do.
+    """
+    pilots, gone = search.pilots, search.gone
+    every = effects(pilots.scene)
+    inner = [e for e in every if e.within in {g.name for g in gone}]
+    gone = [*gone, *inner]
+    share = pilots.part(gone)
+    more = 0.0 if share == 1.0 else WHOLE
+    whole = pilots.must_run(gone, share)
+    rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
+    # what takes longer than all modes do is no way to save time
+    longest = {"evaluations": whole.evaluations // MEMBERS} if not whole.refused else {}
+    apart = _with_doubt(search, pilots.between(pilots.point([*gone, *rigid], share=share), whole), False, more)
     most = {name: i.most for name, i in apart.items()}
     small = search.fits(most)
     if small:
         search.spend(most)
     for effect in soft:
         search.judge(effect, small, "with or without bending the loose joints do the same", most, apart)
+    if small or not pilots.fewer:
+        return
+    if share < LEAST_SEEN:
+        own = pilots.point([*gone, *rigid])
+        if any(i.uncertainty > search.wanted[name] for name, i in pilots.between(own, own).items()):
+            return  # members of rigid bodies part later, and the beginning does not tell what modes do then
+    # the bodies go on to bend, so that chance, which members tell, does not count against leaving out what shakes them
+    apart = pilots.between(pilots.point(gone, fewer=True, share=share, **longest), whole)
+    most = {name: (1.0 + more) * i.difference for name, i in apart.items()}
+    if not search.fits(most):
+        return
+    search.spend(most)
+    search.modes = {name: int(bundle.sizes["mode"]) for name, bundle in pilots.fewer.items()}
+    beyond = [name for name, i in apart.items() if i.uncertainty > search.wanted[name]]
+    for effect in soft:
+        if effect.owner in search.modes:
+            told = search.decisions[effect.name]
+            search.decisions[effect.name] = replace(told, reason=f"{told.reason}; {_static(beyond, kept_loose)}")
+
+
+def _static(beyond: Sequence[str], kept_loose: Sequence[Effect]) -> str:
+    """Why the modes with the ends held may go."""
+    if not beyond:
+        return "its static stiffness alone does the same"
+    return (
+        f"{' and '.join(beyond)} parts by more than is wanted when {kept_loose[0].owner} starts a hair elsewhere, and "
+        "with static stiffness alone it differs by no more than that"
+    )
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
@@ -343,8 +420,8 @@ def _modes(search: Search) -> dict[str, int]:
     kept = [n for n in pilots.fewer if not any(e.owner == n and e.kind == FLEXIBILITY for e in gone)]
     if not kept:
         return {}
-    if pilots.variant(gone).contacts() or pilots.scene.stop:
-        return {}  # impacts shake modes of any frequency, and these change the impacts
+    if search.modes or pilots.variant(gone).contacts() or pilots.scene.stop:
+        return search.modes  # beside impacts it has been decided
     apart = _with_doubt(search, pilots.between(pilots.point(gone, fewer=True), pilots.point(gone)), False)
     most = {name: i.most for name, i in apart.items()}
     if not search.fits(most):
@@ -353,10 +430,13 @@ def _modes(search: Search) -> dict[str, int]:
     return {name: int(pilots.fewer[name].sizes["mode"]) for name in kept}
 
 
-def _finished(search: Search, every: Sequence[Effect]) -> Plan:
+def _finished(search: Search, every: Sequence[Effect], apart: tuple[str, ...]) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
     modes = _modes(search)
     integrator, rtol, error = chosen_solver(search.pilots, search.gone, search.wanted, fewer=bool(modes))
+    for effect in every:
+        if ".".join(effect.name.split(".")[:2]) in apart:
+            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.wanted, 0.0))
     decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
     pilots = search.pilots
     return Plan(
@@ -368,4 +448,5 @@ def _finished(search: Search, every: Sequence[Effect]) -> Plan:
         modes,
         pilots.evaluations,
         len(pilots.points),
+        apart,
     )

@@ -11,8 +11,8 @@ from flexclear.pipeline.dynamics.plan.pilots import RTOL, SMOOTH, SMOOTH_RTOL, P
 
 #: share of what is wanted that the integration may err by
 SHARE = 0.15
-#: tolerances that are tried, loosest first, of motions without contacts, and with
-TRIED, WITH_CONTACTS = (1e-4, 1e-5, 1e-6), (1e-4, 1e-5, 1e-6)
+#: tolerances that are tried, loosest first, down to that of the reference
+TRIED = (1e-4, 1e-5, 1e-6)
 STIFF_TRIED = (1e-3, 1e-4)
 DEFAULT, TIGHT = "dop853", 1e-8
 
@@ -27,15 +27,14 @@ def chosen_solver(
     scene = pilots.variant(gone)
     contacts, flexible = bool(scene.contacts() or scene.stop), bool(scene.flexible())
     if contacts and flexible:
-        # beyond the horizon no tolerance is right, and before it this one was in all that was tried; the search would
-        # take as long as the run
-        return DEFAULT, RTOL, {name: np.nan for name in wanted}
+        # that of the pilots with which it was decided; a search would take as long as the run
+        return DEFAULT, pilots.loose(scene), {name: np.nan for name in wanted}
     if flexible:
         found = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, fewer=fewer)
         if found[1] > SMOOTH_RTOL or _within(found[2], wanted):
             return found
         return DEFAULT, TIGHT, {name: np.nan for name in wanted}
-    return _loosest(pilots, gone, wanted, DEFAULT, WITH_CONTACTS if contacts else TRIED, RTOL)
+    return _loosest(pilots, gone, wanted, DEFAULT, TRIED, pilots.loose(scene) if contacts else RTOL)
 
 
 def _within(error: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
@@ -55,11 +54,14 @@ def _loosest(
     """The loosest of the tolerances that is good enough beside the reference, which stands for itself."""
     there = pilots.point(gone, fewer=fewer, integrator=integrator, rtol=reference)
     error = dict.fromkeys(wanted, np.nan)
+    tried = [rtol for rtol in tried if rtol > reference]
     for rtol in tried:
         apart = pilots.between(pilots.point(gone, fewer=fewer, integrator=integrator, rtol=rtol), there)
         error = {name: i.difference for name, i in apart.items()}
         if _within(error, wanted):
             return integrator, rtol, error
+    if not tried:
+        return integrator, reference, error
     # errors fall at least as the tolerance to the power 1/2
     fall = float(np.sqrt(reference / tried[-1]))
     return integrator, reference, {name: fall * value for name, value in error.items()}

@@ -105,8 +105,9 @@ class Engine:
 
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
-        self.kept[:] = rows
-        selection.write(self.model, self.h, self.kept)
+        if not np.array_equal(self.kept, rows):
+            self.kept[:] = rows
+            selection.write(self.model, self.h, self.kept)
         self.view(m.ROW_SCALE)[: len(rows)] = 0.0
         self.connect()
 

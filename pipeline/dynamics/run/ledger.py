@@ -90,10 +90,10 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None
         return
     first = int(np.argmax(~(error <= tolerance * turned + ROUNDING * largest)))
     raise SolverError(
-        f"at t = {trajectory.time[first]:.6g} s: the ledger of energy does not close: it is off by up to "
-        f"{error[worst]:.3g} J where {turned:.3g} J are turned over (tolerance {tolerance:g}, "
+        f"at t = {trajectory.time[first]:.6g} s: the energy balance does not close: the error is up to "
+        f"{error[worst]:.3g} J where {turned:.3g} J are exchanged (tolerance {tolerance:g}, "
         f"[solver.ledger_tolerance]); lost so far: {_losses(model, totals, first)}; "
-        "a smaller rtol or step is the remedy, or the scene is beyond this integrator"
+        "choose a smaller rtol or step, or another integrator"
     )
 
 

@@ -9,15 +9,14 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.integrate.recording import record_share
 from flexclear.pipeline.dynamics.run.engine import Engine
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation
 
-#: recorded states are projected to this share of rtol times the mechanism's size, and at least to rounding; to more of
-#: a loose rtol, up to the second share, as it grows by so many times rtol: what a run left open itself need not cost
-#: an evaluation in every row
-RECORD_SHARE, MOST_SHARE, LOOSER, ROUNDING = 1e-3, 0.1, 1e3, 1e-14
+#: no row is projected to less than this share of the mechanism's size
+ROUNDING = 1e-14
 #: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
 #: 1e-14, and six, with which a row must do in whose own pose they hold nothing
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
@@ -39,8 +38,7 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np.ndarray:
     """The same as the kernel writes it, shape (rows, columns); see `equations.observation.by_name`."""
     pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
-    share = min(MOST_SHARE, max(RECORD_SHARE, LOOSER * engine.rtol))
-    return observe_with(engine, rows, pieces, max(share * engine.rtol, ROUNDING))
+    return observe_with(engine, rows, pieces, max(record_share(engine.rtol) * engine.rtol, ROUNDING))
 
 
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> np.ndarray:

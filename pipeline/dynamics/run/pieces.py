@@ -12,13 +12,13 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
-from numba import config
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.folder import processor
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.singular_pass import Pass
@@ -170,7 +170,7 @@ def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | N
 
 def digest(engine: Engine, *arrays: np.ndarray) -> str:
     """Of all that decides what an engine makes of some arrays, the processor included."""
-    told = f"{processor()} {config.DISABLE_JIT} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
+    told = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
     found = hashlib.sha256(told.encode())
     h = engine.h.copy()
     h[list(m.ADDRESSES)] = 0

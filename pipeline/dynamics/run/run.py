@@ -200,7 +200,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
             if limit is not None:
                 out[k] = limit
         parts.append(out)
-    seen = observation.by_name(np.concatenate(parts), engine.model.arrays.size)
+    # a megabyte is copied only where there is something to join: that would take as long as a short run
+    seen = observation.by_name(parts[0] if len(parts) == 1 else np.concatenate(parts), engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"

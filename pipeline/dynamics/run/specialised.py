@@ -12,11 +12,11 @@ from __future__ import annotations
 from threading import Lock
 
 import numpy as np
-from numba import config
 
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
@@ -52,7 +52,7 @@ def _make(engine: Engine, progress: Progress) -> None:
     An integration that goes on in another process needs that of the rows which it has met before, too.
     """
     known, rows = engine.straight.addresses, engine.straight.rows
-    if config.DISABLE_JIT or engine.model.parts.joint_frictions or engine.method.traits.reads_all:
+    if INTERPRETED or engine.model.parts.joint_frictions or engine.method.traits.reads_all:
         return
     if engine.kept.tobytes() not in rows and len(rows) < SELECTIONS:
         rows.append(engine.kept.tobytes())

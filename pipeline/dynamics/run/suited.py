@@ -106,6 +106,10 @@ class Suit:
                 f"{DEFAULT}: at a relative tolerance of {rtol:.1e} it is foreseen to take fewer evaluations than "
                 f"{VIBRATING}, which took {self.seen[VIBRATING][1]:.0f} at {self.seen[VIBRATING][0]:.1e}"
             )
+        if VIBRATING in self.missed:
+            return (
+                f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed over to it"
+            )
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self) -> dict[str, tuple[Judge, str]]:

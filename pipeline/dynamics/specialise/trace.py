@@ -14,8 +14,8 @@ from types import CellType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
-from numba.core.dispatcher import Dispatcher
 
+from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 #: of NumPy, that kernels apply
@@ -135,7 +135,7 @@ class Trace:
         return self._plain[id(value)]
 
     def _made_plain(self, value: Any) -> Any:
-        if isinstance(value, Dispatcher):
+        if isinstance(value, Kernel):
             return self._kernel(value.py_func)
         if isinstance(value, ModuleType):
             return self._functions() if value is np else _Names(self, value)

@@ -73,7 +73,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
     coordinates: dict[str, Any] = {
         "quantity": [q.name for q in chosen],
-        "unit": ("quantity", [q.unit for q in chosen]),
+        "unit": ("quantity", [quantities.unit(reference, q) for q in chosen]),
     }
 
     def errors(run: xr.Dataset) -> np.ndarray:

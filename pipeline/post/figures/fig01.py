@@ -129,14 +129,17 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
         up = 1.0 if foot[1] > 0.0 else -1.0
         for place, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
             text = f"{name}\n({place[0]:.1f}, {place[1]:.1f})"
-            axes.annotate(text, (place[0], place[1] + 23.0 * way), ha="center", va="center", fontsize=8.2)
+            axes.annotate(
+                text, (place[0], place[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
+                va="bottom" if way > 0.0 else "top", fontsize=8.2,
+            )  # fmt: skip
     axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)
-    axes.annotate("C, Z", (14.0, 0.0), va="center", fontsize=8.2)
+    axes.annotate("C, Z", (0.0, 0.0), (8.0, 0.0), textcoords="offset points", va="center", fontsize=8.2)
     length = np.linalg.norm(at["platform.A1"] - at["ground.B1"])
     height = at["platform.A1"][2]
     text = f"height of A1..A4 at the start {1e3 * height:.1f} mm; legs between ball centres {1e3 * length:.1f} mm"
     axes.set_xlabel(f"x0 (mm)\n{text}")
     axes.set_ylabel("y0 (mm)")
     reach = 1e3 * np.abs([at[f"ground.B{k}"][:2] for k in LEGS]).max(axis=0)
-    axes.set(xlim=(-1.25 * reach[0] - 40.0, 1.25 * reach[0] + 40.0), ylim=(-reach[1] - 55.0, reach[1] + 55.0))
+    axes.set(xlim=(-1.25 * reach[0] - 40.0, 1.25 * reach[0] + 40.0), ylim=(-1.2 * reach[1], 1.2 * reach[1]))
     axes.set_aspect("equal")

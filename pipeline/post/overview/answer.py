@@ -29,14 +29,14 @@ def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence
     said = [] if compared is None else [*_effects(compared), *_impacts(compared), *_horizon(compared)]
     if compared is None and run is not None:
         said.append(
-            "The scene has neither clearance nor flexible bodies: it is its own ideal, and nothing is compared with it."
+            "The scene has neither clearance nor flexible bodies, so there is no idealised run to compare it with."
         )
     if run is not None:
         said += _trust(run)
     if doubts:
-        many = "One thing is" if len(doubts) == 1 else f"{len(doubts)} things are"
-        said.append(f"<span class='bad'>{many} to be doubted</span>, see <a href='#doubts'>below</a>.")
-    head = "" if compared is None else "<p>Beside the same mechanism with ideal joints and rigid bodies:</p>"
+        many = "one warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
+        said.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
+    head = "" if compared is None else "<p>Compared with the same mechanism with ideal joints and rigid bodies:</p>"
     return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"
 
 
@@ -54,13 +54,14 @@ def _effects(compared: xr.Dataset) -> list[str]:
         size = float(compared["largest"][0, j])
         share = difference / size if size > 0.0 else np.nan
         value = number(difference, error, unit)
-        part = f", {100.0 * share:.2g} % of the ideal's largest value" if np.isfinite(share) and share < 100.0 else ""
+        known = np.isfinite(share) and share < 100.0
+        part = f", which is {100.0 * share:.2g} % of its largest value in the ideal run" if known else ""
         if np.isfinite(error) and difference < TOLD_APART * error:
-            told = f"no effect is told apart from the errors ({value})"
+            told = f"no effect can be seen: the difference ({value}) is not larger than the errors of the two runs"
         elif np.isfinite(share) and share < SLIGHT:
-            told = f"a slight effect, <b class='n'>{value}</b>{part}"
+            told = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
         else:
-            told = f"differs by up to <b class='n'>{value}</b>{part}"
+            told = f"changes by up to <b class='n'>{value}</b>{part}"
         found.append(f"<b>{html.escape(name)}</b>: {told}.")
     return found
 
@@ -70,12 +71,13 @@ def _impacts(compared: xr.Dataset) -> list[str]:
     last = compared.isel(run=compared.sizes["run"] - 1)
     for k, name in enumerate(str(c) for c in last["contact"].values) if "contact" in last.coords else ():
         count, peak = float(last["impact_count"][k]), float(last["peak_force"][k])
+        unit = str(last["peak_force_unit"].values[k])
         if not np.isfinite(count):
             continue
         many = "No impact" if not count else "One impact" if count == 1 else f"{count:.0f} impacts"
         found.append(
-            f"<b>{html.escape(name)}</b>: {many}; the contact force reaches "
-            f"<b class='n'>{number(peak, np.nan, 'N')}</b>."
+            f"<b>{html.escape(name)}</b>: {many}; the contact {'force' if unit == 'N' else 'torque'} reaches "
+            f"<b class='n'>{number(peak, np.nan, unit)}</b>."
         )
     return found
 
@@ -83,10 +85,11 @@ def _impacts(compared: xr.Dataset) -> list[str]:
 def _horizon(compared: xr.Dataset) -> list[str]:
     end, horizon = float(compared["time"].values[-1]), float(compared["horizon"].values[-1])
     if horizon >= end:
-        return ["Neighbouring starts stay together over the whole run: it can be read point by point."]
+        return ["Runs that start almost equally stay together to the end, so every value of this run can be used."]
     return [
-        f"Neighbouring starts part after <span class='n'>{1e3 * horizon:.4g} ms</span> of "
-        f"<span class='n'>{1e3 * end:.4g} ms</span>: what is later holds for this run, and for others only in the mean."
+        f"Runs that start almost equally differ visibly from <span class='n'>{1e3 * horizon:.4g} ms</span> on (the run "
+        f"lasts <span class='n'>{1e3 * end:.4g} ms</span>). Later values are those of this one run; use averages over "
+        "several runs (<code>[ensemble]</code>) there."
     ]
 
 
@@ -99,7 +102,7 @@ def _trust(run: xr.Dataset) -> list[str]:
     largest, missed = max(map(float, energies), default=0.0), float(np.abs(run["energy_error"].values).max())
     share = missed / largest if largest > 0.0 else 0.0
     word = "<span class='good'>closes</span>" if share < LEDGER else "<span class='bad'>does not close</span>"
-    return [f"The energy ledger {word}: it misses <span class='n'>{share:.1e}</span> of the largest energy."]
+    return [f"The energy balance {word}: <span class='n'>{share:.1e}</span> of the largest energy is unaccounted for."]
 
 
 def number(value: float, error: float, unit: str) -> str:
@@ -138,7 +141,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "stops": list(scene.get("stop", {})),
         "gears": list(scene.get("gear", {})),
     }
-    return {name: ", ".join(found) if found else "absent: not computed" for name, found in there.items()}
+    return {name: ", ".join(found) if found else "not in the scene" for name, found in there.items()}
 
 
 def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:

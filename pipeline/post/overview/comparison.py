@@ -74,7 +74,7 @@ def assemble(
         coords={
             "run": labels,
             "quantity": [quantity.name for quantity in chosen],
-            "unit": ("quantity", [quantity.unit for quantity in chosen]),
+            "unit": ("quantity", [_unit(runs, quantity) for quantity in chosen]),
             "time": ("time", time, {"units": "s"}),
         },
         attrs={"Conventions": "CF-1.11", "reference": labels[0]},
@@ -91,6 +91,11 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
     if not quantities.is_series(quantity) or quantity.kind in FROM_THE_START:
         return apart
     return max(apart, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
+
+
+def _unit(runs: Mapping[str, xr.Dataset], quantity: Quantity) -> str:
+    """As the last run has it: the scene itself, of which the others may lack a joint with clearance or a drive."""
+    return quantities.unit(list(runs.values())[-1], quantity)
 
 
 def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
@@ -119,15 +124,25 @@ def _contacts(runs: Mapping[str, xr.Dataset]) -> list[str]:
 
 
 def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-    """Impacts and largest force of each contact in each run; NaN where the joint has no clearance."""
+    """Impacts and largest force (torque, of stops that turn) of each contact and run; NaN without clearance there."""
     names = _contacts(runs)
     count, peak = (np.full((len(runs), len(names)), np.nan) for _ in range(2))
     for i, run in enumerate(runs.values()):
         for k, name in enumerate(names):
-            if "contact" in run.coords and name in run["contact"].values:
+            if _has(run, name):
                 count[i, k] = len(quantities.events(run, Quantity(name, "impact_times")))
                 peak[i, k] = quantities.events(run, Quantity(name, "peak_force"))[0]
-    return {"impact_count": (("run", "contact"), count), "peak_force": (("run", "contact"), peak)}
+    last = list(runs.values())[-1]
+    units = [quantities.unit(last, Quantity(name, "peak_force")) if _has(last, name) else "N" for name in names]
+    return {
+        "impact_count": (("run", "contact"), count),
+        "peak_force": (("run", "contact"), peak),
+        "peak_force_unit": (("contact",), np.array(units, dtype=object)),
+    }
+
+
+def _has(run: xr.Dataset, contact: str) -> bool:
+    return "contact" in run.coords and contact in run["contact"].values
 
 
 def table(compared: xr.Dataset) -> Table:
@@ -145,14 +160,15 @@ def table(compared: xr.Dataset) -> Table:
             apart = "reference" if i == 0 else _difference(compared, i, j, unit)
             rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), apart))
     notes = [
-        "Own error: largest distance from the same run at a tolerance a hundred times tighter (of fixed steps: at "
-        "half the step). Difference: largest distance from the reference at the output times of both; of forces and "
-        "velocities at least the distance of the largest values, which may lie between those times; behind ± the sum "
-        "of both runs' own errors."
+        "Own error: the largest difference between this run and the same run at a hundred times tighter tolerance "
+        "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "
+        "times that both have; for forces and velocities also that of their peaks between output times. The number "
+        "after ± is the sum of both runs' own errors."
     ]
     end = float(compared["time"].values[-1])
     notes += [
-        f"{label}: neighbouring runs part after {1e3 * float(horizon):.4g} ms; what is later holds for this run only."
+        f"{label}: runs that start almost equally differ visibly from {1e3 * float(horizon):.4g} ms on; later values "
+        "are those of this run only."
         for label, horizon in zip(labels, compared["horizon"].values, strict=True)
         if horizon < end
     ]
@@ -169,7 +185,10 @@ def costs(compared: xr.Dataset) -> Table:
         part = compared.isel(run=i)
         cells = [_whole(float(part[name])) for name in COSTS]
         cells += [_whole(float(value)) for value in part["impact_count"].values]
-        cells += ["–" if np.isnan(value) else _number(float(value), "N") for value in part["peak_force"].values]
+        cells += [
+            "–" if np.isnan(value) else _number(float(value), str(unit))
+            for value, unit in zip(part["peak_force"].values, part["peak_force_unit"].values, strict=True)
+        ]
         rows.append((str(label), *cells))
     return Table("Events and costs", columns, tuple(rows))
 

@@ -51,7 +51,9 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     else:
         k, title = 0, f"{quantity.owner}: {quantity.kind.replace('_', ' ')}"
     return [
-        None if values is None else Curve(title, quantity.unit, run["time"].values, _drawn(values, quantity, k), NONE)
+        None
+        if values is None
+        else Curve(title, quantities.unit(run, quantity), run["time"].values, _drawn(values, quantity, k), NONE)
         for run, values in zip(runs, found, strict=True)
     ]
 
@@ -82,7 +84,8 @@ def _force(run: xr.Dataset, joint: str) -> Curve | None:
     time = run["time"].values
     if "contact" in run.coords and joint in run["contact"].values:
         force = np.linalg.norm(run["contact_force"].sel(contact=joint).values, axis=-1)
-        return Curve(f"{joint}: force", "N", time, force, _peaks(run, joint))
+        unit = quantities.unit(run, Quantity(joint, "peak_force"))
+        return Curve(f"{joint}: {'torque' if unit == 'N m' else 'force'}", unit, time, force, _peaks(run, joint))
     if "joint" in run.coords and joint in run["joint"].values:
         force = np.linalg.norm(run["joint_force"].sel(joint=joint).values, axis=-1)
         return Curve(f"{joint}: force", "N", time, force, NONE)

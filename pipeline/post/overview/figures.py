@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import by_unit
@@ -96,7 +97,10 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
     chosen = _chosen(names, first, force.max(axis=0), JOINTS)
     panels: list[tuple[str, np.ndarray]] = [(f"{names[k]}: force (N)", force[:, k]) for k in chosen]
-    panels += [(f"{name}: drive (N or N m)", run["drive_force"].values[:, k]) for k, name in enumerate(drives)]
+    panels += [
+        (f"{name}: drive ({quantities.unit(run, Quantity(name, 'drive_force'))})", run["drive_force"].values[:, k])
+        for k, name in enumerate(drives)
+    ]
     rows = -(-len(panels) // 2)
     figure, axes = style.grid(rows, 2, (11.0, 0.9 + 1.8 * rows), sharex=True)
     time = 1e3 * run["time"].values
@@ -116,18 +120,24 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     """Orbit, gap and force of each joint with clearance, the first named ones first; call it below `style.style`."""
-    names = [str(name) for name in run["contact"].values]
+    names, joints = [str(name) for name in run["contact"].values], parameters(run).get("joint", {})
     chosen = _chosen(names, first, post["peak_force"].values, CONTACTS)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.7 + 3.2 * len(chosen)), width_ratios=[1.0, 1.2, 1.2])
     for row, k in zip(axes, chosen, strict=True):
-        orbit(row[0], run, float(post["clearance"].values[k]), k)
-        row[0].set_title(f"{names[k]}: {CENTRE}")
-        _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap (µm)")
+        unit = quantities.unit(run, Quantity(names[k], "peak_force"))
+        if names[k] in joints:
+            orbit(row[0], run, float(post["clearance"].values[k]), k)
+            row[0].set_title(f"{names[k]}: {CENTRE}")
+        else:  # the end of a stop
+            row[0].set_visible(False)
+        small = "µm" if unit == "N" else "µrad"
+        _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap ({small})")
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
         count = int(post["impact_count"].values[k])
         share = float(post["contact_time_share"].values[k])
         peak = float(post["peak_force"].values[k])
-        told = f"normal force (N); {count} impacts, peak {peak:.4g} N, {share:.0%} in contact"
+        pushes = "normal force" if unit == "N" else "torque"
+        told = f"{pushes} ({unit}); {count} impacts, peak {peak:.4g} {unit}, {share:.0%} in contact"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k], told)
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
@@ -222,7 +232,7 @@ def _energy(run: xr.Dataset) -> dict[str, bytes]:
     error = run["energy_error"].values
     small, small_unit = by_unit({"": error}, "J")
     axes[0, 1].plot(time, small * error, color=style.INK, lw=0.9)
-    axes[0, 1].set_title(f"what the ledger misses ({small_unit})")
+    axes[0, 1].set_title(f"error of the energy balance ({small_unit})")
     for panel in axes.flat:
         panel.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
     if there:

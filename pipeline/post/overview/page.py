@@ -56,9 +56,14 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
     return text.encode()
 
 
-def viewer_page(title: str, figures: Sequence[str]) -> bytes:
-    """A page with views that can be turned (`pipeline.post.pages.viewer`)."""
-    return page(title, "", [Part("view", "View", "".join(figures))])
+def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
+    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what stands below them as HTML."""
+    return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", beside(views) + below)])
+
+
+def beside(figures: Sequence[str]) -> str:
+    """Figures beside each other where there is room for that."""
+    return "".join(figures) if len(figures) < 2 else f"<div class='beside'>{''.join(figures)}</div>\n"
 
 
 def media(name: str, content: bytes, caption: str, alt: str = "") -> str:

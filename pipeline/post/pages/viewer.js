@@ -147,7 +147,8 @@
       } else {
         const bent = this.meshes.some((mesh) => mesh.fields.length);
         state.textContent = `t = ${(1e3 * told.times[this.frame]).toFixed(2)} ms`
-          + (bent ? `, deformation ${shown(this.factor * told.exaggeration)} times larger` : "");
+          + (bent ? `, deformation ${shown(this.factor * told.exaggeration)} times larger` : "")
+          + (told.readings || []).map((r) => `, ${r.label} ${shown(r.values[this.frame])} ${r.unit}`).join("");
       }
     }
     draw() {

@@ -44,6 +44,12 @@ def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -
             yield drawn[share]
 
 
+def told(bundle: xr.Dataset) -> str:
+    """Which modes these are, in words."""
+    kind = str(bundle.attrs.get("reference", ""))
+    return f"{bundle.sizes['mode']} modes{f', {kind}' if kind else ''}"
+
+
 def _pixels(figure: Figure) -> np.ndarray:
     """A figure as a picture, and closed."""
     buffer = io.BytesIO()
@@ -71,10 +77,9 @@ def _sheet(body: str, bundle: xr.Dataset, seen: View, share: float) -> Figure:
             panel.set_visible(False)
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=axes, shrink=0.6, pad=0.01, aspect=30)
     bar.set_label("displacement, largest = 1")
-    kind = str(bundle.attrs.get("reference", "")).replace("-", " ")
     style.heading(
         figure,
-        f"{body}: {count} modes{f', {kind}' if kind else ''}",
+        f"{body}: {told(bundle)}",
         "mass-normalised shapes (in kg^-1/2) times the factor beside each; dashed: at rest",
     )
     return figure

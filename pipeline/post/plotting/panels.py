@@ -16,7 +16,7 @@ from flexclear.pipeline.post.models import PLATFORM, Motion
 from flexclear.pipeline.post.plotting import style
 
 #: alpha of a curve inside its horizon, of one that the paper does not have, and beyond the horizon
-FIRM, ADDED, PALE = 0.95, 0.6, 0.28
+FIRM, ADDED, PALE = 0.95, 0.4, 0.28
 #: what the paper does not have is drawn as the band that it fills, in so many stretches of time: a rod that rings would
 #: cover the paper's own curves
 STRETCHES = 120

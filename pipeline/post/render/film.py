@@ -24,6 +24,7 @@ from flexclear.pipeline.post.render.mechanism import (
 )
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata, shading, skin
+from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
 from flexclear.pipeline.post.render.writing import RATE, write
 
@@ -43,7 +44,7 @@ def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> n
     scene = plotter(size)
     actors = _build(scene, drawn)
     _place(drawn, actors, step, glow=False)
-    _look(scene, drawn)
+    look(scene, drawn)
     result = image(scene)
     scene.close()
     return result
@@ -69,7 +70,7 @@ def _frames(
     steps = np.clip(np.searchsorted(time, shown.times - 1e-12 * (time[-1] - time[0])), 0, time.size - 1)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
-    _look(scene, drawn)
+    look(scene, drawn)
     # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
     caption = pace.Caption((VIEW, 26), SOFT)
     with style.style():
@@ -95,12 +96,17 @@ def _struck(run: xr.Dataset, before: int, now: int) -> bool:
 
 
 def _build(scene: pv.Plotter, drawn: Mechanism) -> Actors:
-    _floor(scene, drawn)
-    parts = tuple(
-        scene.add_mesh(polydata(part.surface), color=part.color, opacity=part.opacity, specular=0.3, specular_power=18)
-        for part in drawn.parts
-    )
+    floor(scene, drawn)
+    parts = tuple(solid(scene, part.surface, part.color, part.opacity) for part in drawn.parts)
     return Actors(parts, tuple(_flexible(scene, drawn, body) for body in drawn.flexible))
+
+
+def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh: pv.PolyData | None = None) -> Any:
+    """A surface as an actor, shaded by its own normals: round ones smoothly, edges sharp."""
+    shown = polydata(surface) if mesh is None else mesh
+    actor = scene.add_mesh(shown, color=color, opacity=opacity, specular=0.3, specular_power=18)
+    actor.prop.interpolation = "Phong"
+    return actor
 
 
 def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyData:
@@ -128,7 +134,7 @@ def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
         mesh.points, mesh["deflection"] = placed(drawn.run, bent, step)
 
 
-def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:
+def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
     """A pale disc under the mechanism; none behind a planar one, and none where its scene says from where to look."""
     if drawn.view.planar or drawn.looks.direction is not None:
         return
@@ -143,7 +149,8 @@ def _floor(scene: pv.Plotter, drawn: Mechanism) -> None:
     scene.add_mesh(disc, color="#dfe5ec", ambient=0.12)
 
 
-def _look(scene: pv.Plotter, drawn: Mechanism) -> None:
+def look(scene: pv.Plotter, drawn: Mechanism) -> None:
+    """Put the camera where all that is drawn over the run is in the picture."""
     width, height = scene.window_size
     place, focus = eye(drawn.view, drawn.cloud, width / height, drawn.looks.zoom)
     scene.camera_position = [tuple(place), tuple(focus), tuple(drawn.view.up)]

@@ -235,8 +235,7 @@ def _joints(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.D
             radius = float(joint.get("ball_radius", BALL * size))
             yield at(second, surfaces.sphere(radius), color, contact)
             if kind == "ball-on-plane":
-                plane = surfaces.box((0.5 * size, 0.5 * size, 0.004 * size))
-                yield at(first, surfaces.moved(plane, np.array([0.0, 0.0, -0.002 * size])), GROUND_COLOR)
+                yield at(first, _floor(run, told, bundles, joint, size), GROUND_COLOR)
             else:
                 yield at(first, surfaces.sphere(1.3 * radius), SOCKET_COLOR, None, 0.35)
         elif "revolute" in kind or kind == "clearance-slot":
@@ -267,6 +266,22 @@ def _joints(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.D
 
 
 _X, _Y = surfaces.along(np.array([1.0, 0.0, 0.0])), surfaces.along(np.array([0.0, 1.0, 0.0]))
+
+
+def _floor(
+    run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], joint: Mapping[str, Any], size: float
+) -> Surface:
+    """A plane without end, as far as a ball goes on it; around the frame's origin where the plane itself moves."""
+    (first, second), names = joint["between"], _names(run, "frame")
+    low = high = np.zeros(2)
+    reach = 0.25 * size
+    if first.partition(".")[0] not in _names(run, "body") and second in names:
+        origin, axes = frame_pose(told, bundles, first)
+        path = (run.frame_position.values[:, names.index(second)] - origin) @ axes
+        low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
+        reach = 2.5 * float(joint["ball_radius"])
+    plane = surfaces.box((*(high - low + 2.0 * reach), 0.004 * size))
+    return surfaces.moved(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
 
 
 def _pin_radius(joint: Mapping[str, Any], size: float) -> float:

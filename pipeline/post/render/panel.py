@@ -12,8 +12,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.figures import orbit
 from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.render import joint_view
 
 #: a body that turns by less does not turn [degrees]
 STILL = 1e-3
@@ -46,7 +49,8 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
     watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves
     farthest, the first contact, the first joint.
     """
-    contact = "contact" in run.sizes
+    loose = [str(run["contact"].values[k]) for k in joint_view.with_clearance(run)]
+    contact = bool(loose)
     canvas = FigureCanvasAgg(
         Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.1))
     )
@@ -58,7 +62,7 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
     else:
         cursors.append(_energy(axes[1], run, post))
     if contact:
-        number = _first(run["contact"].values, watch) or 0
+        number = list(run["contact"].values).index(loose[_first(loose, watch) or 0])
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
         cursors.append((_dot(axes[2], 7), x, y))
     for panel in axes:
@@ -106,6 +110,10 @@ def _reaction(
     joints = [str(name) for name in post.joint.values]
     name = next((name for name in watch if name in contacts or (name in joints and not contacts)), None)
     name = name or (contacts or joints)[0]
+    if name not in joints:  # the end of a stop
+        unit = quantities.unit(run, Quantity(name, "peak_force"))
+        axes.set_title(f"{name}: {'contact force' if unit == 'N' else 'contact torque'} ({unit})")
+        return _curve(axes, run, run.contact_normal_force.sel(contact=name).values, "#D55E00", 0.8)
     axes.set_title(f"{name}: {'contact force' if name in contacts else 'reaction'} (N)")
     return _curve(axes, run, post.reaction.sel(joint=name).values, "#D55E00", 0.8)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any, cast
 
 import numpy as np
@@ -12,9 +13,10 @@ import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.post.overview.page import viewer_page
+from flexclear.pipeline.post.overview.page import media, viewer_page
 from flexclear.pipeline.post.pages import viewer
-from flexclear.pipeline.post.render import gl, gltf, pace, paraview, player
+from flexclear.pipeline.post.plotting import mode_sheet
+from flexclear.pipeline.post.render import gl, gltf, joint_view, pace, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
 from flexclear.pipeline.post.series import derive
 
@@ -60,7 +62,7 @@ def formats(what: str) -> tuple[str, ...]:
 
 def needs_gl(what: str, kind: str) -> bool:
     """Whether the machine must be able to draw solids for that."""
-    return what == "motion" and kind in ("png", "gif", "mp4")
+    return what in ("motion", "vibrations") and kind in ("png", "gif", "mp4")
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -88,13 +90,11 @@ def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     return make_film
 
 
-def _film_module() -> Any:
+def _film_module(name: str = "film") -> Any:
     """Pyvista is imported only where it can draw: without GL libraries it ends the process."""
     if not gl.works():
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
-    from flexclear.pipeline.post.render import film
-
-    return film
+    return import_module(f"flexclear.pipeline.post.render.{name}")
 
 
 def _motion_page(shown: Shown) -> dict[str, bytes]:
@@ -125,8 +125,6 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
 
 
 def _mode_sheets(shown: Shown) -> dict[str, bytes]:
-    from flexclear.pipeline.post.plotting import mode_sheet
-
     found: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
         seen = player.side(bundle)
@@ -136,7 +134,6 @@ def _mode_sheets(shown: Shown) -> dict[str, bytes]:
 
 def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     def make_films(shown: Shown) -> dict[str, bytes]:
-        from flexclear.pipeline.post.plotting import mode_sheet
         from flexclear.pipeline.post.render import writing
 
         found = {}
@@ -149,14 +146,13 @@ def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     return make_films
 
 
-def _mode_pages(shown: Shown) -> dict[str, bytes]:
-    return {
-        f"modes_{body}.html": viewer_page(
-            shown.name(f"modes of {body}"),
-            [viewer(player.modes(bundle), f"{body}: {bundle.sizes['mode']} modes", play=True)],
-        )
+def _mode_page(shown: Shown) -> dict[str, bytes]:
+    """The mode sets of all bodies beside each other."""
+    views = [
+        viewer(player.modes(bundle), f"{body}: {mode_sheet.told(bundle)}", play=True)
         for body, bundle in _bodies(shown).items()
-    }
+    ]
+    return {"modes.html": viewer_page(shown.name("modes"), views)}
 
 
 def _mode_gltf(shown: Shown) -> dict[str, bytes]:
@@ -174,7 +170,7 @@ def _mode_series(shown: Shown) -> dict[str, bytes]:
 
 def _contacts(shown: Shown) -> list[str]:
     assert shown.run is not None
-    if "contact" not in shown.run.sizes:
+    if not joint_view.with_clearance(shown.run):
         raise InputError("--what joint", "the scene has no joint with clearance", "show its motion")
     return [str(name) for name in shown.run["contact"].values]
 
@@ -189,14 +185,33 @@ def _joint_figures(shown: Shown) -> dict[str, bytes]:
         return figures.contacts(shown.run, derive(shown.run), shown.watched)
 
 
+def _joint_page(shown: Shown) -> dict[str, bytes]:
+    """Each joint's ball or pin in its socket, and their curves below."""
+    _contacts(shown)
+    assert shown.run is not None
+    views = [
+        viewer(player.joint(shown.run, k, shown.looks), f"{shown.run['contact'].values[k]}: path of the centre")
+        for k in joint_view.with_clearance(shown.run)
+    ]
+    curves = media(
+        "contacts.png",
+        _joint_figures(shown)["contacts.png"],
+        "Over time",
+        "Path of the ball or pin in its socket, the gap, and the normal force over time",
+    )
+    return {"joint.html": viewer_page(shown.name("joints with clearance"), views, curves)}
+
+
 def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     def make_films(shown: Shown) -> dict[str, bytes]:
         from flexclear.pipeline.post.render import joint_film, writing
 
         found = {}
         rate = writing.RATE if kind == "mp4" else writing.RATE // 2
-        for k, name in enumerate(_contacts(shown)):
-            assert shown.run is not None
+        names = _contacts(shown)
+        assert shown.run is not None
+        for k in joint_view.with_clearance(shown.run):
+            name = names[k]
             pictures = joint_film.frames(shown.run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
             suffix, content = writing.write(pictures, rate, kind)
             found[f"joint_{name}.{suffix}"] = content
@@ -205,16 +220,37 @@ def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     return make_films
 
 
-def _vibration_page(shown: Shown) -> dict[str, bytes]:
+def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
+    """The mechanism at rest, and how it vibrates about that."""
     assert shown.linear is not None
-    still = player.as_run(shown.linear)
-    drawn = mechanism(still, shown.bundles, shown.looks)
-    if not shown.linear.sizes["vibration"]:
+    if not bool((shown.linear["frequency"] > 0.0).any()):
         raise InputError("--what vibrations", "the mechanism has no motion that vibrates in this pose")
-    told = player.vibrations(drawn, shown.linear)
-    count = shown.linear.sizes["vibration"]
-    page = viewer_page(shown.name("natural vibrations"), [viewer(told, f"{count} natural vibrations", play=True)])
-    return {"vibrations.html": page}
+    drawn = mechanism(vibrations.as_run(shown.linear), shown.bundles, shown.looks)
+    return drawn, vibrations.vibrations(drawn, shown.linear)
+
+
+def _vibration_page(shown: Shown) -> dict[str, bytes]:
+    drawn, told = _vibrating(shown)
+    view = viewer(player.vibrations(drawn, told), f"{len(told.labels)} natural vibrations", play=True)
+    return {"vibrations.html": viewer_page(shown.name("natural vibrations"), [view])}
+
+
+def _vibration_sheet(shown: Shown) -> dict[str, bytes]:
+    film = _film_module("vibration_film")
+    return {"vibrations.png": png(film.sheet(*_vibrating(shown)))}
+
+
+def _vibration_film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
+    def make_film(shown: Shown) -> dict[str, bytes]:
+        from flexclear.pipeline.post.render import writing
+
+        film = _film_module("vibration_film")
+        rate = writing.RATE if kind == "mp4" else writing.RATE // 2
+        pictures = film.frames(*_vibrating(shown), rate, shown.progress)
+        suffix, content = writing.write(pictures, rate, kind)
+        return {f"vibrations.{suffix}": content}
+
+    return make_film
 
 
 def _farthest(run: xr.Dataset) -> int:
@@ -236,10 +272,20 @@ MAKERS: dict[str, dict[str, Callable[[Shown], dict[str, bytes]]]] = {
         "png": _mode_sheets,
         "gif": _mode_films("gif"),
         "mp4": _mode_films("mp4"),
-        "html": _mode_pages,
+        "html": _mode_page,
         "gltf": _mode_gltf,
         "pvd": _mode_series,
     },
-    "joint": {"png": _joint_figures, "gif": _joint_films("gif"), "mp4": _joint_films("mp4")},
-    "vibrations": {"html": _vibration_page},
+    "joint": {
+        "png": _joint_figures,
+        "gif": _joint_films("gif"),
+        "mp4": _joint_films("mp4"),
+        "html": _joint_page,
+    },
+    "vibrations": {
+        "png": _vibration_sheet,
+        "gif": _vibration_film("gif"),
+        "mp4": _vibration_film("mp4"),
+        "html": _vibration_page,
+    },
 }

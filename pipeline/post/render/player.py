@@ -7,7 +7,6 @@ deformations can be made larger there. Nothing here draws, and no GL library is 
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,24 +14,30 @@ import xarray as xr
 
 from flexclear.pipeline.core.algebra import matrix_to_quaternion
 from flexclear.pipeline.post.body_shape import box, faces, scale_to, surface
-from flexclear.pipeline.post.render import pace, surfaces
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, Part, part_pose, pose
+from flexclear.pipeline.post.render import joint_view, pace, surfaces
+from flexclear.pipeline.post.render.fields import field, hertz, linear_fields
+from flexclear.pipeline.post.render.mechanism import (
+    CLEARANCE_COLOR,
+    COLORS,
+    SOCKET_COLOR,
+    Flexible,
+    Looks,
+    Mechanism,
+    Part,
+    part_pose,
+)
+from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, eye
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
-#: drawn size of the largest displacement of a mode, as a share of the body's or the mechanism's length
+#: drawn size of the largest displacement of a mode, as a share of the body's length
 SHARE = 0.12
-#: a small step of a coordinate, in which a skin moves linearly
-SMALL = 1e-6
 
 
 def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     """A run, for the viewer: bodies on their tracks, flexible ones bent."""
-    run = drawn.run
-    shown = pace.pace(run, drawn.looks.duration, drawn.looks.impact_slowdown)
-    times = shown.times[np.unique(np.linspace(0, shown.times.size - 1, frames).astype(int))]
-    steps = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
+    run, steps = drawn.run, _steps(drawn.run, drawn.looks, frames)
     tracks: dict[tuple[int | None, int | None], int] = {}
     meshes = []
     for part in drawn.parts:
@@ -46,10 +51,40 @@ def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     return {
         "meshes": meshes,
         "tracks": [_floats(track) for track in kept],
-        "times": [round(float(t), 9) for t in run["time"].values[steps]],
+        "times": _rounded(run, steps),
         "rate": len(steps) / (drawn.looks.duration or pace.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
         **_camera(drawn.view, drawn.cloud, drawn.looks.zoom),
+    }
+
+
+def joint(run: xr.Dataset, contact: int, looks: Looks, frames: int = FRAMES) -> dict[str, Any]:
+    """The centre of a ball or pin in its socket, for the viewer: where it may be, its path, and itself.
+
+    contact: index of a joint with clearance, not of the end of a stop.
+    """
+    steps, shown = _steps(run, looks, frames), joint_view.shown(run, contact)
+    centre = run["contact_offset"].values[steps, contact]
+    unturned = np.tile([1.0, 0.0, 0.0, 0.0], (len(steps), 1))
+    readings = [
+        {"label": label, "unit": unit, "values": [float(f"{v:.4g}") for v in factor * run[name].values[steps, contact]]}
+        for name, label, unit, factor in (
+            ("contact_gap", "gap", "µm", 1e6),
+            ("contact_normal_force", "normal force", "N", 1.0),
+        )
+    ]
+    return {
+        "meshes": [
+            _still(shown.path, joint_view.PATH_COLOR, 1.0) | {"track": -1},
+            _still(shown.mark, CLEARANCE_COLOR, 1.0) | {"track": 0},
+            _still(shown.room, SOCKET_COLOR, 0.3) | {"track": -1},
+        ],
+        "tracks": [_floats(np.column_stack([centre, unturned]))],
+        "times": _rounded(run, steps),
+        "rate": len(steps) / (looks.duration or pace.SECONDS),
+        "readings": readings,
+        "exaggeration": 1.0,
+        **_camera(shown.view, np.concatenate([shown.room.points, shown.path.points])),
     }
 
 
@@ -74,49 +109,26 @@ def scales(bundle: xr.Dataset) -> np.ndarray:
     return np.array([scale_to(bundle, unit, SHARE) for unit in np.eye(bundle.sizes["mode"])])
 
 
-def vibrations(drawn: Mechanism, linear: xr.Dataset) -> dict[str, Any]:
+def vibrations(drawn: Mechanism, told: Vibrations) -> dict[str, Any]:
     """The natural vibrations of a mechanism about a pose, for the viewer.
 
-    drawn: of the equilibrium as a run of one output (`as_run`).  linear: schema LINEAR; of each complex shape real and
-    imaginary part are shown in turn, so that running waves run.
+    Of each complex shape real and imaginary part are shown in turn, so that running waves run.
     """
-    count, motions = linear.sizes["vibration"], body_motions(drawn.run, linear, drawn.flexible)
-    pieces = [(part, None) for part in drawn.parts] + [(None, body) for body in drawn.flexible]
-    meshes, moved = [], []
-    for part, body in pieces:
-        if part is not None:
-            matrix = part_pose(drawn.run, part, 0)
-            surface_ = surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3])
-            points, told = surface_.points, _still(surface_, part.color, part.opacity) | {"plain": True}
-            shown = np.zeros((count, 2, *points.shape))
-            if part.owner is not None:
-                shown = _rigid(motions, part.owner, points, drawn.run.position.values[0, part.owner])
-        else:
-            assert body is not None
-            points, told, shown = _vibrating(drawn.run, body, linear, motions)
-        meshes.append(told | {"track": -1})
-        moved.append(shown)
-    largest = np.max([np.linalg.norm(f, axis=-1).reshape(count, -1).max(axis=1) for f in moved if f.size], axis=0)
-    scale = SHARE * drawn.size / np.where(largest > 0.0, largest, 1.0)
-    for told, shown in zip(meshes, moved, strict=True):
-        if shown.any():
-            told["fields"] = [_scaled(f) for f in shown.reshape(-1, *shown.shape[2:])]
-            told.pop("normals", None)
+    meshes = []
+    for piece in told.pieces:
+        mesh = _still(piece.surface, piece.color, piece.opacity) | {"track": -1, "plain": piece.plain}
+        if piece.moved.any():
+            mesh["fields"] = [_scaled(f) for f in piece.moved.reshape(-1, *piece.moved.shape[2:])]
+            mesh.pop("normals")
+        meshes.append(mesh)
     shapes = [
         {
-            "label": f"vibration {k + 1}: {hertz(frequency)}, damping {damping:.2g}",
-            "fields": [2 * k, 2 * k + 1], "scale": float(scale[k]), "largest": float(largest[k]) or 1.0,
+            "label": label, "fields": [2 * k, 2 * k + 1], "scale": float(told.scale[k]),
+            "largest": float(told.largest[k]) or 1.0,
         }
-        for k, (frequency, damping) in enumerate(
-            zip(linear["frequency"].values, linear["damping_ratio"].values, strict=True)
-        )
+        for k, label in enumerate(told.labels)
     ]  # fmt: skip
     return {"meshes": meshes, "shapes": shapes, "unit": 1.0, **_camera(drawn.view, drawn.cloud, drawn.looks.zoom)}
-
-
-def hertz(frequency: float) -> str:
-    """A frequency in words."""
-    return "static" if not frequency > 0.0 else f"{frequency:.5g} Hz"
 
 
 def side(bundle: xr.Dataset) -> View:
@@ -129,22 +141,16 @@ def side(bundle: xr.Dataset) -> View:
     return View(across / np.linalg.norm(across) + 0.6 * up - 0.25 * axis, up, False)
 
 
-def linear_fields(body: Flexible, rest: np.ndarray) -> np.ndarray:
-    """How each point of a flexible body's skin moves per unit of each coordinate, about its centre of mass.
-
-    Shape (mode, point, 3); body axes.
-    """
-    bundle = body.bundle
-    centre = bundle["modal_first_moment"].values / float(bundle["mass"])
-    return np.array([field(bundle, k, rest) - centre[:, k] for k in range(bundle.sizes["mode"])])
+def _steps(run: xr.Dataset, looks: Looks, frames: int) -> np.ndarray:
+    """The outputs that are shown."""
+    times = pace.pace(run, looks.duration, looks.impact_slowdown).times
+    times = times[np.unique(np.linspace(0, times.size - 1, frames).astype(int))]
+    found: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
+    return found
 
 
-def field(bundle: xr.Dataset, mode: int, rest: np.ndarray) -> np.ndarray:
-    """How each point of a body's skin moves per unit of a modal coordinate, (point, 3); `rest`: the points at zero."""
-    q = np.zeros(bundle.sizes["mode"])
-    q[mode] = SMALL
-    moved: np.ndarray = (surface(bundle, q)[0] - rest) / SMALL
-    return moved
+def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:
+    return [round(float(t), 9) for t in run["time"].values[steps]]
 
 
 def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
@@ -160,68 +166,6 @@ def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
         "largest": largest,
     }
     return told | ({"color": body.color, "plain": True} if body.color else {})
-
-
-def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """Displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
-    move, turn = motions[owner]
-    moved: np.ndarray = move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
-    return moved
-
-
-#: displacement of the centre of mass and rotation in each vibration, (vibration, part, 3), by index of the body
-Motions = Mapping[int, tuple[np.ndarray, np.ndarray]]
-
-
-def body_motions(
-    run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexible]
-) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """How each body moves in the vibrations, from one of its named frames; bodies without one rest.
-
-    What a flexible body bends there is taken off.
-    """
-    bent = {body.index: body for body in flexible}
-    frames = [str(name) for name in linear["frame"].values]
-    found = {}
-    for k, name in enumerate(str(body) for body in run["body"].values):
-        at = next((i for i, frame in enumerate(frames) if frame.partition(".")[0] == name), None)
-        zero = np.zeros((linear.sizes["vibration"], 2, 3))
-        if at is None:
-            found[k] = (zero, zero)
-            continue
-        move, turn = linear["frame_translation"].values[:, :, at], linear["frame_rotation"].values[:, :, at]
-        if k in bent:
-            body, R = bent[k], pose(run, k, 0)[:3, :3]
-            own = body.bundle.sel(frame=frames[at].partition(".")[2])
-            centre = body.bundle["modal_first_moment"].values / float(body.bundle["mass"])
-            q = linear["modal_shape"].values[:, :, body.columns]
-            turn = turn - q @ own["frame_rotation_shape"].values.T @ R.T
-            move = move - q @ (own["frame_translation_shape"].values - centre).T @ R.T
-        arm = run["position"].values[0, k] - run["frame_position"].values[0, at]
-        found[k] = (move + np.cross(turn, arm), turn)
-    return found
-
-
-def as_run(linear: xr.Dataset) -> xr.Dataset:
-    """An equilibrium as a run of one output, in which nothing moves."""
-    still = linear[
-        [n for n in ("position", "quaternion", "frame_position", "modal_coordinate", "joint_position") if n in linear]
-    ]
-    zero = xr.zeros_like(linear["position"])
-    return still.assign(velocity=zero, angular_velocity=zero).expand_dims(time=[0.0]).assign_attrs(linear.attrs)
-
-
-def _vibrating(
-    run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions
-) -> tuple[np.ndarray, dict[str, Any], np.ndarray]:
-    matrix = pose(run, body.index, 0)
-    rest, _ = surface(body.bundle, np.zeros(body.bundle.sizes["mode"]))
-    fields = linear_fields(body, rest) @ matrix[:3, :3].T
-    centre = body.bundle["first_moment"].values / float(body.bundle["mass"])
-    points = (rest - centre) @ matrix[:3, :3].T + matrix[:3, 3]
-    shape = linear["modal_shape"].values[:, :, body.columns]
-    moved = _rigid(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
-    return points, _skin(body.bundle, points), moved
 
 
 def _track(run: xr.Dataset, owner: int | None, frame: int | None, steps: np.ndarray) -> np.ndarray:

@@ -112,6 +112,27 @@ def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
     return moved(cylinder(radius, float(np.linalg.norm(way))), 0.5 * (start + end), along(way))
 
 
+def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
+    """A thin round tube through places, shape (n, 3), open at its ends; places that repeat are left out."""
+    apart = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
+    places = places[apart]
+    if len(places) < 2:
+        return moved(sphere(radius), places[0])
+    way = np.gradient(places, axis=0)
+    across = np.empty_like(places)
+    side = along(way[0])[:, 0]
+    for k, tangent in enumerate(_unit(way)):  # the side is carried along, so that the tube does not twist
+        rest = side - (side @ tangent) * tangent
+        size = float(np.linalg.norm(rest))
+        side = rest / size if size > 1e-6 else along(tangent)[:, 0]
+        across[k] = side
+    other = np.cross(_unit(way), across)
+    turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)[None, :, None]
+    normals = across[:, None] * np.cos(turn) + other[:, None] * np.sin(turn)
+    points = places[:, None] + radius * normals
+    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(places), corners + 1))
+
+
 def grid(rows: int, columns: int) -> np.ndarray:
     """Triangles between points in rows and columns, shape (2 (rows - 1) (columns - 1), 3)."""
     index = np.arange(rows * columns).reshape(rows, columns)

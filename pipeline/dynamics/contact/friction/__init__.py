@@ -7,6 +7,8 @@ Each module has a class, called like its parameters, with
   and the rate of its bristles z [m] in the axes of slip (zeros for a law without memory);
 - ``parameters(law)``: six numbers p, and ``stick_speed(law)``: sliding speed below which it sticks [m/s],
   0 where the law has no such regime;
+- ``kinks(law)``: two sliding speeds [m/s] at which the slope or curvature of the coefficient jumps, 0 for none: steps
+  end there;
 - ``bristle(law)``: the size of z [m], or None for a law without memory.
 A joint without friction names none.
 """

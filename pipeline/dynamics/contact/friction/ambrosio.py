@@ -40,6 +40,11 @@ class Ambrosio:
         return 0.0
 
     @staticmethod
+    def kinks(law: clearance.Ambrosio) -> tuple[float, float]:
+        """v_0, v_1 [m/s]: the coefficient's slope jumps."""
+        return (law.v0, law.v1)
+
+    @staticmethod
     def bristle(law: clearance.Ambrosio) -> float | None:
         """No memory."""
         return None

@@ -66,6 +66,11 @@ class LuGre:
         return law.v_stribeck
 
     @staticmethod
+    def kinks(law: clearance.LuGre) -> tuple[float, float]:
+        """The law is smooth."""
+        return (0.0, 0.0)
+
+    @staticmethod
     def bristle(law: clearance.LuGre) -> float | None:
         """Largest deflection [m], mu_s / sigma_0."""
         return law.static / law.bristle_stiffness

@@ -49,6 +49,11 @@ class ModifiedCoulomb:
         return law.v_static
 
     @staticmethod
+    def kinks(law: clearance.ModifiedCoulomb) -> tuple[float, float]:
+        """v_s, v_d [m/s]: the coefficient's curvature jumps."""
+        return (law.v_static, law.v_dynamic)
+
+    @staticmethod
     def bristle(law: clearance.ModifiedCoulomb) -> float | None:
         """No memory."""
         return None

@@ -69,7 +69,7 @@ class MeshFile(Part):
 
 def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
     if not any(direction):
-        raise ValueError("a direction of length zero points nowhere")
+        raise ValueError("a direction must not have the length zero")
     return direction
 
 

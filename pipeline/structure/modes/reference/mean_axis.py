@@ -18,7 +18,11 @@ FAMILY = "flexclear.pipeline.structure.modes.reference"
 def condition(model: Model, given: Given) -> Condition:
     """The shapes of the condition that `given.of` names, linear and angular momentum taken out."""
     if given.of is None or given.of == "mean-axis":
-        raise InputError("modes.of", "mean axes of which shapes?", 'name them, as of = "craig-bampton"')
+        raise InputError(
+            "modes.of",
+            "mean-axis changes the shapes of another condition, and none is named",
+            'name it, as of = "craig-bampton"',
+        )
     based: Condition = lookup(FAMILY, given.of, where="modes.of")(model, given)
     note = f"shapes of {given.of}; their linear and angular momentum was taken out"
     return replace(based, mean_axes=True, note=note)

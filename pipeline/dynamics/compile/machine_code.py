@@ -1,0 +1,103 @@
+"""Machine code of one compiled function as bytes, and as something that can be called: without the compiler.
+
+Numba's own cache needs Numba, which takes longer to import than many a run takes. What is kept here is the object file
+that it makes of a function, with the name of the function in it and those of what it refers to; LLVM alone loads that.
+Each has an engine of its own, so that names in it, which count functions of the process that compiled it, may be those
+of others.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+#: what only the ways out of functions refer to that raise exceptions of Python, which no kernel does; whoever goes
+#: there all the same ends the process
+NEVER_REACHED = {
+    "NRT_Free",
+    "NRT_MemInfo_call_dtor",
+    "numba_do_raise",
+    "numba_gil_ensure",
+    "numba_gil_release",
+    "numba_runtime_build_excinfo_struct",
+    "numba_unpickle",
+}
+
+
+@dataclass(frozen=True)
+class Code:
+    """A C function: where it is [address], and whatever keeps it there."""
+
+    address: int
+    keeper: Any
+
+
+def image(function: Any) -> bytes:
+    """The code of a C function that Numba has compiled (`numba.cfunc`), to be kept."""
+    library = function._library
+    foreign = [used.name for used in library._final_module.functions if used.is_declaration]
+    foreign += [used.name for used in library._final_module.global_variables if used.is_declaration]
+    binary = bytes(library._get_compiled_object())
+    told = {
+        "name": function.native_name,
+        "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
+        "sha256": hashlib.sha256(binary).hexdigest(),
+    }
+    return json.dumps(told, sort_keys=True).encode() + b"\n" + binary
+
+
+def load(kept: bytes) -> Code:
+    """The function of such an image; ValueError where it cannot be loaded."""
+    import llvmlite.binding as llvm
+
+    line, _, binary = kept.partition(b"\n")
+    told = json.loads(line)
+    if told["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
+        raise ValueError("names and code are not of one function")
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
+    for name in told["foreign"]:
+        _provide(llvm, name)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
+    engine.finalize_object()
+    address = engine.get_function_address(told["name"])
+    if not address:
+        raise ValueError(f"no function {told['name']}")
+    return Code(address, engine)
+
+
+@cache
+def _target() -> Any:
+    """What code is made for: this processor."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    if not sys.platform.startswith("linux"):  # elsewhere Numba knows what its code needs besides
+        _ask_numba()
+    return llvm.Target.from_default_triple()
+
+
+def _provide(llvm: Any, name: str) -> None:
+    """See that a name that code refers to is known: LLVM ends the process over one that is not."""
+    if llvm.address_of_symbol(name):
+        return
+    if name in NEVER_REACHED:
+        import ctypes
+
+        llvm.add_symbol(name, ctypes.cast(ctypes.CDLL(None).abort, ctypes.c_void_p).value)
+        return
+    _ask_numba()
+    if not llvm.address_of_symbol(name):
+        raise ValueError(f"{name} is not known")
+
+
+@cache
+def _ask_numba() -> None:
+    """Let Numba tell LLVM the functions of its own that code may call."""
+    from numba.core.registry import cpu_target
+
+    cpu_target.target_context.refresh()

@@ -1,0 +1,134 @@
+"""Interface bases of the flexible bodies: which combinations of modes move the frames by which a scene uses them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import xarray as xr
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.model.arrays import Arrays
+
+#: a shape or moment below this share of the largest of its kind is rounding, not coupling
+NEGLIGIBLE = 1e-13
+#: so is a product of inertia of two modes, of unit modal mass, below this: it is a sum over all elements
+UNCOUPLED = 1e-11
+#: singular values of the frames' shapes below this share of the largest move nothing
+RANK = 1e-12
+#: modes are mixed where for each moving shape at least so many are held: fewer save less than mixing takes
+WORTH = 0.5
+
+
+@dataclass(frozen=True)
+class InterfaceBasis:
+    """Orthogonal T of `bodies.interface`, shape (mode, shape); `held`: number of shapes that move no frame, first."""
+
+    matrix: np.ndarray
+    held: int
+
+    @property
+    def moving(self) -> np.ndarray:
+        """Columns of T that move frames, shape (mode, moving shapes)."""
+        return self.matrix[:, self.held :]
+
+    def entries(self) -> list[tuple[int, int]]:
+        """(mode, shape) of the entries of T that are not zero, shape after shape."""
+        return [(int(i), int(j)) for j, i in zip(*np.nonzero(self.matrix.T), strict=True)]
+
+
+def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
+    """The interface basis of a flexible link.
+
+    Modes stay as they are where they share entries of the mass matrix, and where bending shortens bodies, which moves
+    every frame on them.
+    """
+    name, bundle = mechanism.links[link].flexible, mechanism.links[link].bundle
+    assert bundle is not None
+    n = bundle.sizes["mode"]
+    if mass_coupled(bundle) or any(body.stiffening is not None for body in mechanism.scene.flexible().values()):
+        return InterfaceBasis(np.eye(n), 0)
+    scene = mechanism.scene
+    parts = (*scene.joint.values(), *scene.load.values(), *scene.drive.values())
+    used = {frame for part in parts for frame in named_frames(part) if frame.partition(".")[0] == name}
+    return basis(_motions(bundle, sorted(used)), np.diag(bundle["modal_stiffness"].values))
+
+
+def mass_coupled(bundle: xr.Dataset) -> bool:
+    """Whether modes share entries of the modal mass."""
+    mass = bundle["modal_mass"].values
+    return bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
+
+
+def _motions(bundle: xr.Dataset, frames: list[str]) -> np.ndarray:
+    """Displacements and turns of frames per mode, each in units of the largest, shape (6 frames, mode)."""
+    shapes = [frame_shapes(bundle, frame.partition(".")[2])[1:] for frame in frames]
+    kinds = []
+    for name, kind in zip(("frame_translation_shape", "frame_rotation_shape"), zip(*shapes, strict=True), strict=False):
+        kinds += [shape / max(float(np.abs(bundle[name].values).max()), 1e-300) for shape in kind]
+    return np.concatenate([*kinds, np.zeros((0, bundle.sizes["mode"]))])
+
+
+def basis(motions: np.ndarray, stiffness: np.ndarray) -> InterfaceBasis:
+    """The basis for motions of frames per mode, shape (motions, mode), and the stiffness of every mode, shape (mode,).
+
+    Held shapes are vibrations of the body with all frames held still: stiffness couples them to moving shapes alone.
+    Modes that move frames in different ways, as in bending and in torsion, are not mixed.
+    """
+    held, moving, n = list[np.ndarray](), list[np.ndarray](), len(stiffness)
+    shared = csr_array((np.abs(motions).T @ np.abs(motions)) > 0.0)
+    families, family_of = connected_components(shared, directed=False)
+    for family in range(families):
+        modes = np.flatnonzero(family_of == family)
+        for kind, columns in zip((held, moving), _family(motions[:, modes], stiffness[modes]), strict=True):
+            for column in columns.T:
+                kind.append(np.zeros(n))
+                kind[-1][modes] = column
+    return InterfaceBasis(np.array([*held, *moving]).T, len(held))
+
+
+def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Held and moving shapes, columns over the modes of one family."""
+    n = len(stiffness)
+    _, values, rows = np.linalg.svd(motions, full_matrices=True) if motions.size else (None, np.zeros(0), np.eye(n))
+    rank = int(np.sum(values > RANK * values.max(initial=1e-300)))
+    if rank == 0:
+        return np.eye(n), np.zeros((n, 0))
+    if n - rank < WORTH * rank or rank == n:
+        return np.zeros((n, 0)), np.eye(n)
+    still, moving = rows[rank:].T, rows[:rank].T
+    _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))
+    # turns before displacements: shapes after the first ones move frames without turning them. With something heavy
+    # on a frame, the mass matrix of other moving shapes, scaled to a unit diagonal, is worse conditioned by 10 to 100
+    turns_first, _ = np.linalg.qr((motions[np.any(motions != 0.0, axis=1)] @ moving)[::-1].T)
+    return still @ axes, moving @ turns_first
+
+
+def frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
+    k = list(bundle["frame"].values).index(frame)
+    pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
+    shapes = [bundle[name].values[k].copy() for name in ("frame_translation_shape", "frame_rotation_shape")]
+    for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):
+        # what the reference condition holds still is exactly still
+        scale = np.abs(bundle[name].values).max()
+        shape[np.abs(shape) <= NEGLIGIBLE * 1e3 * scale] = 0.0
+    return pose, shapes[0], shapes[1]
+
+
+def modes_of(arrays: Arrays) -> np.ndarray:
+    """Coordinates with modes as eigenmodes, of coordinates with modes in the interface basis; orthogonal, (nv, nv)."""
+    matrix, entries = np.eye(arrays.size(m.NV)), arrays.table(m.BASIS)
+    values = arrays.table(m.BASIS_VALUES)["value"]
+    for body in arrays.table(m.FLEXES):
+        mine, c = slice(body["basis0"], body["basis0"] + body["n_basis"]), body["c0"]
+        block = np.zeros((body["n_modes"], body["n_modes"]))
+        block[entries["mode"][mine], entries["shape"][mine]] = values[mine]
+        matrix[c : c + len(block), c : c + len(block)] = block
+    return matrix

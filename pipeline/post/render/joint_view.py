@@ -1,0 +1,65 @@
+"""A ball or pin in its socket in space: where its centre may be without contact, and its path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.post.render import surfaces
+from flexclear.pipeline.post.render.surfaces import Surface
+from flexclear.pipeline.post.render.view import View
+from flexclear.pipeline.post.series import parameters
+
+#: colour of a path, as in the plots of orbits; most places of it that are drawn
+PATH_COLOR, PLACES = "#009E73", 1500
+#: radius of the mark at the centre and of the path, as shares of the room's size
+MARK, PATH = 0.05, 0.006
+#: where a sphere and where a flat room are looked at from
+SLANTED, ABOVE = np.array([0.5, -1.0, 0.7]), np.array([0.0, -0.45, 1.0])
+
+
+@dataclass(frozen=True, slots=True)
+class JointView:
+    """Surfaces in axes of the socket [m]; `mark` about the centre of the ball or pin."""
+
+    room: Surface
+    path: Surface
+    mark: Surface
+    view: View
+
+
+def with_clearance(run: xr.Dataset) -> list[int]:
+    """Columns of the contacts that are joints with clearance; ends of stops have no path."""
+    joints = parameters(run).get("joint", {})
+    return [k for k, name in enumerate(run["contact"].values) if str(name) in joints] if "contact" in run.sizes else []
+
+
+def shown(run: xr.Dataset, contact: int) -> JointView:
+    """What is drawn of one joint with clearance."""
+    offset = run["contact_offset"].values[:, contact]
+    room, half = _room(parameters(run)["joint"][str(run["contact"].values[contact])], offset)
+    some = np.unique(np.linspace(0, len(offset) - 1, PLACES).astype(int))
+    flat = np.ptp(room.points[:, 2]) < 0.1 * half
+    seen = View(ABOVE if flat else SLANTED, np.eye(3)[1 if flat else 2], False)
+    return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), seen)
+
+
+def _room(told: dict, offset: np.ndarray) -> tuple[Surface, float]:
+    """Where the centre may be, and a length that marks are in proportion to [m].
+
+    A sphere or disc of the clearance, a slot longer by its travel; of a ball on a plane the plane in which the centre
+    lies when the ball touches.
+    """
+    if told["type"] == "ball-on-plane":
+        low, high = offset.min(axis=0), offset.max(axis=0)
+        reach = max(float((high - low).max()), 2.0 * float(told["ball_radius"]))
+        plane = surfaces.box((*((high - low)[:2] + 0.4 * reach), 0.005 * reach))
+        return surfaces.moved(plane, np.array([*(0.5 * (low + high))[:2], told["ball_radius"]])), 0.6 * reach
+    clearance = float(told["clearance"])
+    if told["type"] == "clearance-spherical":
+        return surfaces.sphere(clearance), clearance
+    half = 0.5 * float(told.get("travel", 0.0))
+    outline = surfaces.hull(np.array([[-half, 0.0], [half, 0.0]]), clearance)
+    return surfaces.prism(outline, 0.02 * clearance), max(clearance, 0.3 * half)

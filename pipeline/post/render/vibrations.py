@@ -1,0 +1,141 @@
+"""Natural vibrations of an assembled mechanism as moving skins: what pages, films and pictures of them draw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.post.body_shape import faces, surface
+from flexclear.pipeline.post.render import surfaces
+from flexclear.pipeline.post.render.fields import hertz, linear_fields
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
+
+#: drawn size of the largest displacement of a vibration, as a share of the mechanism's size
+SHARE = 0.12
+#: largest drawn rotation of any frame [rad]: points of a body that turns further would leave it, they move linearly
+TURN = 0.5
+#: displacement of the centre of mass and rotation in each vibration, (vibration, part, 3), by index of the body
+Motions = Mapping[int, tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """One skin at rest, world axes, and its complex displacement in each vibration.
+
+    moved: real and imaginary part [m per unit of the vibration's coordinate], shape (vibration, 2, point, 3).
+    plain: whether its own colour is drawn, else how far each point moves.
+    """
+
+    surface: surfaces.Surface
+    moved: np.ndarray
+    color: str
+    opacity: float
+    plain: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Vibrations:
+    """scale: factor by which each is drawn.  largest: displacement of any point at unit coordinate [m]."""
+
+    pieces: tuple[Piece, ...]
+    labels: tuple[str, ...]
+    scale: np.ndarray
+    largest: np.ndarray
+
+
+def as_run(linear: xr.Dataset) -> xr.Dataset:
+    """An equilibrium as a run of one output, in which nothing moves."""
+    still = linear[
+        [n for n in ("position", "quaternion", "frame_position", "modal_coordinate", "joint_position") if n in linear]
+    ]
+    zero = xr.zeros_like(linear["position"])
+    return still.assign(velocity=zero, angular_velocity=zero).expand_dims(time=[0.0]).assign_attrs(linear.attrs)
+
+
+def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
+    """What vibrates of a mechanism: motions that only decay or drift are left out.
+
+    drawn: of the equilibrium as a run of one output.  linear: schema LINEAR.
+    """
+    linear = linear.isel(vibration=np.flatnonzero(linear["frequency"].values > 0.0))
+    run, count = drawn.run, linear.sizes["vibration"]
+    motions = body_motions(run, linear, drawn.flexible)
+    pieces = []
+    for part in drawn.parts:
+        matrix = part_pose(run, part, 0)
+        skin = surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3])
+        moved = np.zeros((count, 2, *skin.points.shape))
+        if part.owner is not None:
+            moved = _rigid(motions, part.owner, skin.points, run["position"].values[0, part.owner])
+        pieces.append(Piece(skin, moved, part.color, part.opacity, True))
+    pieces += [_bending(run, body, linear, motions) for body in drawn.flexible]
+    sizes = [
+        np.linalg.norm(piece.moved, axis=-1).reshape(count, -1).max(axis=1) for piece in pieces if piece.moved.size
+    ]
+    largest = np.max(sizes, axis=0)
+    labels = tuple(
+        f"vibration {k + 1}: {hertz(frequency)}, damping {damping:.2g}"
+        for k, (frequency, damping) in enumerate(
+            zip(linear["frequency"].values, linear["damping_ratio"].values, strict=True)
+        )
+    )
+    return Vibrations(tuple(pieces), labels, _scale(linear, drawn.size, largest), largest)
+
+
+def _scale(linear: xr.Dataset, size: float, largest: np.ndarray) -> np.ndarray:
+    """The factor of each vibration, so that neither displacements nor rotations are drawn too large."""
+    turned = np.linalg.norm(linear["frame_rotation"].values, axis=-1).reshape(len(largest), -1).max(axis=1, initial=0.0)
+    factor: np.ndarray = np.minimum(
+        SHARE * size / np.where(largest > 0.0, largest, 1.0), TURN / np.where(turned > 0.0, turned, 1e-300)
+    )
+    return factor
+
+
+def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexible]) -> Motions:
+    """How each body moves in the vibrations, from one of its named frames; bodies without one rest.
+
+    What a flexible body bends there is taken off.
+    """
+    bent = {body.index: body for body in flexible}
+    frames = [str(name) for name in linear["frame"].values]
+    found = {}
+    for k, name in enumerate(str(body) for body in run["body"].values):
+        at = next((i for i, frame in enumerate(frames) if frame.partition(".")[0] == name), None)
+        zero = np.zeros((linear.sizes["vibration"], 2, 3))
+        if at is None:
+            found[k] = (zero, zero)
+            continue
+        move, turn = linear["frame_translation"].values[:, :, at], linear["frame_rotation"].values[:, :, at]
+        if k in bent:
+            body, R = bent[k], pose(run, k, 0)[:3, :3]
+            own = body.bundle.sel(frame=frames[at].partition(".")[2])
+            centre = body.bundle["modal_first_moment"].values / float(body.bundle["mass"])
+            q = linear["modal_shape"].values[:, :, body.columns]
+            turn = turn - q @ own["frame_rotation_shape"].values.T @ R.T
+            move = move - q @ (own["frame_translation_shape"].values - centre).T @ R.T
+        arm = run["position"].values[0, k] - run["frame_position"].values[0, at]
+        found[k] = (move + np.cross(turn, arm), turn)
+    return found
+
+
+def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """Displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
+    move, turn = motions[owner]
+    moved: np.ndarray = move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
+    return moved
+
+
+def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:
+    matrix = pose(run, body.index, 0)
+    rest, _ = surface(body.bundle, np.zeros(body.bundle.sizes["mode"]))
+    fields = linear_fields(body, rest) @ matrix[:3, :3].T
+    centre = body.bundle["first_moment"].values / float(body.bundle["mass"])
+    points = (rest - centre) @ matrix[:3, :3].T + matrix[:3, 3]
+    shape = linear["modal_shape"].values[:, :, body.columns]
+    moved = _rigid(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
+    # points keep their number, so that displacements fit; sharp edges of solids are shaded softly
+    skin = surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)))
+    return Piece(skin, moved, COLORS[0], 1.0, False)
