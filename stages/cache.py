@@ -64,8 +64,8 @@ def _check(options: argparse.Namespace) -> None:
         print(shown(fault))
     if len(faults) > SHOWN:
         print(f"... and {len(faults) - SHOWN} more")
-    told = f"{len(found.artifacts)} artifacts, {len(kernels)} kernels, {len(faults)} faults"
-    print(f"{told}, {len(found.orphans)} files without a record")
+    told = f"{len(found.artifacts)} artifacts, {len(faults)} faults, {len(found.orphans)} files without a record"
+    print(f"{told}; {len(kernels)} compiled kernels")
     if faults:
         raise ResourceError(
             "damaged files are never used: what needs them makes them again; `cache prune` removes them"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from pathlib import Path
 
 import pytest
@@ -29,7 +28,7 @@ def test_damage_is_told_and_removed(store: Store, capsys: pytest.CaptureFixture[
     for letter in "abc":
         store.show(put(store, letter), f"runs/{letter}", {}, "simulate")
     assert main(["cache", "check"]) == 0
-    assert re.search(r"3 artifacts, \d+ kernels, 0 faults", capsys.readouterr().out)
+    assert "3 artifacts, 0 faults" in capsys.readouterr().out
     store.path("simulate", "a" * 32, "nc").write_bytes(b"b" * 1000)
     path = store.path("simulate", "b" * 32, "json")
     path.write_bytes(path.read_bytes().replace(b'"b"', b'"d"'))
