@@ -10,7 +10,7 @@ import os
 import sys
 from importlib import import_module
 
-from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError
+from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, ResourceError, shown
 from flexclear.pipeline.core.system import plain_output
 from flexclear.pipeline.core.workflow import workers
 
@@ -55,6 +55,9 @@ def main(arguments: list[str] | None = None) -> int:
         # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE
+    except (OSError, MemoryError) as error:  # of the machine, and nobody knew better words for it
+        print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
+        return ResourceError.exit_code
 
 
 class Version(argparse.Action):

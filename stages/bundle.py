@@ -17,6 +17,7 @@ from typing import Any
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.pipeline.core.foreign import require_file
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import compose, is_file
 from flexclear.pipeline.core.version import version
@@ -166,6 +167,7 @@ def _packed(content: Mapping[str, bytes]) -> bytes:
 
 def _unpack(path: Path, folder: Path) -> tuple[dict[str, Any], str]:
     """Facts and log; the files are put into the folder, and nowhere else."""
+    require_file(path, str(path))
     try:
         with zipfile.ZipFile(path) as archive:
             entries = archive.infolist()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.errors import InputError, ResourceError
+from flexclear.pipeline.core.errors import InputError, ResourceError, shown
 from flexclear.stages import run
 
 ACTIONS = {
@@ -18,6 +18,8 @@ ACTIONS = {
 }
 #: artifacts that nothing shows are kept for so many days: going back to an earlier value costs nothing then
 KEPT = 30.0
+#: faults that `check` tells one by one
+SHOWN = 20
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,10 +57,15 @@ def _size(options: argparse.Namespace) -> None:
 def _check(options: argparse.Namespace) -> None:
     store = run.workplace().store
     found = upkeep.inventory(store, whole=True)
-    broken = [path for path in kernel_root().glob("*/flexclear_*.py") if not _kernel_whole(path)]
-    faults = [*found.damaged, *(f"{path} is damaged or half written" for path in broken)]
-    print(*faults, sep="\n", end="\n" if faults else "")
-    print(f"{len(found.artifacts)} artifacts, {len(faults)} faults, {len(found.orphans)} files without a record")
+    # one without a sum has not been compiled yet, or is about to be
+    kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
+    faults = [*found.damaged, *(f"{path} is damaged" for path in kernels if not _kernel_whole(path))]
+    for fault in faults[:SHOWN]:
+        print(shown(fault))
+    if len(faults) > SHOWN:
+        print(f"... and {len(faults) - SHOWN} more")
+    told = f"{len(found.artifacts)} artifacts, {len(faults)} faults, {len(found.orphans)} files without a record"
+    print(f"{told}; {len(kernels)} compiled kernels")
     if faults:
         raise ResourceError(
             "damaged files are never used: what needs them makes them again; `cache prune` removes them"
@@ -78,9 +85,9 @@ def _explain(options: argparse.Namespace) -> None:
         raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
     print(f"{record.stage} {record.key}")
     for name, digest in record.files.items():
-        print(f"  holds {name}: sha256 {digest}")
+        print(shown(f"  holds {name}: sha256 {digest}"))
     for fact, value in record.facts.items():
-        print(f"  {fact}: {value}")
+        print(shown(f"  {fact}: {value}"))
 
 
 def _prune(options: argparse.Namespace) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import is_file
 from flexclear.pipeline.core.scene.schema import Scene
 
 
@@ -35,7 +36,7 @@ def claim(scene: Scene, store: Store) -> str | None:
     with disk_limits(note.parent):
         note.parent.mkdir(parents=True, exist_ok=True)
         publish(note, checked({"file": str(path)}))
-    if before is None or not Path(before).is_file():
+    if not isinstance(before, str) or not is_file(Path(before)):
         return None
     return f"results/runs/{scene.name} showed {before}, and from now on shows {path}, which has the same name"
 

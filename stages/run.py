@@ -14,7 +14,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.pipeline.core.artifacts.disk import disk_limits
+from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
 from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
+#: bytes of what `--set` changes that stand in the name of a folder
+LONGEST_EDITS = 100
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -317,8 +319,10 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
             raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
         try:
             found[key.strip()] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
+        except ValueError:  # no TOML, or a number of more digits than Python reads
             found[key.strip()] = value.strip()
+        except RecursionError:
+            raise InputError(f"--set {text}", "nests tables or lists too deeply to be read") from None
     return found
 
 
@@ -326,8 +330,14 @@ def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
     """The scene called `name` with `settings` changed; its own name then tells them, and so do its results."""
     scene = load_scene(find_scene(name), overrides(settings))
     if settings:
-        scene._name = f"{scene.name}," + ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings)
+        scene._name = f"{scene.name},{_edits(settings)}"
     return scene
+
+
+def _edits(settings: Sequence[str]) -> str:
+    """What was changed, as part of a folder's name: of what is long the beginning, and a digest of the whole."""
+    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings)
+    return told if len(told.encode()) <= LONGEST_EDITS else f"{told[:40]},{sha256(told.encode())[:16]}"
 
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
@@ -390,7 +400,13 @@ def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
 
 def check_target(target: Path, option: str = "--out") -> None:
     """InputError when a file cannot be put there; asked before the work, not after it."""
-    if not target.parent.is_dir():
-        raise InputError(f"{option} {target}", "its folder does not exist", f"mkdir -p {target.parent}")
-    if target.is_dir():
-        raise InputError(f"{option} {target}", "is a folder", "name a file in it")
+    place = f"{option} {target}"
+    try:
+        if not target.parent.is_dir():
+            raise InputError(place, "its folder does not exist", f"mkdir -p {target.parent}")
+        if target.is_dir():
+            raise InputError(place, "is a folder", "name a file in it")
+        if target.exists() and not target.is_file():  # a new file would take the place of a device
+            raise InputError(place, "is no ordinary file", "name a file, and look at it when it is there")
+    except OSError as error:
+        raise InputError(place, f"can be no file: {error.strerror}", "name another one") from None

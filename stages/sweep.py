@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import disk_limits, write_dataset
 from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.scene.load import load_scene, scene_name
+from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import limit, run, sweep_large, sweep_plan
@@ -73,7 +73,7 @@ def read(path: Path) -> tuple[Sweep, Scene]:
     sweep = load_sweep(path)
     beside = path.parent / sweep.scene
     try:
-        found = beside if beside.is_file() else run.find_scene(sweep.scene)
+        found = beside if is_file(beside) else run.find_scene(sweep.scene)
     except InputError as error:
         raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
     return sweep, load_scene(found)

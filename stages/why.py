@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 
+from flexclear.pipeline.core.errors import shown
 from flexclear.pipeline.core.workflow.execute import states
 from flexclear.stages import as_json, run
 from flexclear.stages.graph import STAGES
@@ -32,6 +33,6 @@ def text(found: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     for scene, stages in found.items():
         told.append(scene)
         for label, why in stages.items():
-            first, *others = why or ["fresh"]
+            first, *others = map(shown, why or ["fresh"])
             told += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
     return "\n".join(told)

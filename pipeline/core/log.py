@@ -11,6 +11,8 @@ import logging
 import sys
 from typing import TextIO
 
+from flexclear.pipeline.core.errors import TOGETHER, shown
+
 LOG = logging.getLogger("flexclear")
 #: writes lines to the stream that `write_to` has named last, else to what stderr is at the time
 _HANDLER = logging.StreamHandler()
@@ -26,6 +28,13 @@ class _Stderr:
         sys.stderr.flush()
 
 
+class _Plain(logging.Formatter):
+    """What is told may come from files of others: no control characters, and of what is long the ends."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return shown(super().format(record), TOGETHER)
+
+
 def write_to(out: TextIO | None) -> None:
     """Let the own handler write to a stream; None: to stderr."""
     _HANDLER.setStream(_Stderr() if out is None or out is sys.stderr else out)  # type: ignore[arg-type]
@@ -37,7 +46,7 @@ def set_level(*, quiet: bool = False, verbose: bool = False) -> None:
 
 
 if not LOG.handlers:
-    _HANDLER.setFormatter(logging.Formatter("flexclear: %(message)s"))
+    _HANDLER.setFormatter(_Plain("flexclear: %(message)s"))
     LOG.addHandler(_HANDLER)
     LOG.propagate = False
     LOG.setLevel(logging.INFO)

@@ -140,7 +140,8 @@ _EXPONENTS: dict[str, Exponents] = {
     "force per angle": (1, 1, -2, -1),
     "force per angular velocity": (1, 1, -1, -1),
 }
-_FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d+(?:\.\d+)?))?")
+#: a unit and its power; powers of more digits measure nothing, and would not be numbers
+_FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d(?:\.\d{1,3})?))?")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
 
 #: characters of a quantity; more are none

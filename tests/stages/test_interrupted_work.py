@@ -18,9 +18,10 @@ from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow import journal, stopping
+from flexclear.pipeline.core.workflow import cores, journal, stopping
 from flexclear.pipeline.dynamics.run import pace, pieces, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.overview import comparison
 from tests.analytic.integrator_scenes import double_pendulum, engine_with
@@ -153,12 +154,44 @@ def test_a_run_that_is_killed_before_and_after_it_was_handed_over_goes_on_to_the
     assert all(made) or config.DISABLE_JIT
 
 
+#: five closure rows of six, and others of them from 1.2 s on: code is made for both choices
+CHANGING = {"time.end": 1.4, "solver.rtol": 1e-8}
+
+
 @pytest.mark.usefixtures("often")
-def test_a_killed_ensemble_goes_on_to_the_same_bits(
+def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    scene = check(root, "bounce", ensemble={"members": 3})
+    monkeypatch.setattr(specialised, "MANY", 100)
+    scene = check(root, "bricard", **CHANGING)
+    whole = dynamics.simulate(scene, {}, silent)
+    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 3)
+    assert kills >= 2
+    assert found.identical(whole)
+
+
+@pytest.mark.usefixtures("often")
+def test_what_an_engine_has_met_before_changes_no_bit(root: Path) -> None:
+    """Sections and sweeps run again and again on one engine, and an earlier attempt may have done the first of them."""
+    engine = engine_with(check(root, "bricard", **CHANGING))
+    engine.straight.wanted = True
+    start = consistent_start(engine)
+    once, again = (trajectory.integrate(engine, start, silent) for _ in range(2))
+    assert len(engine.straight.rows) == 2 or config.DISABLE_JIT
+    assert np.array_equal(once.rows, again.rows)
+
+
+@pytest.mark.usefixtures("often")
+@pytest.mark.parametrize("threads", [1, 3])
+def test_a_killed_ensemble_goes_on_to_the_same_bits(
+    threads: int, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Killed with so many threads at work; what nobody kills has one."""
+    scene = check(root, "bounce", ensemble={"members": 4})
+    monkeypatch.setattr(cores, "cores", lambda: 1)
     whole = dynamics.ensemble(scene, {}, silent)
+    monkeypatch.setattr(cores, "cores", lambda: threads)
+    monkeypatch.setattr(cores, "_told", True)
     found, kills = interrupted(lambda: dynamics.ensemble(scene, {}, silent), tmp_path, monkeypatch)
     assert kills >= 3
     assert found.identical(whole)

@@ -14,6 +14,7 @@ import os
 import platform
 import re
 import shutil
+import stat
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
@@ -26,6 +27,8 @@ from flexclear.pipeline.core.errors import ResourceError
 if TYPE_CHECKING:
     from filelock import FileLock
 
+#: bytes that no table of records, facts or imports has
+LARGEST_TABLE = 64 << 20
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 #: temporary files of other machines that share the disk, and unfinished work, are swept when they are so old [s]
@@ -38,6 +41,29 @@ _TEMPORARY = re.compile(r"\.(?P<stem>[^.]*)\.(?P<host>[0-9a-f]{8})-(?P<pid>\d+)\
 def sha256(content: bytes) -> str:
     """Hexadecimal digest."""
     return hashlib.sha256(content).hexdigest()
+
+
+def require_ordinary(path: Path) -> int:
+    """Bytes of a file; OSError for a folder, a device, which may have no end, or a pipe, which waits for a writer."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise OSError(errno.EINVAL, "it is no ordinary file", str(path))
+    return status.st_size
+
+
+def read_whole(path: Path, largest: int | None = None) -> bytes:
+    """What an ordinary file holds; OSError for others, and for more bytes than `largest`."""
+    size = require_ordinary(path)
+    if largest is not None and size > largest:
+        raise OSError(errno.EFBIG, f"it is larger than {largest} bytes", str(path))
+    return path.read_bytes()
+
+
+def digest_of(path: Path) -> str:
+    """The sha256 of an ordinary file, however large; OSError for others."""
+    require_ordinary(path)
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def publish(path: Path, content: bytes) -> str:
@@ -59,7 +85,7 @@ def checked(table: Mapping[str, Any]) -> bytes:
 def read_checked(path: Path) -> dict[str, Any] | None:
     """The table in a file that `checked` made; None when there is none or one bit of it has changed."""
     try:
-        whole = json.loads(path.read_bytes())
+        whole = json.loads(read_whole(path, LARGEST_TABLE))
         table = whole["content"]
         return dict(table) if whole["sha256"] == _digest(table) else None
     except (OSError, ValueError, KeyError, TypeError, RecursionError):

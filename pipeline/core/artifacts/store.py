@@ -12,6 +12,7 @@ import contextlib
 import errno
 import json
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -20,23 +21,27 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.artifacts.disk import (
     checked,
     copy,
+    digest_of,
     disk_limits,
     is_copy,
     locked,
     publish,
     read_checked,
+    read_whole,
     settle,
     sha256,
     sweep,
     temporary,
 )
-from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.errors import ResourceError, shown
 
 if TYPE_CHECKING:
     import xarray as xr
 
     Product = Mapping[str, xr.Dataset | bytes]
 
+#: part of a stage (those of sweeps are folders in folders), key or file of an artifact: no way to another folder
+_PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
 #: stands for the key of all artifacts of a stage, such as the batches of a sweep's points
@@ -99,9 +104,9 @@ class Store:
         for name, digest in record.files.items():
             path = self.path(record.stage, record.key, name)
             try:
-                found = sha256(path.read_bytes())
+                found = digest_of(path)
             except OSError:
-                return f"{self._shown(path)} is missing"
+                return f"{self._shown(path)} is missing, or no file"
             if found != digest:
                 return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
         return None
@@ -131,13 +136,16 @@ class Store:
         import xarray as xr
 
         path = self.path(record.stage, record.key, MAIN)
-        content = path.read_bytes()
+        content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
         written = _READ_BACK.pop(record.files[MAIN], None)
         if written is not None:
             return written
-        return xr.load_dataset(content, engine="netcdf4", decode_times=False)
+        try:
+            return xr.load_dataset(content, engine="netcdf4", decode_times=False)
+        except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
+            raise ResourceError(f"{self._shown(path)} holds no dataset ({shown(str(error))}); remove it") from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
@@ -161,9 +169,11 @@ class Store:
     def _keep_edited(self, target: Path, name: str, folder: str, label: str) -> None:
         """Move a shown file out of the way that is neither of the artifact shown last nor of any other."""
         last = self.last(folder, label)
-        if last is None or name not in last.files or not target.is_file() or target.is_symlink():
+        if not target.is_file() or target.is_symlink():
             return
-        if sha256(target.read_bytes()) != last.files[name]:
+        # of what is not known to have been shown, what could be written to is not ours
+        known = last.files.get(name) if last is not None else None
+        if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             os.replace(target, aside)
             self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
@@ -193,7 +203,7 @@ class Store:
     def why_outdated(self, folder: str, label: str) -> str | None:
         """What `outdated` has noted, if it has."""
         table = read_checked(self._facts(folder, label, "failed")) if folder else None
-        return None if table is None else str(table["why"])
+        return None if table is None else str(table.get("why"))
 
     def show_families(self, folder: str, families: Mapping[str, Mapping[str, str]]) -> None:
         """Note in ``folder/.facts`` what is shown there in a dataset of its own: stages with all their artifacts.
@@ -212,7 +222,7 @@ class Store:
     def _tell_outdated(self, folder: str) -> None:
         path = self.root / folder / OUTDATED
         notes = [read_checked(found) for found in sorted((path.parent / ".facts").glob("*.failed"))]
-        lines = [f"{note['label']}: {note['why']}\n" for note in notes if note is not None]
+        lines = [f"{note.get('label')}: {note.get('why')}\n" for note in notes if note is not None]
         if lines:
             publish(path, (OUTDATED_TEXT + "".join(lines)).encode())
         else:
@@ -230,7 +240,7 @@ class Store:
     def names(self, stage: str, plain: str) -> tuple[str, ...]:
         """Files that the tasks of one plain key have opened so far; none where none was made yet."""
         table = read_checked(self.path(stage, plain, "names"))
-        return tuple(table["names"]) if table is not None else ()
+        return tuple(map(str, table.get("names", ()))) if table is not None else ()
 
     def keep_names(self, stage: str, plain: str, names: Sequence[str]) -> None:
         """Remember them."""
@@ -266,10 +276,17 @@ def read_record(path: Path) -> Record | None:
     """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
     try:
         table = read_checked(path) or {}
-        said = dict(table.get("said", {}))
-        return Record(str(table["stage"]), str(table["key"]), dict(table["files"]), dict(table["facts"]), said)
-    except (ValueError, KeyError, TypeError):
+        files, facts, said = (_texts(table.get(name, {})) for name in ("files", "facts", "said"))
+        found = Record(str(table["stage"]), str(table["key"]), files, facts, said)
+    except (ValueError, KeyError, TypeError, AttributeError):
         return None
+    # a record of somebody else's must not lead out of its folder: what is pruned is removed
+    inside = all(_PART.fullmatch(name) for name in (*found.stage.split("/"), found.key, *found.files))
+    return found if inside and (found.files or found.key == FAMILY) else None
+
+
+def _texts(table: Mapping[object, object]) -> dict[str, str]:
+    return {str(name): str(value) for name, value in table.items()}
 
 
 def _partial(shown: Path) -> Path:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexclear.pipeline.core.artifacts.disk import read_checked
+from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked
 from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store, read_record
 
 #: what stands beside artifacts and is none of their files
@@ -98,7 +98,7 @@ def find(store: Store, what: str) -> Record | None:
 
 def _same(path: Path, other: Path) -> bool:
     try:
-        return path.read_bytes() == other.read_bytes()
+        return digest_of(path) == digest_of(other)
     except OSError:
         return False
 

@@ -34,6 +34,10 @@ Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 LARGEST_TABLE = 16 << 20
 #: most coefficients of a polynomial law
 COEFFICIENTS = 8
+#: most steps of one law, and pieces of laws that are made of others: each is looked at beside all others
+MOST_STEPS, MOST_PIECES = 5_000, 200_000
+#: most pieces of a sum times its laws, each of which is evaluated at the start of each piece
+MOST_SUMMED = 1_000_000
 Ends = Literal["not-a-knot", "natural", "clamped", "periodic"]
 
 
@@ -54,7 +58,7 @@ class Step(Part):
     """
 
     type: Literal["step"]
-    start: Times
+    start: Annotated[Times, Field(max_length=MOST_STEPS)]
     end: Times
     change: Values
 
@@ -211,6 +215,12 @@ class Sum(Part):
     type: Literal["sum"]
     laws: Annotated[tuple[Bare, ...], Field(min_length=1)]
 
+    @model_validator(mode="after")
+    def _countable(self) -> Sum:
+        if _count(self) * len(self.laws) > MOST_SUMMED:
+            raise ValueError(f"a sum of {len(self.laws)} laws takes at most {MOST_SUMMED // len(self.laws)} pieces")
+        return self
+
 
 class Section(Part):
     """From this time on the law holds, until the next section starts.
@@ -236,6 +246,7 @@ class Piecewise(Part):
         starts = [s.start for s in self.sections]
         if any(not a < b for a, b in pairwise(starts)):
             raise ValueError(f"the sections must start one after the other, not at {starts} s")
+        _check_count(self)
         return self
 
 
@@ -250,6 +261,11 @@ class Repeated(Part):
     times: Annotated[int, Field(ge=1)]
     start: Time = 0.0
     law: Bare
+
+    @model_validator(mode="after")
+    def _countable(self) -> Repeated:
+        _check_count(self)
+        return self
 
 
 Law = Annotated[
@@ -267,6 +283,30 @@ def _bare(law: Any) -> Any:
 Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
 for _composed in (Sum, Section, Piecewise, Repeated):
     _composed.model_rebuild()
+
+
+def _count(law: Any) -> int:
+    """Pieces that a law becomes at most; at each, integration stops."""
+    match law:
+        case Step():
+            return 2 * len(law.start) + 1
+        case Spline():
+            return len(law.time)
+        case Table():
+            return len(law.points)
+        case Sum():
+            return sum(map(_count, law.laws))
+        case Piecewise():
+            return sum(1 + _count(section.law) for section in law.sections)
+        case Repeated():
+            return law.times * (1 + _count(law.law))
+    return 1
+
+
+def _check_count(law: Any) -> None:
+    if _count(law) > MOST_PIECES:
+        told = f"{min(_count(law), 10**300):.6g}"
+        raise ValueError(f"it is made of {told} pieces, at each of which integration stops: at most {MOST_PIECES}")
 
 
 def law_types(node: object) -> Iterator[str]:
@@ -306,7 +346,7 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
 
 def _column(path: Path, header: list[str], rows: list[list[str]], wanted: object) -> int:
     if isinstance(wanted, int) and not isinstance(wanted, bool):
-        if rows and wanted > len(rows[0]):
+        if rows and not 1 <= wanted <= len(rows[0]):
             raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {wanted}")
         return wanted - 1
     if wanted not in header:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from functools import lru_cache
 from pathlib import Path
 
 from flexclear.pipeline.core.errors import InputError, InputErrors
@@ -43,11 +44,9 @@ def where(error: InputError) -> tuple[Path, int] | None:
 
 def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[Path, int] | None:
     try:
-        text = file.read_text(encoding="utf-8-sig")
-        extends = tomllib.loads(text).get("extends")
+        extends, lines = _read(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return None
-    lines = written(text)
     # the part itself: of a place below it, the nearest key that is written out
     for length in range(len(keys), min(len(keys), 2) - 1, -1):
         for edit in EDITS:
@@ -58,6 +57,12 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
         if below is not None:
             return below
     return (file, lines[keys[:1]]) if keys[:1] in lines else None
+
+
+@lru_cache(maxsize=16)
+def _read(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
+    """What a text extends, and its lines; many mistakes are looked for in one text."""
+    return tomllib.loads(text).get("extends"), written(text)
 
 
 def written(text: str) -> dict[tuple[str, ...], int]:

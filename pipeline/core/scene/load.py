@@ -23,10 +23,13 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
-#: bytes that no scene or recipe needs
-LARGEST = 4 << 20
+#: bytes that no scene or recipe needs: as many as the reader of TOML takes in a second, whatever they are
+LARGEST = 1 << 20
 #: a key of more parts than a scene has levels; the reader of TOML takes their number squared
-DEEP = re.compile(r"(?<![\w-])(?:[\w-]{1,100}\s{0,9}\.\s{0,9}){50}")
+_PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
+DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
+#: scenes that extend each other in a row; each is read, and what it extends is copied
+LONGEST_CHAIN = 50
 #: keys of parts that name files, which are looked for where the scene is
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
@@ -168,6 +171,8 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if path in above:
         chain = " -> ".join(p.name for p in (*above, path))
         raise InputError(str(path), f"extends itself: {chain}", "break the circle")
+    if len(above) == LONGEST_CHAIN:
+        raise InputError(str(above[0]), f"extends more than {LONGEST_CHAIN} scenes in a row", "leave some out")
     table = read_toml(path)
     _require_tables(table, path)
     if "extends" not in table:
@@ -215,7 +220,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         if not stat.S_ISREG(status.st_mode):
             raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")
         if status.st_size > LARGEST:
-            raise InputError(str(path), f"is larger than {LARGEST >> 20} MB", "name a TOML file")
+            raise InputError(
+                str(path),
+                f"is larger than {LARGEST >> 20} MB",
+                "name a TOML file; longer courses of a law stand in a table (CSV)",
+            )
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
             raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")

@@ -13,6 +13,8 @@ from pydantic import BaseModel, ValidationError
 from flexclear.pipeline.core.errors import InputError, InputErrors
 from flexclear.pipeline.core.registry import suggestion
 
+#: findings that are put into words; nobody reads more of them, and each is compared with what could have been meant
+MOST = 500
 #: findings that a value is no whole number
 WHOLE = ("int_type", "int_parsing", "int_from_float")
 #: kinds of findings -> what was expected
@@ -56,7 +58,7 @@ TAGS = {
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
     """Everything that pydantic found in a file that should be a `model`."""
     places: dict[str, list[tuple[str, InputError]]] = {}
-    for e in error.errors():
+    for e in error.errors(include_url=False)[:MOST]:
         found = _input_error(path, e, model)
         places.setdefault(found.place, []).append((e["type"], found))
     unique = {str(found): found for there in places.values() for found in _nearest(there)}

@@ -16,10 +16,12 @@ from flexclear.pipeline.core.units import any_quantity
 
 #: points of one sweep; more are several sweeps
 MOST_POINTS = 1_000_000
+#: parameters of one sweep, and values of all of them at all points of a sample
+MOST_PARAMETERS, MOST_VALUES = 1000, 10_000_000
 
 Value = float | str
-#: dimensions that results have besides the parameters
-RESERVED = ("point", "time", "section", "axis", "quat")
+#: dimensions and variables that results have besides the parameters
+RESERVED = ("point", "time", "section", "axis", "quat", "status", "reason", "evaluations", "key")
 #: ways to say the values of a parameter, each by its keys
 WAYS = (("values",), ("from", "to"), ("mean", "deviation"))
 
@@ -130,7 +132,7 @@ class Sweep(Part):
     description: str = ""
     scene: str
     set: dict[str, Any] = Field(default_factory=dict)
-    vary: Annotated[dict[str, Parameter], Field(min_length=1)]
+    vary: Annotated[dict[str, Parameter], Field(min_length=1, max_length=MOST_PARAMETERS)]
     combine: Literal["grid", "list"] = "grid"
     sample: Sample | None = None
     keep: Annotated[tuple[str, ...], Field(min_length=1)]
@@ -171,8 +173,10 @@ class Sweep(Part):
     def _each_place_once(self) -> Sweep:
         seen: dict[str, str] = {}
         for name in self.vary:
-            if name in RESERVED:
+            if name in RESERVED or name.startswith(self.keep):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
+            if not name.strip() or "/" in name or not name.isprintable():
+                raise ValueError(f"vary.{name}: is no name of a dimension; choose one without slashes")
             for place in self.places(name):
                 if place in seen:
                     raise ValueError(f"vary.{name}: '{place}' is varied by '{seen[place]}' already")
@@ -182,6 +186,8 @@ class Sweep(Part):
     def _check_sample(self) -> None:
         if self.combine == "list":
             raise ValueError('combine: a [sample] makes its own points; leave combine = "list" out')
+        if self.sample is not None and self.sample.points * len(self.vary) > MOST_VALUES:
+            raise ValueError(f"sample.points: all points together have more than {MOST_VALUES} values; ask for fewer")
         for name, parameter in self.vary.items():
             if parameter.values is not None or parameter.count is not None:
                 raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")

@@ -2,8 +2,8 @@
 
 A task does its work in pieces, one integration each. A piece is named by all that decides it, so that a later
 attempt at the same task asks for the same pieces, in the same order; what it finds, it need not do again. Pieces lie
-beside the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with its own digest, and hold
-numbers only: arrays and JSON, no code. They go when the artifact is there.
+beside the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its user
+can make, and hold numbers only: arrays and JSON, no code. They go when the artifact is there.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from flexclear.pipeline.core.artifacts.disk import publish, sha256
+from flexclear.pipeline.core.artifacts.disk import publish, read_whole
+from flexclear.pipeline.core.artifacts.seal import same, sealed
 
 #: how often unfinished work is written [s], and the share of the time that writing may take where it is slow
 EVERY, SHARE = 20.0, 0.05
@@ -155,7 +156,7 @@ class Journal:
         buffer = io.BytesIO()
         np.savez(buffer, allow_pickle=False, notes=told, **arrays)
         content = buffer.getvalue()
-        digest = sha256(content)
+        digest = sealed(content)
         publish(self._path(name), digest.encode() + b"\n" + content)
         return digest
 
@@ -163,12 +164,12 @@ class Journal:
         import numpy as np
 
         try:
-            whole = self._path(name).read_bytes()
+            whole = read_whole(self._path(name))
         except OSError:
             return None
         content = whole[DIGEST + 1 :]
         noted = whole[:DIGEST].decode(errors="replace")
-        if sha256(content) != noted or digest not in (None, noted):
+        if not same(sealed(content), noted) or digest not in (None, noted):
             return None
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}

@@ -7,6 +7,7 @@ library (`note`).
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import os
 import stat
@@ -60,12 +61,28 @@ class Opened:
 
 
 _current: Opened | None = None
+_ordinary = False
 
 
 def note(path: Path) -> None:
     """A file is about to be read in a way that Python does not tell of."""
     if _current is not None:
         _current.see(path, writing=False)
+
+
+@contextmanager
+def ordinary_only() -> Iterator[None]:
+    """Meanwhile Python opens ordinary files alone; what a file of somebody else names may be a device without end.
+
+    Opening another one raises OSError.
+    """
+    global _ordinary
+    _listen()
+    before, _ordinary = _ordinary, True
+    try:
+        yield
+    finally:
+        _ordinary = before
 
 
 @contextmanager
@@ -129,10 +146,24 @@ def _listen() -> None:
     """From now on Python tells of what it opens; a hook cannot be taken away again."""
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
+        if event == "open" and _ordinary:
+            _require_ordinary(arguments[0])
         if event == "open" and _current is not None:
             _current.see(arguments[0], writing=bool((arguments[2] or 0) & WRITING))
 
     sys.addaudithook(hook)
+
+
+def _require_ordinary(path: Any) -> None:
+    """OSError for devices and pipes; the audit hook's error ends the attempt to open."""
+    if isinstance(path, int):
+        return
+    try:
+        mode = os.stat(path).st_mode
+    except (OSError, ValueError):
+        return  # opening it will tell
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise OSError(errno.EINVAL, "it is no ordinary file", os.fsdecode(path))
 
 
 @cache

@@ -169,9 +169,9 @@ def solve(h, w):
 
 
 @kernel
-def finish(h, w):
-    """Multipliers, and FORCE (holding L^-1 f) completed by them: L^-T then gives the accelerations."""
-    gather_rows(h, w, h[m.GAMMA])
+def respond(h, w):
+    """Multipliers of what is asked of the rows (there, in place) and of FORCE, which holds L^-1 f and is completed by
+    them: L^-T then gives the accelerations."""
     for c in range(h[m.N_CLOSURES]):
         count, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
         S, first = h[m.SPREAD] + m.CLOSURES.jacobian0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
@@ -181,6 +181,13 @@ def finish(h, w):
                 w[first + r] -= w[S + count * a + r] * force
     solve(h, w)
     add_spread(h, w, h[m.FORCE], 1.0)
+
+
+@kernel
+def finish(h, w):
+    """Multipliers of the rows' biases and of FORCE; see `respond`."""
+    gather_rows(h, w, h[m.GAMMA])
+    respond(h, w)
 
 
 @kernel
@@ -195,14 +202,22 @@ def close(h, f, w, n):
 
 
 @kernel
+def take_share(h, w, e, wrenches):
+    """Take what a closure's multipliers do along one known column (entry e) out of its drive's force.
+
+    wrenches: place of those of the closure's kept rows in w.
+    """
+    c, d, sign = m.KNOWN_ENTRIES.closure(h, e), m.KNOWN_ENTRIES.drive(h, e), m.KNOWN_ENTRIES.sign(h, e)
+    col, first = m.COLUMNS.row(h, m.KNOWN_ENTRIES.column(h, e)), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
+    for k in range(m.CLOSURES.n_kept(h, c)):
+        w[h[m.DRIVE_FORCE] + d] -= sign * dot6(w, wrenches + 6 * k, w, col) * w[first + k]
+
+
+@kernel
 def known_forces(h, w):
     """Take the closures' share out of the forces that the drives must supply."""
     for e in range(h[m.N_KNOWN_ENTRIES]):
-        c, d, sign = m.KNOWN_ENTRIES.closure(h, e), m.KNOWN_ENTRIES.drive(h, e), m.KNOWN_ENTRIES.sign(h, e)
-        col = m.COLUMNS.row(h, m.KNOWN_ENTRIES.column(h, e))
-        wrenches, first = m.ROWS.row(h, m.CLOSURES.row0(h, c)), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for k in range(m.CLOSURES.n_kept(h, c)):
-            w[h[m.DRIVE_FORCE] + d] -= sign * dot6(w, wrenches + 6 * k, w, col) * w[first + k]
+        take_share(h, w, e, m.ROWS.row(h, m.CLOSURES.row0(h, m.KNOWN_ENTRIES.closure(h, e))))
 
 
 @kernel

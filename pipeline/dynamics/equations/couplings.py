@@ -75,13 +75,11 @@ def close(h, f, w, n):
 def known_forces(h, w):
     """See `closures.known_forces`."""
     for e in range(h[m.N_KNOWN_ENTRIES]):
-        c, d, sign = m.KNOWN_ENTRIES.closure(h, e), m.KNOWN_ENTRIES.drive(h, e), m.KNOWN_ENTRIES.sign(h, e)
-        col, first = m.COLUMNS.row(h, m.KNOWN_ENTRIES.column(h, e)), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
+        c = m.KNOWN_ENTRIES.closure(h, e)
         o = m.ROWS.row(h, m.CLOSURES.row0(h, c))
         if m.CLOSURES.coupling(h, c) >= 0:
             o = wrench_row(h, c, m.KNOWN_ENTRIES.part(h, e))
-        for k in range(m.CLOSURES.n_kept(h, c)):
-            w[h[m.DRIVE_FORCE] + d] -= sign * dot6(w, o + 6 * k, w, col) * w[first + k]
+        closures.take_share(h, w, e, o)
 
 
 @kernel

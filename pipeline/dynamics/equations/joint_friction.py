@@ -33,7 +33,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
-from flexclear.pipeline.dynamics.equations.closures import add_spread, solve
+from flexclear.pipeline.dynamics.equations.closures import respond
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -128,17 +128,9 @@ def tree_response(h, w):
 def closed_response(h, w):
     """Accelerations in FORCE from the generalised forces there, and their multipliers; loops stay closed."""
     forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-    for c in range(h[m.N_CLOSURES]):
-        count, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
-        S, first = h[m.SPREAD] + m.CLOSURES.jacobian0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for r in range(count):
-            w[first + r] = 0.0
-        for a in range(m.CLOSURES.n_support(h, c)):
-            force = w[h[m.FORCE] + m.SUPPORT.coordinate(h, support + a)]
-            for r in range(count):
-                w[first + r] -= w[S + count * a + r] * force
-    solve(h, w)
-    add_spread(h, w, h[m.FORCE], 1.0)
+    for k in range(h[m.N_KEPT_ROWS]):
+        w[h[m.MULTIPLIER] + k] = 0.0
+    respond(h, w)
     backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
 
 

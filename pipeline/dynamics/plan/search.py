@@ -14,19 +14,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import influence
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Decision, Plan
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.influence import Influence
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
+from flexclear.pipeline.core.scene.wanted import KINDS, parse
 from flexclear.pipeline.dynamics.linear.play import OF_POSE, Bounds, bounds
 from flexclear.pipeline.dynamics.plan.pilots import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import chosen_solver
+from flexclear.pipeline.dynamics.plan.wanted import wanted_in
 from flexclear.pipeline.dynamics.run.run import integrate
 
 #: share of what is wanted that dropped effects may use up together; the rest is for what is not estimated
@@ -42,8 +41,6 @@ OF_IMPACTS = 0.5
 OF_PILOT = 0.15
 #: what the rest of the time may add to what a run over a part of it shows, as a share
 WHOLE = 1.0
-#: peaks of forces between flexible bodies are at least this share of those between rigid ones
-SOFTER = 0.5
 #: where members part, static modes are only trusted that were seen over this part of the time
 LEAST_SEEN = 0.5
 #: effects that cost nothing to keep are dropped below this share of what is wanted
@@ -128,7 +125,7 @@ def plan(
     inner = [effect for effect in every if effect.within]
     within_bodies = [e for e in inner if e.within.startswith("body.")]
     ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
-    search = Search(pilots, _wanted(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
+    search = Search(pilots, wanted_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
     found = _bounds(search, [*loose, *soft, *inner]) if loose or soft else Bounds({}, {}, {})
     _clearances(search, loose, [*soft, *inner], found, ideal)
     _interactions(search, soft, inner)
@@ -142,44 +139,6 @@ def _plain(scene: Scene) -> Scene:
     from flexclear.pipeline.core.scene.load import edited
 
     return edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
-
-
-def _wanted(scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]) -> dict[str, float]:
-    """What is wanted by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with rigid
-    bodies, half of it where bodies are flexible.
-
-    rigid: runs the scene with clearance and rigid bodies.
-    """
-    found, sizes = {}, {}
-    where = f"{scene.path or scene.name} [accuracy]"
-    assert scene.accuracy is not None
-    for q in quantities:
-        of_contact = KINDS[q.kind].owner == "contact"
-        point = rigid() if of_contact else ideal
-        if point.refused:
-            raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
-        sizes[q.name] = influence.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
-        want = scene.accuracy.quantities[q.name]
-        found[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
-        if not found[q.name] > 0.0:
-            raise InputError(
-                f"{where} {q.name}",
-                "a relative accuracy of a quantity that never changes in the ideal mechanism",
-                "give an absolute one, with a unit",
-            )
-    if all(found[name] >= most for name, most in sizes.items()):
-        # forces and rates may come from impacts alone
-        more = rigid() if scene.contacts() or scene.stop else ideal
-        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else influence.size(more, q)) for q in quantities}
-    if all(found[name] >= most for name, most in sizes.items()):
-        q = quantities[0]
-        raise InputError(
-            f"{where} {q.name}",
-            f"{found[q.name]:.3g} {q.unit} is more than it changes ({sizes[q.name]:.3g} {q.unit}), "
-            "and so are all other accuracies that are asked for: the plan would leave out everything, even the motion",
-            "ask for an accuracy below what the quantity does",
-        )
-    return found
 
 
 def _bounds(search: Search, gone: Sequence[Effect]) -> Bounds:

@@ -35,11 +35,14 @@ class Straight:
 
     wanted: whether all integrations shall use it.  used: whether the present one does.
     addresses: where it is, by the closure rows that it solves for; 0: nowhere.
+    rows: those for which the present integration uses it.  They are its own, since what other integrations of this
+    engine have met must not change a bit of this one.
     """
 
     wanted: bool = False
     used: bool = False
     addresses: dict[bytes, int] = field(default_factory=dict)
+    rows: list[bytes] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,8 @@ class Engine:
 
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
-        found = self.straight.addresses.get(self.kept.tobytes()) if self.straight.used else None
+        kept, known = self.kept.tobytes(), self.straight
+        found = known.addresses.get(kept) if known.used and kept in known.rows else None
         self.h[m.RATES] = found or self.h[m.EVALUATE]
 
     def view(self, place: int) -> np.ndarray:

@@ -112,6 +112,7 @@ class Piece:
             "collocations": [[laid.start, laid.span, laid.evaluations] for laid in tape.collocations],
             "passes": [[getattr(one, item.name) for item in fields(Pass)] for one in tape.passes],
             "doubted": sorted(tape.doubted),
+            "straight": [list(rows) for rows in self.engine.straight.rows],
         }
         return State(arrays, notes, tape.rows[: n[m.N_RECORDED]], journal.seconds() - self.begun)
 
@@ -133,6 +134,7 @@ class Piece:
             set(notes["doubted"]),
         )
         tape.rows[: len(found.grown)], tape.events[: len(arrays["events"])] = found.grown, arrays["events"]
+        self.engine.straight.rows[:] = [bytes(rows) for rows in notes["straight"]]
         self.tape, self.done = tape, bool(notes["done"])
 
 

@@ -11,17 +11,20 @@ from __future__ import annotations
 
 from threading import Lock
 
+import numpy as np
+
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import wiring
 
 #: evaluations of one run after which it goes on so: those that it has taken cost what the code takes to make
 MANY = 1_000_000
-#: selections of closure rows for which it is made, of one run
+#: selections of closure rows for which it is made, of one integration
 SELECTIONS = 4
 _making = Lock()
 
@@ -44,15 +47,21 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
 
 
 def _make(engine: Engine, progress: Progress) -> None:
-    """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster."""
-    known, kept = engine.straight.addresses, engine.kept.tobytes()
+    """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster.
+
+    An integration that goes on in another process needs that of the rows which it has met before, too.
+    """
+    known, rows = engine.straight.addresses, engine.straight.rows
     if INTERPRETED or engine.model.parts.joint_frictions or engine.method.traits.reads_all:
         return
-    if kept in known or len(known) >= SELECTIONS:
-        return
-    wired = wiring(engine.model.arrays, engine.h)
-    try:
-        with _making:  # members of ensembles run side by side
-            known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
-    except UnsuitedError:
-        known[kept] = 0
+    if engine.kept.tobytes() not in rows and len(rows) < SELECTIONS:
+        rows.append(engine.kept.tobytes())
+    for kept in [kept for kept in rows if kept not in known]:
+        h = engine.h.copy()
+        selection.write(engine.model, h, np.frombuffer(kept, dtype=bool))
+        try:
+            with _making:  # members of ensembles run side by side
+                wired = wiring(engine.model.arrays, h)
+                known[kept] = functions.specialised(engine.model.parts, wired, lambda text: progress(None, text))
+        except UnsuitedError:
+            known[kept] = 0

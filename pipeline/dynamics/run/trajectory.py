@@ -146,6 +146,7 @@ def integrate(
 
 def _begun(engine: Engine, y: np.ndarray, left: Handover | None, outputs: np.ndarray) -> Tape:
     """The tape of an integration that begins, at the start or where another method left it."""
+    engine.straight.rows.clear()
     if left is not None:
         return _resume(engine, left, outputs)
     tape = _begin(engine, _sampler(engine)(y, engine.start), outputs)

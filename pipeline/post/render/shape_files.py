@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.foreign import require_mesh
 from flexclear.pipeline.core.workflow import opened
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 
+#: bytes of a surface: more is no picture that anybody waits for; and how far its points may be [m]
+LARGEST, FARTHEST = 200_000_000, 1e15
 #: faces of cells, by their corners, seen from outside
 _SIDES = {
     "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
@@ -22,9 +25,11 @@ def read(path: Path, unit: float) -> Surface:
     """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
     import meshio
 
+    require_mesh(path, f"{path}", LARGEST)
     opened.note(path)  # some readers are not written in Python
     try:
-        with np.errstate(over="ignore"):  # meshio takes text for the length of a binary file, to see that it is none
+        # meshio takes text for the length of a binary file, to see that it is none
+        with np.errstate(over="ignore"), opened.ordinary_only():
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # meshio ends the process for what it does not know
         said = str(error) if not isinstance(error, SystemExit) else "meshio does not know its format"
@@ -41,7 +46,12 @@ def read(path: Path, unit: float) -> Surface:
         raise InputError(f"{path}", "has no triangles, quadrangles, tetrahedra or hexahedra", "export a surface")
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = unit * mesh.points
-    return surfaces.shaded(points, np.concatenate(faces), sharp=True)
+    triangles = np.concatenate(faces)
+    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(points)):
+        raise InputError(f"{path}", f"its faces name points beyond the {len(points)} that it has", "export it again")
+    if not np.abs(points).max(initial=0.0) < FARTHEST:
+        raise InputError(f"{path}", "its points are no finite numbers, or too large to be drawn", "export it again")
+    return surfaces.shaded(points, triangles, sharp=True)
 
 
 def _boundary(cells: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:

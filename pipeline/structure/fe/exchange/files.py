@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import zipfile
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ import scipy.sparse as sp
 
 from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.errors import FlexclearError, InputError, shown
+from flexclear.pipeline.core.foreign import require_file
 from flexclear.pipeline.structure.fe.exchange import market
 from flexclear.pipeline.structure.fe.exchange.market import COPIES, SMALLER
 from flexclear.pipeline.structure.fe.model import Model
@@ -102,18 +104,27 @@ def moments(model: Model) -> dict[str, Any]:
 
 def read_npz(path: Path, where: str) -> Contents:
     """A file as `write_npz` makes it; InputError when something is missing."""
+    require_file(path, where)
     try:
         with zipfile.ZipFile(path) as packed:
             need = sum(entry.file_size for entry in packed.infolist())
         machine.require_memory(COPIES * need, f"{where}: '{path.name}' unpacked", SMALLER)
         with np.load(path, allow_pickle=False) as file:
             data = {name: file[name] for name in file.files}
-        found = Table(data.pop("node"), data.pop("component"), data.pop("position"))
+        found = Table(
+            _array(data, "node", "iu"), _array(data, "component", "iu"), _array(data, "position", "iuf", (None, 3))
+        )
         n = len(found.node)
+        if not len(found.component) == len(found.position) == n or not np.isfinite(found.position).all():
+            raise ValueError("node, component and position must have as many rows as each other, of finite numbers")
+        if n == 0 or found.component.min() < 0 or found.component.max() >= len(COMPONENTS):
+            raise ValueError(f"components are numbers from 0 to {len(COMPONENTS) - 1}: {', '.join(COMPONENTS)}")
         matrices = []
         for name in ("stiffness", "mass"):
-            row, column, value = (data.pop(f"{name}_{part}") for part in ("row", "column", "value"))
-            matrices.append(sp.coo_array((value, (row, column)), shape=(n, n)))
+            row, column = (_array(data, f"{name}_{part}", "iu") for part in ("row", "column"))
+            matrices.append(sp.coo_array((_array(data, f"{name}_value", "iuf"), (row, column)), shape=(n, n)))
+        for name in list(data):
+            data[name] = _array(data, name, "iuf", None)
     except FlexclearError:
         raise
     except Exception as error:  # damaged, it makes readers of zip, zlib and NumPy fail in ways of their own
@@ -122,19 +133,36 @@ def read_npz(path: Path, where: str) -> Contents:
     return Contents(matrices[0], matrices[1], found, data)
 
 
+def _array(
+    data: dict[str, np.ndarray], name: str, kinds: str, shape: tuple[int | None, ...] | None = (None,)
+) -> np.ndarray:
+    """An array taken out of a file's; ValueError unless its numbers are of these kinds (NumPy) and it has this shape.
+
+    shape: None for any length, or, as a whole, for any shape.
+    """
+    found = data.pop(name)
+    fits = shape is None or (
+        found.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, found.shape, strict=True))
+    )
+    if found.dtype.kind not in kinds or not fits:
+        raise ValueError(f"'{name}' is an array of {found.dtype.name}, {found.shape}")
+    return found
+
+
 def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) -> Contents:
     """Matrices of any code; InputError when they and the table do not fit together."""
     matrices = [_matrix(path, where) for path in (stiffness, mass)]
-    found = _table(unknowns, where)
+    found = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
     for path, matrix in zip((stiffness, mass), matrices, strict=True):
         if matrix.shape != (len(found.node),) * 2:
             raise InputError(
-                where, f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' {len(found.node)} lines"
+                where, f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' another number of lines"
             )
     return Contents(matrices[0], matrices[1], found, {})
 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:
+    require_file(path, where)
     try:
         return market.read(path, where)
     except FlexclearError:
@@ -151,10 +179,12 @@ def _component(text: str) -> int:
     return COMPONENTS.index(name)
 
 
-def _table(path: Path, where: str) -> Table:
+def _table(path: Path, where: str, count: int) -> Table:
+    """The table of so many rows; one more is read, so that a longer one is noticed."""
+    require_file(path, where)
     try:
         with path.open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file, skipinitialspace=True))
+            rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))
         node = np.array([int(row["node"]) for row in rows])
         position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
         component = np.array([_component(row["component"]) for row in rows])

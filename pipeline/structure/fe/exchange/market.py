@@ -12,6 +12,7 @@ import bz2
 import gzip
 import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TextIO
 
@@ -25,6 +26,8 @@ COPIES = 4.0
 SMALLER = "condense the body, or leave out what no frame needs"
 #: more rows than this are taken for damage
 LARGEST = 10**9
+#: characters of a line of the header, or of a comment, that are read at once
+LONGEST = 10_000
 OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
@@ -34,13 +37,14 @@ def read(path: Path, where: str) -> sp.coo_array:
     Raises ResourceError when its header promises more than memory can hold.
     """
     with OPENERS.get(path.suffix, open)(path, "rt", encoding="utf-8", errors="strict") as file:
-        layout, symmetric = _kind(file.readline())
+        layout, symmetric = _kind(file.readline(LONGEST))
         rows, columns, *rest = _sizes(file)
         count = rest[0] if rest else rows * columns
         machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file without entries, which is told below
-            entries = np.loadtxt(file, comments="%", ndmin=2)
+            # one more than there should be: packed files have no end that their size tells
+            entries = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
     return _sparse(entries, rows, columns, count, symmetric) if layout else _dense(entries, rows, columns, symmetric)
 
 
@@ -58,7 +62,8 @@ def _kind(line: str) -> tuple[bool, bool]:
 
 
 def _sizes(file: TextIO) -> list[int]:
-    line = next((text for text in file if text.strip() and not text.startswith("%")), "")
+    lines = iter(partial(file.readline, LONGEST), "")
+    line = next((text for text in lines if text.strip() and not text.startswith("%")), "")
     sizes = [int(word) for word in line.split()]
     if len(sizes) not in (2, 3) or min(sizes) < 0 or max(sizes) > LARGEST:
         raise ValueError(f"its sizes are said to be {sizes}")

@@ -43,8 +43,12 @@ def build(recipe: MatricesRecipe, folder: Path, place: str) -> xr.Dataset:
             data[f"{name}_{part}"] = ((f"{name}_entry",), values)
     data |= {name: (MATRICES[name].dims, values) for name, values in contents.moments.items() if name in MATRICES}
     data |= _frames(recipe, contents.table, position, place)
+    try:
+        made = xr.Dataset(data)
+    except ValueError as error:  # integrals in a file are of other sizes than its unknowns
+        raise InputError(where, f"what the file holds does not fit together: {error}") from None
     return conform(
-        xr.Dataset(data),
+        made,
         MATRICES,
         title=recipe.title,
         body_kind="matrices",

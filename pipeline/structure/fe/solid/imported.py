@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.foreign import require_mesh
 from flexclear.pipeline.core.units import UNITS
 from flexclear.pipeline.core.workflow import opened
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
@@ -48,14 +48,11 @@ def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
 def _read(path: Path, where: str) -> Any:
     import meshio  # slow to import, and only meshes from files need it
 
-    if not path.is_file():
-        raise InputError(where, f"there is no file {path}", "paths are relative to the recipe")
-    # text of 20 bytes becomes a number of 8, but meshes are in memory several times while they are read
-    machine.require_memory(5.0 * path.stat().st_size, f"{where}: '{path.name}'", "use a coarser mesh")
+    require_mesh(path, where)
     _note_companions(path)
     said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), opened.ordinary_only():
             return meshio.read(path)
     except SystemExit:
         # meshio prints its reason and ends the process where the content is not what it knows of that suffix
@@ -69,8 +66,9 @@ def _read(path: Path, where: str) -> Any:
 def _note_companions(path: Path) -> None:
     """XDMF keeps its numbers in HDF5 files, which a library in C opens."""
     if path.suffix in (".xdmf", ".xmf"):
-        for name in set(re.findall(r"([^\s<>]+\.h5):", path.read_text(encoding="utf-8", errors="replace"))):
-            opened.note(path.parent / name)
+        words = re.split(r"[\s<>]+", path.read_text(encoding="utf-8", errors="replace"))
+        for name in {word.partition(".h5:")[0] for word in words if ".h5:" in word}:
+            opened.note(path.parent / f"{name}.h5")
 
 
 def _cell_type(mesh: Any, where: str) -> str:

@@ -1,0 +1,304 @@
+"""Files that somebody made to harm: meshes, matrices, surfaces, sweeps and whole folders of results.
+
+Each is refused in words, or counts as absent, in a second of the processor and without being read beyond its use.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import struct
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
+from flexclear.pipeline.core.artifacts.seal import sealed
+from flexclear.pipeline.core.artifacts.store import Store, read_record
+from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.pipeline.core.workflow.journal import Journal, State
+from flexclear.pipeline.post.render import shape_files
+from flexclear.pipeline.structure.fe.exchange import files
+from flexclear.pipeline.structure.fe.solid import imported
+from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
+from flexclear.stages import cost_peers, run
+
+#: processor time [s] of a refusal; measured at most 0.1 s, the reader's first import aside
+SECONDS = 1.0
+BASE = """
+title = "sound"
+time.end = "1 s"
+[body.ground]
+type = "ground"
+frames.O = {}
+[body.crank]
+type = "rigid"
+mass = 1.0
+inertia = [0.1, 0.1, 0.1]
+frames.A = {}
+[joint.A]
+type = "revolute"
+between = ["ground.O", "crank.A"]
+"""
+DRIVE = '\n[drive.d]\njoint = "A"\nlaw = '
+HARMONIC = '{ type = "harmonic", amplitude = 1, frequency = 1 }'
+
+
+@contextmanager
+def refused(words: str) -> Iterator[None]:
+    begun = time.process_time()
+    with pytest.raises(FlexclearError, match=words) as caught:
+        yield
+    assert time.process_time() - begun < SECONDS
+    assert len(str(caught.value).encode()) < 4000
+
+
+SCENES = {
+    "no number of metres": (BASE.replace("mass = 1.0", 'mass = "1 mm^-99999"'), "unknown unit"),
+    "more pieces than there is memory for": (
+        f'{BASE}{DRIVE}{{ type = "repeated", period = 1e-9, times = 1000000000, law = {HARMONIC} }}',
+        "2e\\+09 pieces",
+    ),
+    "each piece many pieces": (
+        BASE + DRIVE + '{ type = "repeated", period = 1, times = 1000000, law = ' * 20 + HARMONIC + "}" * 20,
+        "pieces",
+    ),
+    "more steps than are compared with each other": (
+        f"{BASE}{DRIVE}{{ type = 'step', start = {list(range(20000))}, end = 1, change = 1 }}",
+        "at most 5000 entries",
+    ),
+    "a sum of many laws of many pieces": (
+        BASE + DRIVE + '{ type = "sum", laws = [' + '{ type = "step", start = 0, end = 1, change = 1 },' * 600 + "] }",
+        "a sum of 600 laws",
+    ),
+    "keys of many parts in quotation marks": ('"a".' * 200_000 + "b = 1", "more than 50 parts"),
+    "a million unknown keys": ("".join(f"k{i}=1\n" for i in range(90_000)), "unknown key"),
+    "more text than any scene": ("#\n" * 600_000, "larger than 1 MB"),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_scene_that_asks_for_endless_work_is_refused_at_once(name: str, tmp_path: Path) -> None:
+    text, words = SCENES[name]
+    (tmp_path / "scene.toml").write_text(text)
+    with refused(words):
+        load_scene(tmp_path / "scene.toml")
+
+
+def test_a_long_row_of_scenes_that_extend_each_other_is_refused(tmp_path: Path) -> None:
+    for k in range(60):
+        (tmp_path / f"{k}.toml").write_text(f'extends = "{k + 1}.toml"')
+    (tmp_path / "60.toml").write_text(BASE)
+    with refused("more than 50 scenes in a row"):
+        load_scene(tmp_path / "0.toml")
+
+
+@pytest.mark.parametrize("value", ["[" * 20_000, "{a=" * 5_000, "9" * 5_000], ids=["lists", "tables", "digits"])
+def test_values_of_the_command_line_are_refused_as_those_of_files(value: str, tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(BASE)
+    with refused(r"too deeply|is not a number|\[body.crank.mass\]"):
+        run.loaded(str(tmp_path / "s.toml"), [f"body.crank.mass={value}"])
+
+
+def test_many_changes_give_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text(BASE)
+    names = {run.loaded(str(tmp_path / "s.toml"), [f"title={'a' * 300}{k}"]).name for k in range(2)}
+    assert len(names) == 2
+    assert max(map(len, names)) < 255  # bytes of a name on all usual file systems
+
+
+def test_results_take_the_place_of_no_device() -> None:
+    """A new file of that name would be put there, and the device be gone."""
+    for target in ("/dev/null", "/" + "x" * 5000):
+        with refused("no ordinary file|can be no file"):
+            run.check_target(Path(target))
+
+
+SWEEP: dict[str, Any] = {"scene": "s", "keep": ["b.position.final"], "vary": {}}
+MASS = {"values": [1, 2], "places": ["body.b.mass"]}
+
+
+@pytest.mark.parametrize("name", ["", "a/b", "a\nb", "status", "key", "b.position.final", "b.position.final.error"])
+def test_parameters_are_called_as_dimensions_may_be(name: str) -> None:
+    with refused(r"vary\."):
+        read_sweep({**SWEEP, "vary": {name: MASS}}, "sweep.toml")
+
+
+def test_samples_of_more_values_than_there_is_memory_for_are_refused() -> None:
+    for count, points in ((900, 1_000_000), (2, 10_000_000)):
+        vary = {f"body.b{k}.mass": {"from": 1, "to": 2} for k in range(count)}
+        with refused("more than 10000000 values|less than or equal to 1000000"):
+            read_sweep({**SWEEP, "sample": {"method": "sobol", "points": points}, "vary": vary}, "sweep.toml")
+
+
+GRID = "# vtk DataFile Version 3.0\nx\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 300 300 300\n"
+POINTS = "ply\nformat binary_little_endian 1.0\nelement vertex 10000000000\nproperty double x\nend_header\n"
+MESHES: dict[str, tuple[bytes | None, str]] = {
+    "mesh.vtk": (GRID.encode(), "promises a grid of 2.7e\\+07 points"),
+    "mesh.inp": (b"*INCLUDE, INPUT=/dev/zero\n", "no ordinary file"),
+    "mesh.xdmf": (b"<a>" + b"a" * 1_000_000, "cannot read|no surface"),
+    "mesh.stl": (b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 100, "cannot read|no solid cells|no triangles"),
+    "mesh.ply": (POINTS.encode(), "cannot read|no surface"),
+    "pipe.vtu": (None, "no ordinary file"),
+}
+
+
+@pytest.mark.parametrize("name", MESHES)
+def test_a_mesh_that_would_never_end_is_refused(name: str, tmp_path: Path) -> None:
+    content, words = MESHES[name]
+    if content is None:
+        os.mkfifo(tmp_path / name)
+    else:
+        (tmp_path / name).write_bytes(content)
+    import meshio  # noqa: F401 - its import is none of the refusal
+
+    with refused(words):
+        imported.read(MeshFile(type="mesh-file", file=name, length_unit="mm"), tmp_path, "recipe")
+    with refused(words):
+        shape_files.read(tmp_path / name, 1.0)
+
+
+@pytest.mark.parametrize("faces", ["f 1 2 1000000000000", "f -7 1 2", "f 1 2 3\nv nan 1 1"])
+def test_a_surface_with_faces_or_points_nowhere_is_refused(faces: str, tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text(f"v 0 0 0\nv 1 1 1\nv 0 0 1\n{faces}\n")
+    with refused("points"):
+        shape_files.read(tmp_path / "a.obj", 1.0)
+
+
+SIX = np.arange(6)
+SOUND = {
+    **{f"{name}_{part}": SIX for name in ("stiffness", "mass") for part in ("row", "column")},
+    **{f"{name}_value": np.ones(6) for name in ("stiffness", "mass")},
+    **{"node": np.ones(6, dtype=int), "component": SIX, "position": np.zeros((6, 3))},
+}
+ARRAYS: dict[str, dict[str, Any]] = {
+    "no component": {"component": np.full(6, 10**9)},
+    "text": {"position": np.full((6, 3), "a")},
+    "complex": {"stiffness_value": 1j * np.ones(6)},
+    "records": {"node": np.zeros(6, dtype=[("a", "i4")])},
+    "dates": {"position": np.zeros((6, 3), dtype="M8[s]")},
+    "flat": {"position": np.zeros(18)},
+    "shorter": {"node": np.ones(5, dtype=int)},
+    "nothing": {name: values[:0] for name, values in SOUND.items()},
+    "not finite": {"position": np.full((6, 3), np.nan)},
+}
+
+
+@pytest.mark.parametrize("name", ARRAYS)
+def test_arrays_of_other_kinds_are_no_matrices(name: str, tmp_path: Path) -> None:
+    np.savez(tmp_path / "sound.npz", **SOUND)
+    assert files.read_npz(tmp_path / "sound.npz", "recipe").mass.nnz == 6
+    np.savez(tmp_path / "a.npz", **{**SOUND, **ARRAYS[name]})
+    with refused("holds no matrices"):
+        files.read_npz(tmp_path / "a.npz", "recipe")
+
+
+def test_a_packed_matrix_is_not_read_beyond_what_its_header_says(tmp_path: Path) -> None:
+    """A file of 1 MB may hold 1 GB."""
+    header = b"%%MatrixMarket matrix coordinate real general\n1 1 1\n"
+    with gzip.open(tmp_path / "k.mtx.gz", "wb", compresslevel=1) as file:
+        file.write(header)
+        for _ in range(100):
+            file.write(b"1 1 1\n" * 100_000)
+    (tmp_path / "m.mtx").write_bytes(header + b"1 1 1\n")
+    (tmp_path / "u.csv").write_text("node,x,y,z,component\n1,0,0,0,ux\n" + "1,0,0,0,ux\n" * 300_000)
+    paths = [tmp_path / name for name in ("k.mtx.gz", "m.mtx", "u.csv")]
+    with refused("2 entries where its header says 1"):
+        files.read_matrix_market(paths[0], paths[1], paths[2], "recipe")
+    with refused("another number of lines"):
+        files.read_matrix_market(paths[1], paths[1], paths[2], "recipe")
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"s": [{"name": 1, "seconds": [NaN], "error": {}}]}', ""])
+def test_runs_of_other_programs_are_numbers(text: str, tmp_path: Path) -> None:
+    (tmp_path / "p.json").write_text(text)
+    with refused("--peer"):
+        cost_peers.read(tmp_path / "p.json")
+
+
+# Folders of results that somebody else sent ----------------------------------------------------------------------
+
+
+def stored(root: Path) -> tuple[Store, Path]:
+    store = Store(root / "results")
+    store.put("stage", "key", {"txt": b"content"}, {"a": "b"})
+    return store, store.path("stage", "key", "json")
+
+
+def altered(path: Path, **changes: Any) -> None:
+    """With a sum that is right: a digest is no signature."""
+    path.write_bytes(checked({**(read_checked(path) or {}), **changes}))
+
+
+def test_what_is_pruned_lies_in_the_cache(tmp_path: Path) -> None:
+    store, record = stored(tmp_path)
+    (tmp_path / "precious.txt").write_text("precious")
+    (record.parent / "key.x").mkdir()
+    altered(record, files={"x/../../../../precious.txt": sha256(b"other")})
+    assert read_record(record) is None
+    assert upkeep.inventory(store, whole=True).unreadable == (record,)
+    for stage in ("../stage", "stage/../..", "/stage", ""):
+        altered(record, stage=stage, files={"txt": sha256(b"content")})
+        assert read_record(record) is None
+    for artifact in upkeep.prunable(store, upkeep.inventory(store, whole=True), -1.0):
+        upkeep.remove(store, artifact)
+    assert (tmp_path / "precious.txt").read_text() == "precious"
+
+
+REPLACED: dict[str, Callable[[Path], Any]] = {
+    "pipe": os.mkfifo,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+    "loop": lambda path: path.symlink_to(path.name),
+    "folder": Path.mkdir,
+}
+
+
+@pytest.mark.parametrize("kind", REPLACED)
+@pytest.mark.parametrize("file", ["json", "txt", "names"])
+def test_what_is_no_file_counts_as_absent(file: str, kind: str, tmp_path: Path) -> None:
+    store, _ = stored(tmp_path)
+    store.path("stage", "key", file).unlink(missing_ok=True)
+    REPLACED[kind](store.path("stage", "key", file))
+    begun = time.process_time()
+    assert (store.find("stage", "key") is None) == (file != "names")
+    assert store.names("stage", "key") == ()
+    assert time.process_time() - begun < SECONDS
+
+
+def test_strange_tables_with_right_sums_are_read_as_texts(tmp_path: Path) -> None:
+    store, record = stored(tmp_path)
+    altered(record, facts={"a": {"b": [1]}, "c": 3}, said={"warnings": 5})
+    found = store.find("stage", "key")
+    assert found is not None
+    assert found.facts == {"a": "{'b': [1]}", "c": "3"}
+    for strange in ([], 3, None):
+        altered(record, files=strange)
+        assert store.find("stage", "key") is None
+
+
+def test_unfinished_work_of_somebody_else_is_not_gone_on_with(tmp_path: Path) -> None:
+    """What a work space holds decides where compiled code writes; its sum can only be made by its user."""
+    kept = Journal(tmp_path, "key")
+    kept.write("piece", State({"w": np.ones(3)}, {"done": False}, np.ones((2, 2))))
+    assert Journal(tmp_path, "key").find("piece") is not None
+    for path in tmp_path.glob("*.part"):
+        content = path.read_bytes().partition(b"\n")[2]
+        assert path.read_bytes().startswith(sealed(content).encode())
+        path.write_bytes(sha256(content).encode() + b"\n" + content)
+    assert Journal(tmp_path, "key").find("piece") is None
+
+
+def test_a_result_that_is_no_dataset_is_told(tmp_path: Path) -> None:
+    store = Store(tmp_path / "results")
+    found = store.put("stage", "key", {"nc": b"no netcdf"}, {})
+    with pytest.raises(FlexclearError, match="holds no dataset") as caught:
+        store.load(found)
+    assert not isinstance(caught.value, InputError)
