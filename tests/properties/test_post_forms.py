@@ -15,7 +15,6 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.overview.answer import number
 from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, shape_files, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
@@ -306,9 +305,3 @@ def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
 
     assert kind not in MAKERS[what]
     assert {name: tuple(kinds) for name, kinds in MAKERS.items()} == s6_render.FORMATS
-
-
-def test_a_number_is_written_to_the_second_digit_of_its_error():
-    assert number(0.0984812, 0.07, "m/s") == "98 ± 70 mm/s"
-    assert number(1.1044e-4, 2.01e-5, "m") == "110 ± 20 µm"
-    assert number(12.34567, 0.0123, "N") == "12.346 ± 0.012 N"
