@@ -221,7 +221,10 @@ class Graph:
         solver = self.scene.solver
         finer = {"rtol": max(TIGHTER * solver.rtol, TIGHTEST)} if solver.step is None else {"step": 0.5 * solver.step}
         change = {f"solver.{key}": value for key, value in finer.items()} | {"accuracy": None}
-        return Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
+        task = Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
+        # progress and messages name it, else the scene would seem to be run twice
+        how = "a tighter tolerance" if solver.step is None else "half the step"
+        return replace(task, scene=f"{task.scene} at {how}")
 
     @property
     def has_tighter(self) -> bool:

@@ -15,7 +15,7 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.influence import Influence, influence
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.post.overview.curves import scaled
+from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
 Names = frozenset[str]
@@ -158,9 +158,10 @@ def written(value: float, uncertainty: float, unit: str) -> str:
         return "–"
     if np.isinf(value):
         return "not the same events"
-    factor, shown = scaled(max(value, uncertainty), unit)
-    chance = f" ± {factor * uncertainty:.2g}" if uncertainty > 0.0 else ""
-    return f"{factor * value:.3g}{chance} {shown}"
+    if uncertainty > 0.0:
+        return measured(value, uncertainty, unit)
+    factor, shown = scaled(value, unit)
+    return f"{rounded(factor * value, 3)} {shown}"
 
 
 def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] | None = None) -> dict[str, bytes]:

@@ -119,6 +119,31 @@ def test_differences_are_those_of_the_runs():
     assert rows["A1.peak_force", "ideal"][2] == "–"
 
 
+@pytest.mark.parametrize(
+    "value, error, written",
+    [
+        (244.5e-6, 250e-6, "240 ± 250 µm"),  # two digits of the error, no exponent beside a prefix
+        (1.35906e-6, 4.9e-10, "1.35906 ± 0.00049 µm"),
+        (110e-9, 20e-6, "0 ± 20 µm"),  # the unit of what is larger
+        (1e-3, 0.0, "1 ± 0 mm"),
+        (1e-3, np.nan, "1 mm"),  # an error that nobody knows is not told
+        (1e-3, np.inf, "1 ± inf mm"),
+    ],
+)
+def test_a_value_is_written_to_the_second_digit_of_its_error(value: float, error: float, written: str):
+    assert curves.measured(value, error, "m") == written
+
+
+def test_numbers_have_an_exponent_only_where_they_need_one():
+    assert [curves.rounded(v, 2) for v in (280.0, 99.96, 0.28, 2.1e-9, 3.14e8)] == [
+        "280",
+        "100",
+        "0.28",
+        "2.1e-09",
+        "3.1e+08",
+    ]
+
+
 def test_a_peak_between_output_times_counts_as_a_difference():
     """One run has a row of its own, at an impact: velocities differ there although no common time shows it."""
     runs = pair()

@@ -18,7 +18,7 @@ TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])
 #: radii of the parts that Table 1 decodes into [m]
 CYLINDER, ROD, BALL = 0.02, 0.01, 0.02
 #: where the legs' names stand beside the middle of their cylinders on the paper [m]
-LABELS = {1: (0.07, 0.0), 2: (0.06, -0.02), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
+LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
 STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
 
 
@@ -67,7 +67,8 @@ def _mechanism(axes: Axes, seen: View, at: dict[str, np.ndarray], corners: np.nd
         clear = f"A{k}" == JOINT
         _ball(axes, seen, at[f"platform.A{k}"], CSJ.color if clear else "#3b4754", 8.0)
         _name(axes, seen, at[f"platform.A{k}"], f"A{k}" + (" (clearance)" if clear else ""), (0.012, 0.024))
-        _name(axes, seen, at[f"ground.B{k}"], f"B{k}", (0.018, -0.036))
+        # B3 is behind leg 2, and its name beside that
+        _name(axes, seen, at[f"ground.B{k}"], f"B{k}", (0.052, 0.0) if k == 3 else (0.018, -0.036))
     _ball(axes, seen, at["platform.C"], "#3b4754", 8.0)
     _name(axes, seen, at["platform.C"], "C", (0.012, 0.022))
     axes.plot(*seen.project(at["ground.Z"]), "s", color=style.INK, ms=4, zorder=9)

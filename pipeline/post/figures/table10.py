@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.post.overview.curves import rounded
 from flexclear.pipeline.post.paper import TABLE10
 from flexclear.pipeline.post.plotting.table import Table, files
 
@@ -62,7 +63,7 @@ def _milliseconds(repeats: xr.DataArray) -> str:
     values = 1e3 * made(repeats)
     if not values.size:
         return ABSENT
-    return f"{np.median(values):.3g} ± {0.5 * (values.max() - values.min()):.1g}"
+    return f"{np.median(values):.3g} ± {rounded(0.5 * (values.max() - values.min()), 1)}"
 
 
 def made(repeats: xr.DataArray) -> np.ndarray:
@@ -78,7 +79,7 @@ def _ratio(timing: xr.Dataset, way: str, name: str) -> str:
         return ABSENT
     ratio = np.median(own) / np.median(base)
     half = 0.0 if name == REFERENCE else 0.5 * (own.max() / base.min() - own.min() / base.max())
-    return f"{ratio:.3g} ± {half:.1g}"
+    return f"{ratio:.3g} ± {rounded(half, 1)}"
 
 
 def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
@@ -126,8 +127,9 @@ def _verdict(timing: xr.Dataset, way: str) -> str:
         return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
     least, most = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
     return (
-        f"{WAYS[way].capitalize()}: our ratios are {found[least]:.2g} ({least}) to {found[most]:.2g} ({most}) times "
-        "the paper's."
+        f"{WAYS[way].capitalize()}: our ratios are "
+        f"{rounded(found[least], 2)} ({least}) to {rounded(found[most], 2)} ({most}) "
+        "times the paper's."
     )
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.overview.curves import scaled
+from flexclear.pipeline.post.overview.curves import measured, rounded
 from flexclear.pipeline.post.series import parameters
 
 #: a difference is told from none where it is so many times larger than both runs' own errors
@@ -53,11 +53,14 @@ def _effects(compared: xr.Dataset) -> list[str]:
         error = sum(errors) if np.isfinite(errors).all() else np.nan
         size = float(compared["largest"][0, j])
         share = difference / size if size > 0.0 else np.nan
-        value = number(difference, error, unit)
+        value = measured(difference, error, unit)
         known = np.isfinite(share) and share < 100.0
-        part = f", which is {100.0 * share:.2g} % of its largest value in the ideal run" if known else ""
+        part = f", which is {rounded(100.0 * share, 2)} % of its largest value in the ideal run" if known else ""
         if np.isfinite(error) and difference < TOLD_APART * error:
-            told = f"no effect can be seen: the difference ({value}) is not larger than the errors of the two runs"
+            told = (
+                f"the runs are not exact enough to tell an effect: their difference ({value}) is less "
+                f"than {TOLD_APART:g} times their errors together"
+            )
         elif np.isfinite(share) and share < SLIGHT:
             told = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
         else:
@@ -77,7 +80,7 @@ def _impacts(compared: xr.Dataset) -> list[str]:
         many = "No impact" if not count else "One impact" if count == 1 else f"{count:.0f} impacts"
         found.append(
             f"<b>{html.escape(name)}</b>: {many}; the contact {'force' if unit == 'N' else 'torque'} reaches "
-            f"<b class='n'>{number(peak, np.nan, unit)}</b>."
+            f"<b class='n'>{measured(peak, np.nan, unit)}</b>."
         )
     return found
 
@@ -103,18 +106,6 @@ def _trust(run: xr.Dataset) -> list[str]:
     share = missed / largest if largest > 0.0 else 0.0
     word = "<span class='good'>closes</span>" if share < LEDGER else "<span class='bad'>does not close</span>"
     return [f"The energy balance {word}: <span class='n'>{share:.1e}</span> of the largest energy is unaccounted for."]
-
-
-def number(value: float, error: float, unit: str) -> str:
-    """A value with its error, in a unit that reads well, to the second digit of the error."""
-    factor, written = scaled(value, unit)
-    value, error = factor * value, factor * error
-    if not np.isfinite(error) or error <= 0.0:
-        return f"{value:.4g} {written}"
-    places = 1 - int(np.floor(np.log10(error)))
-    if places > 6 or error < 1e-4 * abs(value):
-        return f"{value:.4g} ± {error:.2g} {written}"
-    return f"{value:.{max(places, 0)}f} ± {error:.{max(places, 0)}f} {written}"
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:

@@ -17,7 +17,7 @@ from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.post.overview.curves import curves, has, scaled
+from flexclear.pipeline.post.overview.curves import curves, has, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
 #: what a run tells of its price, by its attribute
@@ -200,8 +200,10 @@ def _difference(compared: xr.Dataset, run: int, quantity: int, unit: str) -> str
     if np.isinf(value):
         return "other number of impacts"
     error = float(compared["error"][run, quantity]) + float(compared["error"][0, quantity])
-    factor, written = scaled(value, unit)
-    return f"{factor * value:.4g} ± {factor * error:.2g} {written}"
+    if np.isnan(error):  # of one of the two runs it is not known
+        factor, written = scaled(value, unit)
+        return f"{rounded(factor * value, 4)} ± ? {written}"
+    return measured(value, error, unit)
 
 
 def _own(error: float, unit: str) -> str:
@@ -212,7 +214,7 @@ def _own(error: float, unit: str) -> str:
 
 def _number(value: float, unit: str, digits: int = 4) -> str:
     factor, written = scaled(value, unit)
-    return f"{factor * value:.{digits}g} {written}"
+    return f"{rounded(factor * value, digits)} {written}"
 
 
 def _whole(value: float) -> str:

@@ -108,6 +108,31 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
     return good[0] if good else choices[-1] if largest > 0.0 else choices[0]
 
 
+def rounded(value: float, digits: int) -> str:
+    """A number to so many significant digits; no exponent where up to seven digits before the point do without it."""
+    near = float(f"{value:.{digits}g}")
+    return f"{near:.0f}" if 10.0**digits <= abs(near) < 1e7 else f"{value:.{digits}g}"
+
+
+def measured(value: float, error: float, unit: str) -> str:
+    """A value [SI] with its error, in a unit that reads well, to the second digit of the error.
+
+    The error is left out where it is nan; where it is far below the value's fourth digit, it does not set the
+    digits.
+    """
+    factor, written = scaled(max(value, error) if np.isfinite(error) else value, unit)
+    value, error = factor * value, factor * error
+    if np.isnan(error):
+        return f"{rounded(value, 4)} {written}"
+    if error <= 0.0 or np.isinf(error):
+        return f"{rounded(value, 4)} ± {error:g} {written}"
+    places = 1 - int(np.floor(np.log10(error)))
+    if places > 6 or error < 1e-4 * abs(value):
+        return f"{rounded(value, 4)} ± {rounded(error, 2)} {written}"
+    shown = max(places, 0)
+    return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f} {written}"
+
+
 def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:
     """`scaled` for several series that share an axis."""
     return scaled(max((float(np.abs(v).max(initial=0.0)) for v in values.values()), default=0.0), unit)

@@ -137,13 +137,16 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         share = float(post["contact_time_share"].values[k])
         peak = float(post["peak_force"].values[k])
         pushes = "normal force" if unit == "N" else "torque"
-        told = f"{pushes} ({unit}); {count} impacts, peak {peak:.4g} {unit}, {share:.0%} in contact"
-        _over_time(row[2], run, run["contact_normal_force"].values[:, k], told)
+        _over_time(row[2], run, run["contact_normal_force"].values[:, k])
+        row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
+        # a line of its own: beside the title it would be cut off
+        told = f"{count} impacts, peak {peak:.4g} {unit}, {share:.0%} of the time in contact"
+        row[2].text(0.0, 1.015, told, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 
 
-def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str) -> None:
+def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str = "") -> None:
     time = 1e3 * run["time"].values
     axes.plot(time, values, color="#D55E00", lw=0.8)
     axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)")

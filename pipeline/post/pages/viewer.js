@@ -143,7 +143,7 @@
       const told = this.told, state = this.root.querySelector(".viewer-state");
       if (told.shapes) {
         const shape = told.shapes[this.shape];
-        state.textContent = `${shape.label}; drawn ${shown(this.factor * shape.scale * told.unit)} times per unit of its coordinate`;
+        state.textContent = `${shape.label}; drawn with its coordinate at ${shown(this.factor * shape.scale * told.unit)}`;
       } else {
         const bent = this.meshes.some((mesh) => mesh.fields.length);
         state.textContent = `t = ${(1e3 * told.times[this.frame]).toFixed(2)} ms`

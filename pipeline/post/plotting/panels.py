@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -144,7 +144,7 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     axes.set_ylim(-top, top)
     axes.set_yticks([-top, 0.0, top])
     axes.minorticks_off()
-    told = f"linear within ±{linear:.0e}"
+    told = f"linear within ±{linear:.0e}, logarithmic beyond"
     axes.text(0.995, 0.03, told, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 
@@ -160,34 +160,47 @@ def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clea
     The path itself is 60 mm long: nothing is seen on it.
     """
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    paths = {motion.model.scene: _ball_apart(motion, reference) for motion in others}
+    factor, unit = _short(clearance, paths.values())
     if clearance > 0.0:
-        axes.plot(clearance * np.cos(turn), clearance * np.sin(turn), color=style.SOFT, lw=0.9, ls=":")
-        axes.annotate("clearance", (0.0, clearance), ha="center", va="bottom", fontsize=7.6, color=style.SOFT)
+        edge = factor * clearance
+        axes.plot(edge * np.cos(turn), edge * np.sin(turn), color=style.SOFT, lw=0.9, ls=":")
+        axes.annotate("clearance", (0.0, edge), ha="center", va="bottom", fontsize=7.6, color=style.SOFT)
     for motion in sorted(others, key=lambda m: not m.model.ours):
-        i, j = common_times(motion.time, reference.time)
-        x, _, z = (motion.ball[i] - reference.ball[j]).T
-        inside = motion.time[i] <= motion.horizon
+        time, apart = paths[motion.model.scene]
+        x, _, z = factor * apart.T
+        inside = time <= motion.horizon
         axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
         axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
     axes.plot(0.0, 0.0, "+", color=reference.model.color, ms=8, mew=1.4, zorder=4)
-    axes.set_xlabel("x minus ideal (mm)")
-    axes.set_ylabel("z minus ideal (mm)")
+    axes.set_xlabel(f"x minus ideal ({unit})")
+    axes.set_ylabel(f"z minus ideal ({unit})")
     axes.locator_params(nbins=6)
-    axes.ticklabel_format(style="sci", scilimits=(-3, 4))
     axes.set_aspect("equal", adjustable="datalim")
 
 
 def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> None:
-    """Distance of the ball's centre from where the ideal model has it, over time [mm]."""
-    for motion in others:
-        i, j = common_times(motion.time, reference.time)
-        distance = np.linalg.norm(motion.ball[i] - reference.ball[j], axis=1)
-        _curve(axes, motion, distance, 0.9, motion.time[i])
+    """Distance of the ball's centre from where the ideal model has it, over time."""
+    paths = [_ball_apart(motion, reference) for motion in others]
+    factor, unit = _short(0.0, paths)
+    for motion, (time, apart) in zip(others, paths, strict=True):
+        _curve(axes, motion, factor * np.linalg.norm(apart, axis=1), 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("time (s)")
-    axes.set_ylabel("from ideal\nmm")
-    axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+    axes.set_ylabel(f"from ideal\n{unit}")
+
+
+def _ball_apart(motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Common times, and where the ball's centre is minus where the reference has it [mm], (t, 3)."""
+    i, j = common_times(motion.time, reference.time)
+    return motion.time[i], motion.ball[i] - reference.ball[j]
+
+
+def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[float, str]:
+    """Factor and unit of lengths [mm] that are drawn: micrometres where all are below a tenth of a millimetre."""
+    largest = max([least, *(float(np.abs(apart).max()) for _, apart in paths)])
+    return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
 
 
 def _curve(axes: Axes, motion: Motion, values: np.ndarray, width: float, time: np.ndarray | None = None) -> None:
