@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib import import_module
 from typing import Any, cast
 
 import numpy as np
@@ -75,14 +74,18 @@ def png(pixels: np.ndarray) -> bytes:
 
 
 def _still(shown: Shown) -> dict[str, bytes]:
-    film = _film_module()
+    _must_draw()
+    from flexclear.pipeline.post.render import film
+
     drawn = shown.mechanism()
     return {"mechanism.png": png(film.still(drawn, _farthest(drawn.run)))}
 
 
 def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     def make_film(shown: Shown) -> dict[str, bytes]:
-        film = _film_module()
+        _must_draw()
+        from flexclear.pipeline.post.render import film
+
         drawn = shown.mechanism()
         suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind)
         return {f"film.{suffix}": content}
@@ -90,11 +93,10 @@ def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     return make_film
 
 
-def _film_module(name: str = "film") -> Any:
-    """Pyvista is imported only where it can draw: without GL libraries it ends the process."""
+def _must_draw() -> None:
+    """Before pyvista is imported: without GL libraries it ends the process."""
     if not gl.works():
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
-    return import_module(f"flexclear.pipeline.post.render.{name}")
 
 
 def _motion_page(shown: Shown) -> dict[str, bytes]:
@@ -236,7 +238,9 @@ def _vibration_page(shown: Shown) -> dict[str, bytes]:
 
 
 def _vibration_sheet(shown: Shown) -> dict[str, bytes]:
-    film = _film_module("vibration_film")
+    _must_draw()
+    from flexclear.pipeline.post.render import vibration_film as film
+
     return {"vibrations.png": png(film.sheet(*_vibrating(shown)))}
 
 
@@ -244,7 +248,9 @@ def _vibration_film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     def make_film(shown: Shown) -> dict[str, bytes]:
         from flexclear.pipeline.post.render import writing
 
-        film = _film_module("vibration_film")
+        _must_draw()
+        from flexclear.pipeline.post.render import vibration_film as film
+
         rate = writing.RATE if kind == "mp4" else writing.RATE // 2
         pictures = film.frames(*_vibrating(shown), rate, shown.progress)
         suffix, content = writing.write(pictures, rate, kind)
