@@ -58,7 +58,7 @@ TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"platform.
         ("[]", "expected a table of scenes"),
         ('{"a": 1}', "expected a list of tracks"),
         ('{"a": [{"name": "x"}]}', "a track needs name, seconds and error"),
-        ('{"a": [{"name": "x", "seconds": ["1"], "error": {}}]}', "lists of numbers"),
+        ('{"a": [{"name": "x", "seconds": ["1"], "error": {}}]}', "lists of finite numbers"),
         ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "another number of errors"),
     ],
 )
