@@ -30,24 +30,10 @@ from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
 from flexclear.stages import cost_peers, run
+from tests.properties.test_hostile_scenes import BASE
 
 #: processor time [s] of a refusal; measured at most 0.1 s, the reader's first import aside
 SECONDS = 1.0
-BASE = """
-title = "sound"
-time.end = "1 s"
-[body.ground]
-type = "ground"
-frames.O = {}
-[body.crank]
-type = "rigid"
-mass = 1.0
-inertia = [0.1, 0.1, 0.1]
-frames.A = {}
-[joint.A]
-type = "revolute"
-between = ["ground.O", "crank.A"]
-"""
 DRIVE = '\n[drive.d]\njoint = "A"\nlaw = '
 HARMONIC = '{ type = "harmonic", amplitude = 1, frequency = 1 }'
 
