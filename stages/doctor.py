@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from flexclear.pipeline.core import machine
+from flexclear.pipeline.core import machine, system
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
@@ -32,6 +32,8 @@ LIBRARIES = (
 OPTIONAL = ("pyvista", "vtk", "imageio")
 #: least space that is no reason to worry [B]
 LITTLE_MEMORY, LITTLE_DISK = 1e9, 2e9
+#: characters of the longest path below the results, but for names of scenes that are longer than usual
+DEEPEST = 130
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
 GRAVITY, T = 9.81, 0.1
 SCENE = f"""
@@ -109,19 +111,23 @@ def findings() -> Iterator[tuple[str, str, bool]]:
     missing = [name for name in LIBRARIES if versions[name] == "absent"]
     yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
     yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
-    root = results_root()
-    yield (
-        "results",
-        f"{root}, {machine.size(machine.disk(root))} free",
-        machine.disk(root) > LITTLE_DISK and _writable(root),
-    )
+    yield "results", *_results(results_root())
     yield "kernels", *_kernels()
     yield "graphics", *_graphics()
     yield "self-test", *_self_test()
 
 
-def _writable(folder: Path) -> bool:
-    return os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK)
+def _results(root: Path) -> tuple[str, bool]:
+    """The folder of results, the space there, and what else keeps results from being written."""
+    free = machine.disk(root)
+    wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
+    if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
+        wrong.append("nothing can be written there: FLEXCLEAR_RESULTS names another folder")
+    if len(str(root)) + DEEPEST > system.longest_path():
+        wrong.append(
+            f"longer than paths to files may be here ({system.longest_path()} characters with {DEEPEST} of ours)"
+        )
+    return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
 
 
 def _kernels() -> tuple[str, bool]:
@@ -145,13 +151,15 @@ def _graphics() -> tuple[str, bool]:
 
 def _self_test() -> tuple[str, bool]:
     expected = -0.5 * GRAVITY * T**2
+    paths = os.pathsep.join([str(TREE), os.environ.get("PYTHONPATH", "")])  # where the libraries may be, too
     with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8")
+        (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
         done = subprocess.run(
             [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
-            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "FLEXCLEAR_RESULTS": folder, "PYTHONPATH": str(TREE)},
+            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "FLEXCLEAR_RESULTS": folder, "PYTHONPATH": paths},
             capture_output=True,
-            text=True,
+            encoding="utf-8",
+            errors="replace",
             check=False,
         )
     lines = done.stdout.split()
