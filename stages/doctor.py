@@ -31,7 +31,7 @@ LIBRARIES = (
 #: without these only pictures of shapes are missing
 OPTIONAL = ("pyvista", "vtk", "imageio")
 #: least space that is no reason to worry [B]
-LITTLE_MEMORY, LITTLE_DISK = 1e9, 2e9
+LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
 #: characters of the longest path below the results, but for names of scenes that are longer than usual
 DEEPEST = 130
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
@@ -54,7 +54,11 @@ pose = {{}}
 #: run apart, where nothing is compiled: that would take longer than all else
 RUN = """import sys
 from flexclear import pipeline
-found = pipeline.run(sys.argv[1])
+from flexclear.pipeline.core.errors import FlexclearError
+try:
+    found = pipeline.run(sys.argv[1])
+except FlexclearError as error:
+    sys.exit(str(error))
 print(float(found.position.sel(body="ball", axis="z")[-1]))
 """
 #: integration is exact to its tolerance, 1e-10 of metres
@@ -138,7 +142,12 @@ def _kernels() -> tuple[str, bool]:
         folder = writable(kernel_root(), said.append)
     except FlexclearError as error:
         return str(error), False
-    return said[0] if said else f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled", not said
+    if said:
+        return f"{said[0]}: FLEXCLEAR_KERNELS names another folder", False
+    text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
+    if machine.disk(folder) < LITTLE_FOR_KERNELS:
+        return f"{text}; only {machine.size(machine.disk(folder))} free: FLEXCLEAR_KERNELS names another folder", False
+    return text, True
 
 
 def _graphics() -> tuple[str, bool]:
@@ -152,18 +161,26 @@ def _graphics() -> tuple[str, bool]:
 def _self_test() -> tuple[str, bool]:
     expected = -0.5 * GRAVITY * T**2
     paths = os.pathsep.join([str(TREE), os.environ.get("PYTHONPATH", "")])  # where the libraries may be, too
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
-        done = subprocess.run(
-            [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
-            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "FLEXCLEAR_RESULTS": folder, "PYTHONPATH": paths},
-            capture_output=True,
-            encoding="utf-8",
-            errors="replace",
-            check=False,
-        )
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
+            # results and kernels have lines of their own
+            apart = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
+            done = subprocess.run(
+                [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
+                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **apart},
+                capture_output=True,
+                encoding="utf-8",
+                errors="replace",
+                check=False,
+            )
+    except OSError as error:
+        return f"a free fall cannot be computed: {error.strerror} ({error.filename})", False
     lines = done.stdout.split()
     if done.returncode or not lines:
-        return f"a free fall cannot be computed: {done.stderr.strip().splitlines()[-1:]}", False
+        said = done.stderr.strip().splitlines()
+        # of a traceback only the last line is for users
+        told = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        return f"a free fall cannot be computed: {' '.join(line.strip() for line in told)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine
