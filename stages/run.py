@@ -347,7 +347,7 @@ def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
 
 def _edits(settings: Sequence[str]) -> str:
     """What was changed, as part of a folder's name: of what is long the beginning, and a digest of the whole."""
-    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings)
+    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
     return told if len(told.encode()) <= LONGEST_EDITS else f"{told[:40]},{sha256(told.encode())[:16]}"
 
 
