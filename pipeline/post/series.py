@@ -131,8 +131,3 @@ def _peak_force(run: xr.Dataset) -> np.ndarray:
 def parameters(run: xr.Dataset) -> dict:
     """The scene's parameters as the run's attributes tell them; empty when they do not."""
     return json.loads(run.attrs.get("parameters", "{}"))
-
-
-def assumptions(run: xr.Dataset) -> dict[str, str]:
-    """Place -> ``assumed: why``, as the run's attributes tell them."""
-    return json.loads(run.attrs.get("assumptions", "{}"))
