@@ -56,6 +56,7 @@ PROTOTYPES = {
     "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, *_TABLE_AT),
     "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
 }
+LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _INTEGER)
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
@@ -97,11 +98,24 @@ class Entry:
         """Step to the end of the segment or of the budget."""
         self._advance(_tables(h, f, w, n), 0.0, -1, outputs, rows, events)
 
+    def advancing(
+        self,
+        h: np.ndarray,
+        f: np.ndarray,
+        w: np.ndarray,
+        n: np.ndarray,
+        outputs: np.ndarray,
+        rows: np.ndarray,
+        events: np.ndarray,
+    ) -> tuple[int, list[int]]:
+        """Address of what `advance` calls, and what that is given, a word each."""
+        given = _advancing(_tables(h, f, w, n), 0, -1, outputs, rows, events)
+        return self.addresses["advance"], given
+
     def _advance(
         self, tables: tuple, t: float, repeat: int, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray
     ) -> None:
-        record = (place(rows), *rows.shape, place(events), *events.shape)
-        self._functions["advance"](*tables, t, repeat, place(outputs), len(outputs), *record)
+        self._functions["advance"](*_advancing(tables, t, repeat, outputs, rows, events))
 
     def observe(
         self,
@@ -125,6 +139,13 @@ class Entry:
         return {name: prototype(self.addresses[name]) for name, prototype in PROTOTYPES.items()}
 
 
+def _advancing(
+    tables: tuple, t: float, repeat: int, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray
+) -> list[Any]:
+    """Arguments of the compiled function `advance`."""
+    return [*tables, t, repeat, place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
+
+
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
     return place(h, np.int64), place(f), place(w), place(n, np.int64)
 
@@ -136,11 +157,14 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
         return Entry(_addresses(folder, sources.sources(parts, scheme), tell, began))
 
 
-def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None]) -> int:
-    """Address of the right-hand side for one wiring; UnsuitedError when there is none."""
+def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes: int = 0) -> int:
+    """Address of the right-hand side for one wiring; UnsuitedError when there is none.
+
+    lanes: see `sources.specialised`; of several that of what lets as many steppers run (`compile.lanes`).
+    """
     folder, began = writable(kernel_root(), tell), time.monotonic()
     with disk_limits(folder):
-        found = _addresses(folder, {SPECIALISED: sources.specialised(parts, wiring)}, tell, began)
+        found = _addresses(folder, {SPECIALISED: sources.specialised(parts, wiring, lanes)}, tell, began)
     return found[SPECIALISED]
 
 
