@@ -13,12 +13,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics.compile.calls import call
-from flexclear.pipeline.dynamics.compile.stacks import DONE, GIVEN, READY, STATE, TIME, WAITING
+from flexclear.pipeline.dynamics.compile.stacks import DONE, GIVEN, HEAD, READY, STATE, TIME, WAITING
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.specialise.straight import exactly
-
-#: words of the table before the addresses of the records: whether the caller is wanted back
-HEAD = 1
 
 
 def _pointer(kind: Any) -> Any:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import mmap
 import platform
 import sys
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -23,12 +24,13 @@ import numpy as np
 
 #: of a stack [bytes]
 SIZE = 1 << 20
-#: words of a record: stack pointers of the function and of who lets it run; what it is waiting for; the arguments of the
-#: evaluation (h, f, w, n, y, dy, t); the function's address and its arguments (h, f, w, n, t, six integers and places,
-#: then five)
+#: words of a record: stack pointers of the function and of who lets it run; its state; the arguments of the evaluation
+#: that it waits for (h, f, w, n, y, dy, t); its address and arguments (h, f, w, n, t, then nine integers and places)
 POINTER, BACK, STATE, GIVEN, TIME, FUNCTION, ARGUMENTS = 0, 1, 2, 3, 9, 10, 11
 #: states: it may go on, it waits for an evaluation, it has come back, there is none
 READY, WAITING, DONE, IDLE = 0, 1, 2, 3
+#: words of a crew's table before the addresses of its records: whether its thread is wanted back
+HEAD = 1
 #: words of a record, and those that a stack holds before its function has begun
 RECORD, BEGIN = 32, 9
 _SAVED = ("rbp", "rbx", "r12", "r13", "r14", "r15")
@@ -110,7 +112,7 @@ class Stacks:
         self.records = self._words[:, :RECORD]
         self.records[:, STATE] = IDLE
 
-    def begin(self, k: int, function: int, arguments: list[int]) -> None:
+    def begin(self, k: int, function: int, arguments: Sequence[int]) -> None:
         """Let stack k run a function, by its address and that of all its arguments, from the next `resume` on."""
         top = self._words[k, -BEGIN:]
         top[:] = 0

@@ -18,9 +18,6 @@ import numpy as np
 
 from flexclear.pipeline.dynamics.compile import functions, stacks
 
-#: words of the crew's table before the addresses of records, as of `compile.lanes`
-HEAD = 1
-
 
 @dataclass
 class _Steps:
@@ -42,9 +39,9 @@ class Crew:
         self.wait = stacks.addresses()["wait"]
         self._run = functions.LANES(code)
         self._stacks = stacks.Stacks(lanes)
-        self._table = np.zeros(HEAD + lanes, np.int64)
+        self._table = np.zeros(stacks.HEAD + lanes, np.int64)
         self._places = np.zeros(6 * lanes, np.int64)
-        self._table[HEAD:] = [record.ctypes.data for record in self._stacks.records]
+        self._table[stacks.HEAD :] = [record.ctypes.data for record in self._stacks.records]
         self._waiting, self._news, self._closed = deque[_Steps](), Condition(), False
         self._thread = Thread(target=self._work, name="steps side by side", daemon=True)
         self._thread.start()
