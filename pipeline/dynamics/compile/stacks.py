@@ -6,7 +6,8 @@ that address there is `wait`. To stop is to store the registers that a function 
 with another stack: some nanoseconds.
 
 Each stack begins with a record; a function finds its own by its stack pointer, since stacks begin at multiples of their
-size. Kernels neither recurse nor have arrays on the stack; they come nowhere near its end.
+size. Kernels neither recurse nor have arrays on the stack; they come nowhere near its end, and what lies between is
+guarded: to touch it ends the process.
 
 Source: System V Application Binary Interface, AMD64 Architecture Processor Supplement, sec. 3.2 (registers, arguments).
 """
@@ -29,6 +30,8 @@ SIZE = 1 << 20
 POINTER, BACK, STATE, GIVEN, TIME, FUNCTION, ARGUMENTS = 0, 1, 2, 3, 9, 10, 11
 #: states: it may go on, it waits for an evaluation, it has come back, there is none
 READY, WAITING, DONE, IDLE = 0, 1, 2, 3
+#: of mprotect, on every Linux
+NO_ACCESS = 0
 #: words of a crew's table before the addresses of its records: whether its thread is wanted back
 HEAD = 1
 #: words of a record, and those that a stack holds before its function has begun
@@ -101,6 +104,16 @@ def _function(name: str, lines: list[str]) -> str:
     return f'{head} {{\n  call void asm sideeffect "{code}", ""()\n  unreachable\n}}'
 
 
+def _guard(page: int) -> None:
+    """Let nobody touch a page of memory."""
+    import ctypes
+
+    protect = ctypes.CDLL(None, use_errno=True).mprotect
+    protect.argtypes = (ctypes.c_void_p, ctypes.c_size_t, ctypes.c_int)
+    if protect(page, mmap.PAGESIZE, NO_ACCESS):
+        raise OSError(ctypes.get_errno(), "a page of memory cannot be guarded")
+
+
 class Stacks:
     """Room for functions to run on; records: one per stack, not copied, shape (number, RECORD)."""
 
@@ -108,6 +121,8 @@ class Stacks:
         self._memory = mmap.mmap(-1, (number + 1) * SIZE)
         whole = np.frombuffer(self._memory, np.int64)
         first = -whole.ctypes.data % SIZE // 8
+        for k in range(number):
+            _guard(whole.ctypes.data + 8 * first + k * SIZE + mmap.PAGESIZE)
         self._words = whole[first : first + number * SIZE // 8].reshape(number, -1)
         self.records = self._words[:, :RECORD]
         self.records[:, STATE] = IDLE

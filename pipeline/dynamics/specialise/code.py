@@ -31,7 +31,7 @@ INTRINSICS = {
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
 SHORT, CALL = 12, 40
 _NUMBER = ir.IntType(32)
-LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2"}
+LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2", "pow": "pow"}
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def size(block: list[Any], found: Counter[Symbol]) -> int:
         if isinstance(item, Branch):
             total += 1 + sum(size(inner, found) for inner in item.blocks)
         elif found[item]:
-            total += CALL if item.operation == "pow" or item.operation in LIBRARY else 1
+            total += CALL if item.operation in LIBRARY else 1
     return total
 
 
@@ -123,7 +123,7 @@ class Emitter:
     def __init__(self, builder: ir.IRBuilder, program: Program, where: Any, lanes: int = 1, *, exact: bool = False):
         self.builder, self.program, self.where, self.lanes = builder, program, where, lanes
         self.uses = uses(program)
-        self.flags = () if exact else FLAGS
+        self.exact, self.flags = exact, () if exact else FLAGS
         self.fused = fused(program.block, self.uses) if exact else {}
         self.inside_sums = {product for product, _ in self.fused.values()}
         self.types = {kind: one if lanes == 1 else ir.VectorType(one, lanes) for kind, one in TYPES.items()}
@@ -307,8 +307,15 @@ class Emitter:
         return self.builder.call(function, values)
 
     def _call(self, name: str, values: list[Any]) -> Any:
-        """A function of the mathematics library, in one lane."""
+        """A function of the mathematics library, in one lane.
+
+        Exact code has no other in its place, such as one for vectors: the compiler is not to know what it is.
+        """
         module, kind = self.builder.module, TYPES[FLOAT]
-        full = f"{INTRINSICS[name]}.f64" if name in INTRINSICS else LIBRARY[name]
-        function = module.globals.get(full) or ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), full)
+        full = LIBRARY[name] if self.exact or name not in INTRINSICS else f"{INTRINSICS[name]}.f64"
+        function = module.globals.get(full)
+        if function is None:
+            function = ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), full)
+            if self.exact:
+                function.attributes.add("nobuiltin")
         return self.builder.call(function, values)
