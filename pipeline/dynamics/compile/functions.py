@@ -94,28 +94,29 @@ class Entry:
         outputs: np.ndarray,
         rows: np.ndarray,
         events: np.ndarray,
+        by: Callable[[int, list[int]], None] | None = None,
     ) -> None:
-        """Step to the end of the segment or of the budget."""
-        self._advance(_tables(h, f, w, n), 0.0, -1, outputs, rows, events)
+        """Step to the end of the segment or of the budget.
 
-    def advancing(
+        by: what is to call the compiled function, given its address and a word for each of its arguments.
+        """
+        self._advance(_tables(h, f, w, n), 0, -1, outputs, rows, events, by)
+
+    def _advance(
         self,
-        h: np.ndarray,
-        f: np.ndarray,
-        w: np.ndarray,
-        n: np.ndarray,
+        tables: tuple,
+        t: float,
+        repeat: int,
         outputs: np.ndarray,
         rows: np.ndarray,
         events: np.ndarray,
-    ) -> tuple[int, list[int]]:
-        """Address of what `advance` calls, and what that is given, a word each."""
-        given = _advancing(_tables(h, f, w, n), 0, -1, outputs, rows, events)
-        return self.addresses["advance"], given
-
-    def _advance(
-        self, tables: tuple, t: float, repeat: int, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray
+        by: Callable[[int, list[int]], None] | None = None,
     ) -> None:
-        self._functions["advance"](*_advancing(tables, t, repeat, outputs, rows, events))
+        record = [place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
+        if by is None:
+            self._functions["advance"](*tables, t, repeat, *record)
+        else:
+            by(self.addresses["advance"], [*tables, 0, repeat, *record])  # steps have their time in w
 
     def observe(
         self,
@@ -137,13 +138,6 @@ class Entry:
         if INTERPRETED:
             return {name: interpreted[self.addresses[name]] for name in PROTOTYPES}
         return {name: prototype(self.addresses[name]) for name, prototype in PROTOTYPES.items()}
-
-
-def _advancing(
-    tables: tuple, t: float, repeat: int, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray
-) -> list[Any]:
-    """Arguments of the compiled function `advance`."""
-    return [*tables, t, repeat, place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:

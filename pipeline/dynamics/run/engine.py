@@ -126,11 +126,9 @@ class Engine:
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or by the crew."""
-        given, crew = (self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events), self.straight.crew
-        if crew is not None and self.h[m.RATES] == crew.wait:
-            crew.advance(*self.entry.advancing(*given))
-        else:
-            self.entry.advance(*given)
+        crew = self.straight.crew
+        by = crew.advance if crew is not None and self.h[m.RATES] == crew.wait else None
+        self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
 
     def view(self, place: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
