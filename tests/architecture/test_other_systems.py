@@ -245,6 +245,12 @@ def test_a_body_with_files_has_no_name_of_a_device(root: Path, name: str) -> Non
         renamed(root, {"rod": name})
 
 
+def test_names_of_many_bytes_are_refused_before_files_are_called_by_them(root: Path) -> None:
+    with pytest.raises(InputError, match="200 bytes in UTF-8 at most"):
+        renamed(root, {"rod": "\u5b57" * 67})
+    renamed(root, {"rod": "\u5b57" * 66})
+
+
 def test_bodies_with_files_differ_by_more_than_capitals(root: Path) -> None:
     with pytest.raises(InputError, match="called as 'rod' but for capitals"):
         renamed(root, {"rod": "rod", "other": "ROD"})
