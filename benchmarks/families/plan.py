@@ -114,7 +114,11 @@ def _silent(share: float | None, text: str) -> None:
 
 def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
     """Inputs with the bundles of fewer modes where the plan takes them."""
-    return inputs | {f"bundle/{body}": inputs[f"fewer/{body}"] for body in modes}
+    from flexclear.stages import s8_plan
+
+    by_count = [level for level in s8_plan.less(inputs) if modes and all(body in level for body in modes)]
+    chosen = next((n for n in by_count if all(n[body].sizes["mode"] == count for body, count in modes.items())), {})
+    return inputs | {f"bundle/{body}": chosen[body] for body in modes}
 
 
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any]) -> tuple[Any, float]:

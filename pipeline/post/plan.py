@@ -101,7 +101,7 @@ def table(found: xr.Dataset) -> Table:
     rows.append(("wanted", "", *wanted, "", ""))
     told = json.loads(found.attrs["planned"])
     notes = [words(found)]
-    notes += [f"{name} keeps {count} modes: its static ones do the same." for name, count in told["modes"].items()]
+    notes += [f"{name} keeps {count} of its modes, which do the same as all." for name, count in told["modes"].items()]
     if told["apart"]:
         notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
     notes.append(
