@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: inputs that are bundles of fewer modes: this, the level, the body
 FEWER = "fewer/"
+#: inputs that are bundles from twice as many elements
+FINER, TWICE = "finer/", 2
 #: reference condition with static modes between interfaces, six for each but one, and those without any
 WITH_STATIC, DIRECTIONS = "craig-bampton", 6
 NORMAL = ("free-free", "fixed-fixed", "cantilever")
@@ -40,18 +42,29 @@ def task(scene: Scene) -> Task:
     for k, counts in enumerate(levels(scene)):
         less = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
         inputs |= {f"{FEWER}{k}/{body}": less.bundle[body] for body in counts}
+    counts = elements(scene)
+    if counts:
+        finer = Graph(edited(scene, {"accuracy": None}), shown=False, recipe={"elements": TWICE})
+        inputs |= {f"{FINER}{body}": finer.bundle[body] for body in counts}
     simulate = s4_simulate.params(scene)
     return Task(
         stage="plan",
         scene=scene.name,
         run="flexclear.stages.s8_plan:run",
-        params={"simulate": simulate, "title": scene.title},
+        params={"simulate": simulate, "title": scene.title, "elements": counts},
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
         modules=s4_simulate.modules(scene),
         folder=f"plan/{scene.name.replace('/', '_')}",
         names={"nc": "plan.nc"},
     )
+
+
+def elements(scene: Scene) -> dict[str, int]:
+    """Numbers of finite elements of flexible bodies whose recipe says one, and which may have twice as many."""
+    found = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
+    most = scene.limits.cells // TWICE
+    return {body: n for body, n in found.items() if isinstance(n, int) and n <= most}
 
 
 def levels(scene: Scene) -> tuple[dict[str, int], ...]:
@@ -109,7 +122,8 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
     own = {name: data for name, data in rigid.items() if _meshed(params["simulate"], name)}
     scene = s4_simulate.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
-    return plan(scene, s4_simulate.bundles(inputs), fewer, filled, progress)
+    meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
+    return plan(scene, s4_simulate.bundles(inputs), fewer, meshes, filled, progress)
 
 
 def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:

@@ -94,4 +94,4 @@ def too_much(most: Mapping[str, float], wanted: Mapping[str, float]) -> str:
     name = max(wanted, key=lambda n: most[n] / wanted[n])
     if not np.isfinite(most[name]):
         return f"without it {name} cannot be told, or has other events"
-    return f"it may change {name} by {most[name]:.2g}, {most[name] / wanted[name]:.2g} times what is wanted"
+    return f"without it {name} may be off by {most[name] / wanted[name]:.2g} times what is wanted"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -105,7 +106,7 @@ def _tried(search: Search, level: int | None, share: float, rtol: float, whole: 
     """A run of a level of modes at a tolerance, given up where it takes longer or loses energy too fast."""
     pilots = search.pilots
     saved = 1.0 if level is None else pilots.saved(level)
-    limits = {
+    limits: dict[str, Any] = {
         "evaluations": int(saved * whole.evaluations / MEMBERS) + 1,
         "ledger_tolerance": OF_LEDGER * CHOSEN * share,
     }

@@ -9,30 +9,33 @@ What is not shown to be small is kept.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Plan
+from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.core.scene.wanted import KINDS, parse
-from flexclear.pipeline.dynamics.linear.play import OF_POSE, Bounds, bounds
+from flexclear.pipeline.dynamics.linear.play import OF_POSE, bounds
+from flexclear.pipeline.dynamics.linear.response import Response, response
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
+from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
 from flexclear.pipeline.dynamics.plan.pilots import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, smooth
 from flexclear.pipeline.dynamics.plan.wanted import wanted_in
-from flexclear.pipeline.dynamics.run.run import integrate
+from flexclear.pipeline.dynamics.run.run import Run, integrate
 
 #: what bounds of clearances, which hold whatever happens, may use up of the budget
 BY_BOUND = 0.9
-#: a bent body vibrates about its quasi-static deflection, by as much again after a sudden load; and half of that more
-#: for what the response leaves out: turning, and loads that follow the vibration
-VIBRATION = 3.0
+#: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
+#: and that loads follow the vibration; beside runs it is 0.7 to 10 times what is true
+OF_RESPONSE = 2.0
 #: effects that cost nothing to keep are dropped below this share of what is wanted
 NEGLIGIBLE = 0.02
 #: why parts go that the motion asked for never feels
@@ -43,13 +46,15 @@ def plan(
     scene: Scene,
     bundles: Mapping[str, xr.Dataset],
     fewer: Sequence[Mapping[str, xr.Dataset]],
+    meshes: Mapping[str, tuple[int, xr.Dataset]],
     filled: Callable[[Scene], Scene],
     progress: Progress,
 ) -> Plan:
     """The decisions for a scene with `[accuracy]`.
 
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, of those that have a choice, levels with the
-    fewest first.  filled: a variant with the rigid bodies that recipes describe filled in.
+    fewest first.  meshes: numbers of elements, and the bodies as reduced from twice as many.  filled: a variant
+    with the rigid bodies that recipes describe filled in.
     Raises InputError where nothing is wanted, or the motion itself is below it; SolverError where the scene, or what is
     left of it, cannot be run.
     """
@@ -68,13 +73,14 @@ def plan(
     within_bodies = [e for e in inner if e.within.startswith("body.")]
     ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
     search = Search(pilots, wanted_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
-    found = _bounds(search, [*loose, *soft, *inner]) if loose or soft else Bounds({}, {}, {})
-    _clearances(search, loose, [*soft, *inner], found, ideal)
+    rigid = _rigid(search, [*loose, *soft, *inner]) if loose or soft else None
+    _clearances(search, loose, [*soft, *inner], rigid)
     _interactions(search, soft, inner)
-    _flexibilities(search, soft, loose, inner, found)
+    _flexibilities(search, soft, loose, inner, rigid)
     _confirm(search, soft, inner)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
-    return _finished(search, effects(scene), apart)
+    made = _finished(search, effects(scene), apart)
+    return replace(made, meshes=_meshes(search, meshes))
 
 
 def _plain(scene: Scene) -> Scene:
@@ -83,16 +89,14 @@ def _plain(scene: Scene) -> Scene:
     return edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
 
 
-def _bounds(search: Search, gone: Sequence[Effect]) -> Bounds:
-    scene = search.pilots.variant(gone)
-    if not any(q.kind in OF_POSE for q in search.pilots.chosen):
-        return Bounds({}, {}, {})
-    run = integrate(scene, {}, silent)
+def _rigid(search: Search, gone: Sequence[Effect]) -> Run:
+    """The run of the ideal mechanism."""
+    run = integrate(search.pilots.variant(gone), {}, silent)
     search.pilots.evaluations += int(run.trajectory.counters["evaluations"])
-    return bounds(search.pilots.scene, run, search.pilots.bundles, search.pilots.chosen)
+    return run
 
 
-def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], found: Bounds, ideal: Point) -> None:
+def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
     """Which joints stay loose: by bounds where only the pose is asked for, else by runs of rigid bodies."""
     asked = {q.owner for q in search.pilots.chosen if KINDS[q.kind].owner == "contact"}
     for effect in loose:
@@ -101,7 +105,10 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     free = [effect for effect in loose if effect.owner not in asked]
     if not free:
         return
-    reach = {effect.name: found.clearance.get(effect.owner, {}) for effect in free}
+    pilots, found = search.pilots, dict[str, Mapping[str, float]]()
+    if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
+        found = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
+    reach = {effect.name: found.get(effect.owner, {}) for effect in free}
     total = _sum(reach.values(), search.wanted)
     if search.fits(total, BY_BOUND):
         search.spend(total)
@@ -160,28 +167,35 @@ def _sum(parts: object, wanted: Mapping[str, float]) -> dict[str, float]:
 
 
 def _flexibilities(
-    search: Search, soft: Sequence[Effect], loose: Sequence[Effect], inner: Sequence[Effect], found: Bounds
+    search: Search, soft: Sequence[Effect], loose: Sequence[Effect], inner: Sequence[Effect], rigid: Run | None
 ) -> None:
     """Which bodies stay flexible."""
     if not soft:
         return
-    kept_loose = [e for e in loose if e.name in search.decisions and search.decisions[e.name].kept]
-    bending = {e.name: {n: VIBRATION * v for n, v in found.bending.get(e.owner, {}).items()} for e in soft}
-    if kept_loose:
+    if any(search.decisions[e.name].kept for e in loose):
         bent(search, soft)
         return
-    total = _sum(bending.values(), search.wanted)
-    if search.fits(total):
-        search.spend(total)
+    bundles, bending = search.pilots.bundles, dict[str, Mapping[str, float]]()
+    if rigid is not None:
+        together = response(rigid, bundles, search.pilots.chosen)
         for effect in soft:
-            search.decide(
-                effect, False, RESPONSE, "it bends too little to matter, vibration included", bending[effect.name]
+            alone = (
+                together
+                if len(soft) == 1
+                else response(rigid, {effect.owner: bundles[effect.owner]}, search.pilots.chosen)
             )
-        return
+            bending[effect.name] = _with_margin(alone.influence)
+        total = _with_margin(together.influence)
+        if search.fits(total):
+            search.spend(total)
+            why = f"it bends too little to matter: {_vibrating(together)}"
+            for effect in soft:
+                search.decide(effect, False, RESPONSE, why, bending[effect.name])
+            return
     gone = [*search.gone, *(e for e in inner if e.within.startswith("joint."))]
     there = search.pilots.point(gone)
     dropped: list[Effect] = []
-    for effect in sorted(soft, key=lambda e: max(bending[e.name].values(), default=np.inf)):
+    for effect in sorted(soft, key=lambda e: max(bending.get(e.name, {}).values(), default=np.inf)):
         trial = [*dropped, effect]
         names = {e.name for e in trial}
         variant = search.pilots.point([*gone, *trial, *(e for e in inner if e.within in names)])
@@ -193,6 +207,19 @@ def _flexibilities(
             dropped, left = trial, most
     if dropped:
         search.spend(left)
+
+
+def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
+    """A first-order response with what it may be wrong by."""
+    return {name: OF_RESPONSE * value for name, value in influence.items()}
+
+
+def _vibrating(found: Response) -> str:
+    """The first vibration of the assembled mechanism, and how the loads of the motion excite it."""
+    return (
+        f"the mechanism's first frequency is {found.first:.3g} Hz, and the loads of the ideal motion take that "
+        f"vibration to {found.amplification:.2g} times its quasi-static value"
+    )
 
 
 def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
@@ -258,6 +285,18 @@ def _chosen(search: Search) -> Chosen:
             search.spend(most)
             return smooth(pilots, gone, search.wanted, level)
     return smooth(pilots, gone, search.wanted, None)
+
+
+def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
+    """The finite elements of bodies that stay flexible, judged by what their flexibility does."""
+    scene, found = search.pilots.scene, {}
+    for body, (given, finer) in meshes.items():
+        decision = search.decisions.get(f"body.{body}.modes")
+        if decision is not None and decision.kept:
+            bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
+            duration = scene.time.end - scene.time.start
+            found[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.wanted, duration)
+    return found
 
 
 def _finished(search: Search, every: Sequence[Effect], apart: tuple[str, ...]) -> Plan:
