@@ -148,7 +148,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     there = {name for names in owners.values() for name in names}
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
-    solver = {"integrator": told["integrator"], "rtol": told["rtol"]}
+    solver = {key: told[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in told}
     result = edited(
         fewer,
         {

@@ -52,7 +52,8 @@ class Plan:
     modes: elastic coordinates of kept flexible bodies that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  apart: places of parts that nothing couples to what is asked for.
-    meshes: finite elements of flexible bodies whose recipes tell them.
+    meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
+    is not the usual one.
     """
 
     decisions: tuple[Decision, ...]
@@ -65,6 +66,7 @@ class Plan:
     runs: int
     apart: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
+    ledger_tolerance: float | None = None
 
     @property
     def gone(self) -> tuple[Effect, ...]:

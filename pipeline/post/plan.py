@@ -31,6 +31,7 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
         "modes": dict(plan.modes),
         "integrator": plan.integrator,
         "rtol": plan.rtol,
+        **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "apart": list(plan.apart),
     }
     found = xr.Dataset(

@@ -25,12 +25,16 @@ WHOLE = 1.0
 
 @dataclass(frozen=True)
 class Chosen:
-    """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown."""
+    """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
+
+    ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
+    """
 
     integrator: str
     rtol: float
     error: Mapping[str, float]
     level: int | None = None
+    ledger_tolerance: float | None = None
 
 
 @dataclass

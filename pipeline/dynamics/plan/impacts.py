@@ -25,11 +25,15 @@ LEAST_SEEN = 0.5
 #: looser than that of the pilots where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
 #: of the largest energy error of a run, what one over a part of the time may have, as a share of that part
-OF_LEDGER = 0.5
+OF_LEDGER = 0.25
+#: energy error that the planned run may have then: what it does to what is asked for has been looked at
+LEDGER = 5e-3
+#: levels of modes that leave more than this share of the variables save too little to be tried
+WORTH = 0.85
 #: differences beyond so many budgets are not of the tolerance
 NEAR = 10.0
 #: evaluations times variables of all pilots beyond which nothing more is tried
-MOST_WORK = 2.5e7
+MOST_WORK = 2e7
 
 
 def bent(search: Search, soft: Sequence[Effect]) -> None:
@@ -69,7 +73,7 @@ def quickest(search: Search, usual: str) -> Chosen:
                 search.spend(most)
                 if level is not None:
                     _tell(search, level, apart)
-                return Chosen(QUICK, rtol, most, level)
+                return Chosen(QUICK, rtol, most, level, LEDGER)
             if level is not None and _by_modes(search, most, apart):
                 break
     return unknown
@@ -92,7 +96,7 @@ def _levels(search: Search, share: float) -> Iterator[int]:
     """Levels of fewer modes that may be tried."""
     pilots = search.pilots
     bending = pilots.variant(search.gone).flexible()
-    mine = [level for level in range(len(pilots.fewer)) if pilots.modes(level, bending)]
+    mine = [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
     if mine and share < LEAST_SEEN:
         every = effects(pilots.scene)
         soft = [e for e in every if e.kind == FLEXIBILITY or e.within.startswith("body.")]

@@ -8,8 +8,7 @@ What is not shown to be small is kept.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Collection, Mapping, Sequence
 
 import numpy as np
 import xarray as xr
@@ -79,8 +78,7 @@ def plan(
     _flexibilities(search, soft, loose, inner, rigid)
     _confirm(search, soft, inner)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
-    made = _finished(search, effects(scene), apart)
-    return replace(made, meshes=_meshes(search, meshes))
+    return _finished(search, effects(scene), apart, meshes)
 
 
 def _plain(scene: Scene) -> Scene:
@@ -122,7 +120,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         variant = _rigid_without(search, trial, soft)
         apart = with_doubt(search, search.pilots.between(variant, there), bool(soft))
         most = {name: i.most for name, i in apart.items()}
-        for name, bound in _sum((reach[e.name] for e in trial), search.wanted).items():
+        for name, bound in _sum([reach[e.name] for e in trial], search.wanted).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
         search.judge(effect, small, "its impacts change what is asked for by less", most, apart)
@@ -162,8 +160,9 @@ def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effec
     return search.pilots.point([*trial, *inner])
 
 
-def _sum(parts: object, wanted: Mapping[str, float]) -> dict[str, float]:
-    return {name: sum(part.get(name, np.inf) for part in list(parts)) for name in wanted}  # type: ignore[call-overload]
+def _sum(parts: Collection[Mapping[str, float]], wanted: Mapping[str, float]) -> dict[str, float]:
+    """The sum by quantity, infinite where one of them does not say."""
+    return {name: sum(part.get(name, np.inf) for part in parts) for name in wanted}
 
 
 def _flexibilities(
@@ -299,7 +298,12 @@ def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dic
     return found
 
 
-def _finished(search: Search, every: Sequence[Effect], apart: tuple[str, ...]) -> Plan:
+def _finished(
+    search: Search,
+    every: Sequence[Effect],
+    apart: tuple[str, ...],
+    meshes: Mapping[str, tuple[int, xr.Dataset]],
+) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
     chosen = _chosen(search)
     left = search.pilots.variant(search.gone).flexible()
@@ -319,4 +323,6 @@ def _finished(search: Search, every: Sequence[Effect], apart: tuple[str, ...]) -
         pilots.evaluations,
         len(pilots.points),
         apart,
+        _meshes(search, meshes),
+        chosen.ledger_tolerance,
     )
