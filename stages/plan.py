@@ -149,6 +149,8 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
     solver = {key: told[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in told}
+    if "evaluations" in scene.solver.model_fields_set:
+        solver["evaluations"] = scene.solver.evaluations  # a limit that the scene sets itself
     result = edited(
         fewer,
         {

@@ -75,12 +75,23 @@ class Search:
         self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
 
     def judge(
-        self, effect: Effect, small: bool, why: str, most: Mapping[str, float], apart: Mapping[str, Influence]
+        self,
+        effect: Effect,
+        small: bool,
+        why: str,
+        most: Mapping[str, float],
+        apart: Mapping[str, Influence],
+        besides: str = "",
     ) -> None:
-        """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there."""
+        """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there.
+
+        besides: said before the reason why it is kept.
+        """
         difference = {name: influence.difference for name, influence in apart.items()}
         uncertainty = {name: influence.uncertainty for name, influence in apart.items()}
-        self.decide(effect, not small, PILOT, why if small else too_much(most, self.wanted), difference, uncertainty)
+        self.decide(
+            effect, not small, PILOT, why if small else besides + too_much(most, self.wanted), difference, uncertainty
+        )
 
 
 def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:

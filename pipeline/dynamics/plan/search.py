@@ -36,7 +36,7 @@ BY_BOUND = 0.9
 #: and that loads follow the vibration; beside runs it is 0.7 to 10 times what is true
 OF_RESPONSE = 2.0
 #: effects that cost nothing to keep are dropped below this share of what is wanted
-NEGLIGIBLE = 0.02
+FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
 #: why parts go that the motion asked for never feels
 UNCOUPLED = "nothing couples it to what is asked for"
 
@@ -242,7 +242,7 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
-    """Gravity, friction, damping, stiffening, stops: kept unless a cheap run shows that they do next to nothing."""
+    """Gravity, friction, damping, stiffening, stops: kept unless a cheap run shows that they do little."""
     kept = {d.effect.name for d in search.decisions.values() if d.kept}
     gone = list(search.gone)
     dear = any(d.kept and d.effect.kind == FLEXIBILITY for d in search.decisions.values()) and any(
@@ -262,11 +262,15 @@ def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -
         there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
         apart = search.pilots.between(lost, there)
         most = {name: i.most for name, i in apart.items()}
-        small = search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)) and search.fits(most)
+        small = search.fits(most)
+        free = effect.kind in FREE or bool(effect.within)  # friction of a contact goes along with it
+        if small and free and not search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)):
+            search.judge(effect, False, "", most, apart, "it costs no time, and ")
+            continue
         if small:
             search.spend(most)
             gone.append(effect)
-        search.judge(effect, small, "it does next to nothing", most, apart)
+        search.judge(effect, small, "what it does is small", most, apart)
 
 
 def _chosen(search: Search) -> Chosen:
