@@ -107,7 +107,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
         found = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
     reach = {effect.name: found.get(effect.owner, {}) for effect in free}
-    total = _sum(reach.values(), search.wanted)
+    total = summed(reach.values(), search.wanted)
     if search.fits(total, BY_BOUND):
         search.spend(total)
         for effect in free:
@@ -120,7 +120,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         variant = _rigid_without(search, trial, soft)
         apart = with_doubt(search, search.pilots.between(variant, there), bool(soft))
         most = {name: i.most for name, i in apart.items()}
-        for name, bound in _sum([reach[e.name] for e in trial], search.wanted).items():
+        for name, bound in summed([reach[e.name] for e in trial], search.wanted).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
         search.judge(effect, small, "its impacts change what is asked for by less", most, apart)
@@ -160,7 +160,7 @@ def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effec
     return search.pilots.point([*trial, *inner])
 
 
-def _sum(parts: Collection[Mapping[str, float]], wanted: Mapping[str, float]) -> dict[str, float]:
+def summed(parts: Collection[Mapping[str, float]], wanted: Mapping[str, float]) -> dict[str, float]:
     """The sum by quantity, infinite where one of them does not say."""
     return {name: sum(part.get(name, np.inf) for part in parts) for name in wanted}
 
