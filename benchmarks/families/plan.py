@@ -164,7 +164,7 @@ def show(records: list[Record]) -> dict[str, str]:
         "all dropped": lambda r: str(r["bare"]),
         "clearance kept": lambda r: str(r["loose"]),
         "flexibility kept": lambda r: str(r["soft"]),
-        "of these static": lambda r: str(r["static"]),
+        "of these fewer modes": lambda r: str(r["fewer"]),
         "median planning [s]": lambda r: short(r["planning"]),
     }
     rows = [_together(name, [r for r in done if r["mechanism"] == name]) for name in _names(done)]
@@ -215,7 +215,7 @@ def _together(name: str, mine: list[Record]) -> Record:
         "bare": sum(".clearance" not in k and ".modes" not in k for k in kept),
         "loose": sum(".clearance" in k for k in kept),
         "soft": sum(".modes" in k for k in kept),
-        "static": sum(bool(r["modes"]) for r in mine),
+        "fewer": sum(bool(r["modes"]) for r in mine),
         "planning": float(np.median([r["plan_s"] for r in mine])),
     }
 
