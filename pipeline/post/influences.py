@@ -195,7 +195,8 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 for y, value in zip(place, values, strict=True):
-                    text = "" if np.isfinite(value) and value > 0.0 else "none" if value == 0.0 else "not comparable"
+                    text = "none" if value == 0.0 else "not looked into" if np.isnan(value) else "not comparable"
+                    text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
             if wanted and np.isfinite(wanted.get(chosen[k], np.nan)):
@@ -207,7 +208,7 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
                 panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)
             panel.set_title(f"{chosen[k]} [{found['unit'].values[k]}]")
-        axes.flat[0].invert_yaxis()
+        axes.flat[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
         style.heading(figure, title)
         style.shared_legend(figure, axes.flat[0], 3)
         return style.files(name, figure)
