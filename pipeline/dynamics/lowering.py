@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from numba.core import typed_passes as typed
+from numba.core import untyped_passes as untyped
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
@@ -19,6 +21,9 @@ class Part(JITCodeLibrary):
     """Unoptimised code of a kernel, and which libraries hold what it calls."""
 
     _whole: Any = None
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Nothing: the function that reaches it is optimised as a whole."""
 
     def finalize(self) -> None:
         """Link, optimise and assemble nothing."""
@@ -85,15 +90,42 @@ class PartLowering(NativeLowering):
         return bool(super().run_pass(state))
 
 
+#: Numba's steps that kernels have a use for, in Numba's order. What is left out makes functions of comprehensions and
+#: closures, fuses expressions of arrays, lifts loops and lists what could run in parallel: kernels have none of these,
+#: and each step takes its time on each of some hundred kernels.
+STEPS = (
+    untyped.TranslateByteCode,
+    untyped.FixupArgs,
+    untyped.IRProcessing,
+    untyped.RewriteSemanticConstants,
+    untyped.DeadBranchPrune,
+    untyped.GenericRewrites,
+    untyped.ReconstructSSA,
+    untyped.DeadBranchPrune,
+    typed.NopythonTypeInference,
+    typed.PreLowerStripPhis,
+    typed.NoPythonSupportedFeatureValidation,
+    typed.IRLegalization,
+    typed.AnnotateTypes,
+    PartLowering,
+    typed.NoPythonBackend,
+)
+
+
+def _pipeline() -> PassManager:
+    found = PassManager("kernel")
+    for step in STEPS:
+        found.add_pass(step, step._name)
+    found.finalize()
+    return found
+
+
+PIPELINE = _pipeline()
+
+
 class KernelCompiler(CompilerBase):
     """Numba's pipeline, with `PartLowering`."""
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one; there is no object mode to fall back to."""
-        found = PassManager("kernel")
-        found.passes += DefaultPassBuilder.define_untyped_pipeline(self.state).passes
-        found.passes += DefaultPassBuilder.define_typed_pipeline(self.state).passes
-        for step, description in DefaultPassBuilder.define_nopython_lowering_pipeline(self.state).passes:
-            found.add_pass(PartLowering if step is NativeLowering else step, description)
-        found.finalize()
-        return [found]
+        return [PIPELINE]
