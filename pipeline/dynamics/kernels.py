@@ -92,6 +92,8 @@ def field_reader(place: int, size: int, field: int) -> Any:
 
 
 def _lookup(function: Callable, place: int, size: int, field: int | None) -> Any:
+    if not lowering():
+        return _compiled(function)
     from flexclear.pipeline.dynamics.lookup import Lookup
 
     return Lookup(function.__name__, place, size, field)
