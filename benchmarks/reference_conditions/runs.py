@@ -147,7 +147,7 @@ def _with_clearance(case: Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
 
 
 def layout_rows(members: int) -> Iterator[Row]:
-    """Ideal joints and clearance for layouts of the identified family; of ideal joints deviations from rigid."""
+    """Ideal joints and clearance for each of `design.layouts`; of ideal joints deviations from rigid."""
     place = workplace()
     for number, layout in enumerate(design.layouts()):
         runs = bring(design.of_layout(layout, members), place)
