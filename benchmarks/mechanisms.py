@@ -60,7 +60,7 @@ class State:
 
 
 def mechanism(name: str) -> Mechanism:
-    """A model of the paper's mechanism, such as `far_cb`, with up-to-date bundles; FlexclearError when there are none."""
+    """A model of the paper's mechanism, such as `far_cb`, with fresh bundles; FlexclearError when there are none."""
     scene = load_scene(find_scene(f"sps4/{name}"))
     return Mechanism(name, scene, bundles(scene))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import errors, log, maximal, timing
+from benchmarks import errors, log, maximal, page, timing
 from benchmarks.errors import SAMPLING, Error, Samples
 from benchmarks.exudyn_model import METHODS, holds_at_zero, polynomials, solve
 from benchmarks.families import evaluation, exudyn, growth
