@@ -428,9 +428,15 @@ STATEMENTS = (
         "With ideal joints the rod's flexibility has no effect on angle, displacement and velocity",
         _same_motion,
     ),
-    Statement("6.2.1, Fig. 11(d)", "Nor has it on the acceleration", _same_acceleration),
+    Statement(
+        "6.2.1, Fig. 11(d)",
+        "With ideal joints the rod's flexibility has no effect on the acceleration",
+        _same_acceleration,
+    ),
     Statement("6.2.1, Fig. 11(e)", "The reaction at A1 differs slightly, by a vibration", _slight_vibration),
-    Statement("6.2.1, Fig. 11(f)", "The path of the ball's centre is almost the same", _same_path(*FAR)),
+    Statement(
+        "6.2.1, Fig. 11(f)", "With ideal joints the path of the ball's centre is almost the same", _same_path(*FAR)
+    ),
     Statement("6.2.1, Table 7", "Free-free and fixed-fixed modes give the same with ideal joints", _consistent),
     Statement("6.2.1", "Free-free modes give the right solution where there is no clearance", _free_suitable),
     Statement(
@@ -440,9 +446,13 @@ STATEMENTS = (
     ),
     Statement("6.2.2, Fig. 12(c)", "The velocity does not suffer from clearance", _in_both_layouts(_velocity_free)),
     Statement(
-        "6.2.2, Fig. 12(d), (e)", "Its effect on acceleration and force is conspicuous", _in_both_layouts(_conspicuous)
+        "6.2.2, Fig. 12(d), (e)",
+        "The effect of clearance on acceleration and force is conspicuous",
+        _in_both_layouts(_conspicuous),
     ),
-    Statement("6.2.2, Fig. 12(f)", "It makes the path of the ball's centre significantly different", _other_path),
+    Statement(
+        "6.2.2, Fig. 12(f)", "Clearance makes the path of the ball's centre significantly different", _other_path
+    ),
     Statement(
         "6.2.3, Fig. 13(a)-(c), Figs. 14, 15",
         "With both, angle, displacement and velocity stay those of the ideal model, whatever the mode set",
