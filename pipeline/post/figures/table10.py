@@ -100,8 +100,9 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         "dataset) costs the same whatever the way, stands in a column of its own and is in no ratio. Medians of warm "
         "repeats in one process, ± half their range; a ratio's ± is half of what the ranges of both times leave it.",
         f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
-        f"{told['equal_error']:g} over the first {100 * told['share']:.0f} % of the stroke, where all models can be "
-        "predicted point by point; one whose energy ledger does not close at it, at the next decade at which it does. "
+        f"{told['equal_error']:g} at most over the first {100 * told['share']:.0f} % of the stroke, where all models "
+        "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "
+        "ledger does not close at it, at the next decade at which it does. "
         f"Paper's step: a predictor-corrector at Table 6's step of {told['step']:g} s, contacts noticed at the ends of "
         f"steps, whatever the error. Paper's tolerance: {told['damped']}, a damped implicit method of variable "
         "step, at "
