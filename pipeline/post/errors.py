@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from scipy.interpolate import CubicHermiteSpline
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.quantities import SAME_TIME, common_times
@@ -45,6 +44,8 @@ def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: fl
 
     smooth: a motion without impacts, cubic in between by its accelerations.  Returns the time [s] as well.
     """
+    from scipy.interpolate import CubicHermiteSpline
+
     time = run.time.values
     inside = time <= min(until, smooth.time.values[-1]) + SAME_TIME * time[-1]
     mine, other = (one.sel(body=body, axis="z") for one in (run, smooth))
