@@ -10,11 +10,10 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.paths import TREE
-from flexclear.pipeline.core.quantities import common_times
-from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
+from flexclear.pipeline.post.figures import measured
+from flexclear.pipeline.post.figures.measured import APART, SLIGHT, Data, apart, mode_set
 from flexclear.pipeline.post.figures.table10 import ratios
 from flexclear.pipeline.post.models import (
-    BALL_FRAME,
     CSJ,
     FAR,
     FAR_CB,
@@ -61,16 +60,13 @@ NEEDS = (
 
 #: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
 SECTIONS = TREE / "docs/chaos/verdicts.csv"
-#: two answers agree, or an effect is slight, below this share; one that has no influence is below SMALL
-SLIGHT, SMALL = 0.1, 0.05
-#: means over the members of two ensembles differ when they do by more than this many of their standard deviations, too
-APART = 2.0
+#: an effect that has no influence is below this share; one that is slight, and answers that agree, below SLIGHT
+SMALL = 0.05
 #: a cost agrees with the paper's within this factor
 NEAR = 1.5
 #: shares below this are rounding of the runs
 ROUNDING = 1e-9
 HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
-Data = Mapping[str, xr.Dataset]
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so
 
 
@@ -102,48 +98,14 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
 HEADS = ("place", "statement", "verdict", "numbers")
 
 
-def _moved(data: Data, model: Model, ideal_model: Model = IDEAL) -> Deviation:
-    """Largest deviations from the ideal model; of a model with an ensemble the means over the members."""
-    ideal = data[f"{ideal_model.scene}:run"]
-    if f"{model.scene}:ensemble" not in data:
-        return max_deviation(data[f"{model.scene}:run"], ideal, PLATFORM)
-    members = ensemble_deviations(data[f"{model.scene}:ensemble"], ideal, PLATFORM)
-    names = ("angle", "rotation", "displacement", "velocity", "until")
-    return Deviation(**{name: float(np.mean([getattr(m, name) for m in members])) for name in names})
-
-
-def _sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:
-    """Largest values of the ideal model's own motion."""
-    run, post = data[f"{ideal_model.scene}:run"], data[f"{ideal_model.scene}:post"]
-    z = np.abs(post.displacement.sel(body=PLATFORM, axis="z").values).max()
-    v = np.abs(run.velocity.sel(body=PLATFORM, axis="z").values).max()
-    angle = np.abs(post.rotation_y.sel(body=PLATFORM).values).max()
-    return Deviation(float(angle), float(angle), float(z), float(v), float(run.time.values[-1]))
-
-
-def _reaction(data: Data, model: Model) -> float:
-    """Largest force at A1 [N], with clearance the normal one; of ensembles the mean of the members' largest."""
-    if f"{model.scene}:ensemble" in data:
-        return float(data[f"{model.scene}:ensemble"].peak_force.sel(contact=JOINT).mean())
-    post = data[f"{model.scene}:post"]
-    return float(post.peak_force.sel(contact=JOINT) if "contact" in post.sizes else post.peak_reaction.sel(joint=JOINT))
-
-
-def _acceleration(data: Data, model: Model) -> float:
-    """Largest vertical acceleration of the platform [m/s^2]."""
-    if f"{model.scene}:ensemble" in data:
-        return float(data[f"{model.scene}:ensemble"].peak_acceleration.sel(body=PLATFORM, axis="z").mean())
-    return float(data[f"{model.scene}:post"].peak_acceleration.sel(body=PLATFORM, axis="z"))
-
-
 def _verdict(*tests: bool) -> str:
     return HOLDS if all(tests) else (PARTLY if any(tests) else NOT)
 
 
 def _same_motion(data: Data) -> Outcome:
-    own, shares = _sizes(data), []
+    own, shares = measured.sizes(data), []
     for model in FAR:
-        moved = _moved(data, model)
+        moved = measured.moved(data, model)
         shares.append(
             max(moved.angle / own.angle, moved.displacement / own.displacement, moved.velocity / own.velocity)
         )
@@ -153,9 +115,9 @@ def _same_motion(data: Data) -> Outcome:
 
 
 def _same_acceleration(data: Data) -> Outcome:
-    largest = _acceleration(data, IDEAL)
-    shares = {model: _apart(data, model, _vertical).max() / largest for model in FAR}
-    told = ", ".join(f"{100 * share:.2g} % ({_set(model)})" for model, share in shares.items() if share > ROUNDING)
+    largest = measured.acceleration(data, IDEAL)
+    shares = {model: apart(data, model, measured.vertical).max() / largest for model in FAR}
+    told = ", ".join(f"{100 * share:.2g} % ({mode_set(model)})" for model, share in shares.items() if share > ROUNDING)
     return _verdict(*(share < SMALL for share in shares.values())), f"it changes by {told or 'nothing'} of the largest"
 
 
@@ -163,10 +125,10 @@ def _same_path(*models: Model) -> Callable[[Data], Outcome]:
     """Whether the ball's centre stays beside the ideal model's; as a share of how far that moves."""
 
     def told(data: Data) -> Outcome:
-        ideal = _centre(data[f"{IDEAL.scene}:run"])
+        ideal = measured.centre(data[f"{IDEAL.scene}:run"])
         stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
-        off = {model: float(np.linalg.norm(_apart(data, model, _centre), axis=1).max()) for model in models}
-        words = ", ".join(f"{_set(model) or model.label} {_length(far)}" for model, far in off.items())
+        off = {model: float(np.linalg.norm(apart(data, model, measured.centre), axis=1).max()) for model in models}
+        words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
         return _verdict(*(far < SMALL * stroke for far in off.values())), (
             f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
         )
@@ -184,37 +146,15 @@ def _length(far: float) -> str:
     return f"{1e3 * far:.2g} mm" if 1e3 * far > NOISE else "nothing"
 
 
-def _vertical(run: xr.Dataset) -> np.ndarray:
-    values: np.ndarray = run.acceleration.sel(body=PLATFORM, axis="z").values
-    return values
-
-
-def _centre(run: xr.Dataset) -> np.ndarray:
-    values: np.ndarray = run.frame_position.sel(frame=BALL_FRAME).values
-    return values
-
-
-def _force(run: xr.Dataset) -> np.ndarray:
-    values: np.ndarray = run.joint_force.sel(joint=JOINT).values
-    return values
-
-
-def _apart(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
-    """Sizes of the differences from the ideal model at the outputs that both have."""
-    run, ideal = data[f"{model.scene}:run"], data[f"{IDEAL.scene}:run"]
-    i, j = common_times(run.time.values, ideal.time.values)
-    return np.abs(of(run)[i] - of(ideal)[j])
-
-
 def _slight_vibration(data: Data) -> Outcome:
-    ideal = _reaction(data, IDEAL)
-    found = {m: _reaction(data, m) for m in FAR}
-    told = ", ".join(f"{_set(m)} {force:.0f} N" for m, force in found.items())
+    ideal = measured.reaction(data, IDEAL)
+    found = {m: measured.reaction(data, m) for m in FAR}
+    told = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in found.items())
     return _verdict(*(force / ideal - 1.0 < SLIGHT for force in found.values())), f"ideal {ideal:.0f} N; {told}"
 
 
 def _consistent(data: Data) -> Outcome:
-    free, fixed, full = (_effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
+    free, fixed, full = (measured.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
     shares = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
     told = ", ".join(f"{100 * share:.2g} % ({name})" for name, share in shares.items())
@@ -224,15 +164,8 @@ def _consistent(data: Data) -> Outcome:
     )
 
 
-def _effects(data: Data, model: Model) -> dict[str, float]:
-    """Largest differences from the ideal model, that of the force at A1 [N] among them."""
-    moved = _moved(data, model)
-    force = float(np.linalg.norm(_apart(data, model, _force), axis=1).max())
-    return {"angle": moved.angle, "displacement": moved.displacement, "velocity": moved.velocity, "force": force}
-
-
 def _free_suitable(data: Data) -> Outcome:
-    free, full = _moved(data, FAR_FREE).velocity, _moved(data, FAR_CB).velocity
+    free, full = measured.moved(data, FAR_FREE).velocity, measured.moved(data, FAR_CB).velocity
     return _verdict(abs(free / full - 1.0) < SLIGHT), (
         f"free-free modes find {1e3 * free:.2g} mm/s of the {1e3 * full:.2g} mm/s that a basis with all static "
         "compliance finds"
@@ -250,7 +183,7 @@ def _in_both_layouts(outcome: Callable[[Data, Model, Model], Outcome]) -> Callab
 
 
 def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
-    own, moved = _sizes(data, ideal), _moved(data, csj, ideal)
+    own, moved = measured.sizes(data, ideal), measured.moved(data, csj, ideal)
     shares = moved.angle / own.angle, moved.displacement / own.displacement
     return _verdict(
         *(s < SMALL for s in shares)
@@ -258,13 +191,13 @@ def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
 
 
 def _velocity_free(data: Data, csj: Model, ideal: Model) -> Outcome:
-    share = _moved(data, csj, ideal).velocity / _sizes(data, ideal).velocity
+    share = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
     return _verdict(share < SMALL), f"{100 * share:.1f} % of the largest velocity"
 
 
 def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
-    force = _reaction(data, ideal), _reaction(data, csj)
-    acceleration = _acceleration(data, ideal), _acceleration(data, csj)
+    force = measured.reaction(data, ideal), measured.reaction(data, csj)
+    acceleration = measured.acceleration(data, ideal), measured.acceleration(data, csj)
     return _verdict(force[1] > 2.0 * force[0], acceleration[1] > 2.0 * acceleration[0]), (
         f"force {force[0]:.0f} to {force[1]:.0f} N, acceleration {acceleration[0]:.0f} to {acceleration[1]:.0f} m/s²"
     )
@@ -272,17 +205,20 @@ def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
 
 def _lowered(data: Data) -> Outcome:
     models = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
-    force, acceleration = [_reaction(data, m) for m in models], [_acceleration(data, m) for m in models]
-    told = "; ".join(f"{_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True))
-    rigid = _reaction(data, CSJ), _acceleration(data, CSJ)
+    force = [measured.reaction(data, m) for m in models]
+    acceleration = [measured.acceleration(data, m) for m in models]
+    told = "; ".join(
+        f"{mode_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True)
+    )
+    rigid = measured.reaction(data, CSJ), measured.acceleration(data, CSJ)
     tests = [f < rigid[0] and a < rigid[1] for f, a in zip(force, acceleration, strict=True)]
     return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {told}"
 
 
 def _motion_kept(data: Data) -> Outcome:
     """Angle and displacement are those of the ideal model, and none depends on the mode set."""
-    own, shares = _sizes(data), []
-    moved = {model: _moved(data, model) for model in FAR_CSJ}
+    own, shares = measured.sizes(data), []
+    moved = {model: measured.moved(data, model) for model in FAR_CSJ}
     for m in moved.values():
         shares.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
     largest = np.max(shares, axis=0)
@@ -298,7 +234,7 @@ def _paths_differ(data: Data) -> Outcome:
     """The ball's path in the socket, by what can be said of it beyond the horizon: statistics of the members."""
     free, fixed = (data[f"{model.scene}:ensemble"].sel(contact=JOINT) for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED))
     names = {"impact_count": ("impacts", 1.0), "contact_time_share": ("% of the time in contact", 100.0)}
-    tests = [_differ(free[name].values, fixed[name].values) for name in names]
+    tests = [measured.differ(free[name].values, fixed[name].values) for name in names]
     told = [
         f"{factor * free[n].mean():.0f} ± {factor * free[n].std(ddof=1):.0f} and "
         f"{factor * fixed[n].mean():.0f} ± {factor * fixed[n].std(ddof=1):.0f} {words}"
@@ -307,21 +243,16 @@ def _paths_differ(data: Data) -> Outcome:
     return _verdict(*tests), f"free-free and fixed-fixed: {'; '.join(told)}"
 
 
-def _differ(a: np.ndarray, b: np.ndarray) -> bool:
-    gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
-    return bool(gap > SLIGHT * abs(b.mean()) and gap > APART * spread)
-
-
 def _dashpot(data: Data) -> Outcome:
     """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
-    ideal = _vertical(data[f"{IDEAL.scene}:run"])
-    rigid = float(np.sqrt(np.mean(_apart(data, CSJ, _vertical) ** 2)))
+    ideal = measured.vertical(data[f"{IDEAL.scene}:run"])
+    rigid = float(np.sqrt(np.mean(apart(data, CSJ, measured.vertical) ** 2)))
     found = {}
     for model in FAR_CSJ:
         members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
         found[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
     count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=JOINT).mean()) for m in FAR_CSJ}
-    told = "; ".join(f"{_set(m)} {found[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
+    told = "; ".join(f"{mode_set(m)} {found[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
     return _verdict(*(size < rigid for size in found.values())), (
         f"vibration CSJ {rigid:.0f} m/s² and {int(data[f'{CSJ.scene}:post'].impact_count.sel(contact=JOINT))} impacts; "
         f"{told}; without structural damping the rod takes no energy out of the mechanism"
@@ -329,8 +260,8 @@ def _dashpot(data: Data) -> Outcome:
 
 
 def _sets_differ(data: Data) -> Outcome:
-    force = [_reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
-    acceleration = [_acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
+    force = [measured.reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
+    acceleration = [measured.acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
     apart = [abs(a / b - 1.0) for a, b in (force, acceleration)]
     return _verdict(
         *(a > SLIGHT for a in apart)
@@ -338,10 +269,10 @@ def _sets_differ(data: Data) -> Outcome:
 
 
 def _fixed_right(data: Data) -> Outcome:
-    best = _reaction(data, FAR_CSJ_CB), _acceleration(data, FAR_CSJ_CB)
+    best = measured.reaction(data, FAR_CSJ_CB), measured.acceleration(data, FAR_CSJ_CB)
     off = {}
     for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED):
-        off[model] = _reaction(data, model) / best[0] - 1.0, _acceleration(data, model) / best[1] - 1.0
+        off[model] = measured.reaction(data, model) / best[0] - 1.0, measured.acceleration(data, model) / best[1] - 1.0
     free, fixed = off[FAR_CSJ_FREE], off[FAR_CSJ_FIXED]
     return _verdict(abs(fixed[0]) < abs(free[0]), abs(fixed[1]) < abs(free[1])), (
         f"against all static compliance: free-free {100 * free[0]:+.0f} % (force), {100 * free[1]:+.0f} % "
@@ -350,7 +281,7 @@ def _fixed_right(data: Data) -> Outcome:
 
 
 def _clearance_dominates(data: Data) -> Outcome:
-    rod, clearance = _moved(data, FAR_CB), _moved(data, CSJ)
+    rod, clearance = measured.moved(data, FAR_CB), measured.moved(data, CSJ)
     shares = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
     return _verdict(*(s < SLIGHT for s in shares)), (
         f"the rod's part of the clearance's: angle {100 * shares[0]:.2g} %, displacement {100 * shares[1]:.2g} %, "
@@ -359,12 +290,12 @@ def _clearance_dominates(data: Data) -> Outcome:
 
 
 def _enlarged(data: Data) -> Outcome:
-    rigid, tests, told = _moved(data, CSJ), [], []
+    rigid, tests, told = measured.moved(data, CSJ), [], []
     for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB):
-        moved = _moved(data, model)
+        moved = measured.moved(data, model)
         rise = [getattr(moved, n) / getattr(rigid, n) - 1.0 for n in ("angle", "displacement", "velocity")]
         tests.append(min(rise) > 0.0)
-        told.append(f"{_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
+        told.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
     return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(told)}"
 
 
@@ -376,7 +307,7 @@ def _costs(*models: Model) -> Callable[[Data], Outcome]:
         for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
             found = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
             tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in found.items()))
-            words.append(f"{name}: " + ", ".join(f"{_set(m) or m.label} {_ratio(r)}" for m, r in found.items()))
+            words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in found.items()))
         printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
         return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
 
@@ -394,7 +325,7 @@ def _becomes_chaotic(data: Data) -> Outcome:
     with SECTIONS.open(newline="") as file:
         found = {row["scene"]: row for row in csv.DictReader(file)}
     wanted = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
-    told = [f"{_set(model) or model.label} {_motion(found[model.scene])}" for model in wanted]
+    told = [f"{mode_set(model) or model.label} {_motion(found[model.scene])}" for model in wanted]
     return _verdict(*(found[model.scene]["verdict"] == motion for model, motion in wanted.items())), (
         f"over {found[CSJ.scene]['periods']} repeated strokes: {'; '.join(told)} (chaos.md)"
     )
@@ -416,10 +347,6 @@ def _one_stroke(data: Data) -> Outcome:
         "FAR-CSJ "
         f"runs they part after {min(parts):.0f} to {max(parts):.0f} ms. Sections of a repeated stroke: chaos.md"
     )
-
-
-def _set(model: Model) -> str:
-    return model.label.partition(", ")[2].split(" ")[0]
 
 
 STATEMENTS = (
