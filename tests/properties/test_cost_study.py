@@ -53,7 +53,10 @@ def study(uncertainty: float = 1e-8, horizon: float | None = None, **extra: xr.D
     for k, (rtol, error) in enumerate(((1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-7))):
         points.append(Point(f"d{k}", "tolerance", {"adaptive_integrator": "dop853", "rtol": rtol}))
         runs[f"d{k}"] = run(error, evaluations=100 * (k + 1))
-    for step, made in ((1e-3, run(1e-4, evaluations=50)), (1e-2, xr.Dataset(attrs={"refused": "it blew up"}))):
+    for step, made in (
+        (1e-3, run(1e-4, evaluations=50)),
+        (1e-2, xr.Dataset(attrs={"refused": "it blew up; take another"})),
+    ):
         points.append(Point(f"r{step}", "step", {"fixed_integrator": "rk4", "step": step}))
         runs[f"r{step}"] = made
     return assemble(points, runs, [POSITION, TIMES]), points, runs
@@ -76,6 +79,7 @@ def test_refused_points_are_gaps_with_their_reason():
     found, *_ = study()
     assert np.isnan(found.error_by_step.sel(fixed_integrator="rk4", step=1e-2)).all()
     assert "it blew up" in found.attrs["refused"]
+    assert "take another" not in found.attrs["refused"]
 
 
 def test_errors_near_the_reference_cannot_be_told():

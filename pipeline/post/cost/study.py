@@ -92,9 +92,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         "confirmation": _described(points, "confirmation"),
         "horizon": until if np.isfinite(until) else "none",
         "end": float(reference["time"].values[-1]),
-        "refused": "; ".join(
-            f"{p.key}: {runs[p.key].attrs['refused']}" for p in points if "refused" in runs[p.key].attrs
-        ),
+        "refused": "; ".join(f"{p.key}: {_reason(runs[p.key])}" for p in points if "refused" in runs[p.key].attrs),
         "Conventions": "CF-1.11",
     }
     result = xr.Dataset(data, coords=coordinates, attrs=attributes)
@@ -108,6 +106,11 @@ def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
     found: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
     return found
+
+
+def _reason(refused: xr.Dataset) -> str:
+    """Why a run was refused; what else is to be doubted of it, and what helps, is for those who want that run."""
+    return str(refused.attrs["refused"]).partition(";")[0]
 
 
 def _span(
