@@ -97,6 +97,24 @@ def test_errors_beyond_the_horizon_do_not_count():
     assert ratio == pytest.approx(np.sin(0.2 * np.pi))
 
 
+def test_the_horizon_of_the_confirmation_counts_too():
+    """An impact that only one of both has, beyond what the confirmation can predict, is no uncertainty."""
+    _, points, runs = study(horizon=0.7)
+    runs["other"] = run(1e-8, impacts=2)
+    assert np.isinf(assemble(points, runs, [TIMES]).reference_uncertainty).all()
+    runs["other"] = run(1e-8, impacts=2, horizon=0.5)
+    found = assemble(points, runs, [TIMES])
+    assert found.attrs["horizon"] == 0.5
+    assert float(found.reference_uncertainty[0]) < 1e-7
+
+
+def test_a_reference_that_is_not_confirmed_is_drawn_as_one():
+    _, points, runs = study()
+    runs["other"] = run(1e-8, impacts=2)
+    found = assemble(points, runs, [POSITION, TIMES])
+    assert set(work_precision.make("w", found, "t")) == {"w.png", "w.svg"}
+
+
 def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheapest():
     _, points, runs = study()
     runs["d2"] = run(0.0, impacts=2, evaluations=1)
