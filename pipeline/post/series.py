@@ -7,7 +7,7 @@ import json
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.algebra import first_largest, rotation_between
 from flexclear.pipeline.core.artifacts.schema import conform, require_complete
 from flexclear.pipeline.core.quantities import IMPACT, PARTED
 from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
@@ -88,7 +88,7 @@ def extremes(run: xr.Dataset, reaction: np.ndarray) -> Variables:
     found: Variables = {}
     for name, (dims, values) in series.items():
         found[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
-        found[f"peak_{name}_time"] = (dims, run.time.values[values.argmax(axis=0)])
+        found[f"peak_{name}_time"] = (dims, run.time.values[first_largest(values, axis=0)])
     if "event_peak_force" in run:
         found["peak_force"] = (("contact",), _peak_force(run))
     return found
@@ -131,8 +131,3 @@ def _peak_force(run: xr.Dataset) -> np.ndarray:
 def parameters(run: xr.Dataset) -> dict:
     """The scene's parameters as the run's attributes tell them; empty when they do not."""
     return json.loads(run.attrs.get("parameters", "{}"))
-
-
-def assumptions(run: xr.Dataset) -> dict[str, str]:
-    """Place -> ``assumed: why``, as the run's attributes tell them."""
-    return json.loads(run.attrs.get("assumptions", "{}"))
