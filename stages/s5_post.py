@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    import xarray as xr
+from flexclear.pipeline.core.workflow.task import given_arrays
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
     from flexclear.pipeline.core.progress import Progress
 
 
-def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+@given_arrays
+def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
     """The post dataset (schema POST)."""
-    from flexclear.pipeline.post import derive
+    from flexclear.pipeline.post import derived
 
-    return {"nc": derive(inputs["run"], inputs.get("ensemble"))}
+    return {"nc": derived(inputs["run"], inputs.get("ensemble"))}

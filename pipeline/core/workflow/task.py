@@ -4,17 +4,28 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, library_versions
 
 #: libraries that every artifact passes through on its way to disk
 STORE = "flexclear.pipeline.core.artifacts.store"
+#: attribute of functions that `given_arrays` marks
+ARRAYS = "given_arrays"
 #: made once: `json.dumps` with options makes one for every value
 _JSON = json.JSONEncoder(ensure_ascii=False, default=str)
+
+
+Stage = TypeVar("Stage", bound=Callable[..., Any])
+
+
+def given_arrays(run: Stage) -> Stage:
+    """Marks the function of a stage that is given its inputs as `LabelledArrays`, not as datasets of xarray."""
+    setattr(run, ARRAYS, True)
+    return run
 
 
 @dataclass(frozen=True, eq=False)

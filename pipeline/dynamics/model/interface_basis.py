@@ -6,13 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.sparse_graphs import components
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
