@@ -35,16 +35,17 @@ test-slow: $(READY) ## The tests marked slow
 OTHERS := python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)
 
 interpreters: $(READY) ## A short run under every other Python there is
-	@for p in $(OTHERS); do \
+	@ran=" "; for p in $(OTHERS); do \
 		v=$$($$p -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue; \
-		test -e $(VENV)/others/$$v/.ran-$$$$ && continue; \
+		case "$$ran" in *" $$v "*) continue;; esac; \
+		ran="$$ran$$v "; there=$(VENV)/others/$$v; \
 		echo "-- Python $$v"; \
-		test -x $(VENV)/others/$$v/bin/flexclear || { $$p -m venv $(VENV)/others/$$v && \
-			$(VENV)/others/$$v/bin/pip install -q -c constraints.txt -e .; } || \
-			{ echo "not installed: what it needs is not to be had for Python $$v here"; continue; }; \
-		FLEXCLEAR_RESULTS=$(VENV)/others/$$v/results $(VENV)/others/$$v/bin/python -m flexclear doctor || exit 1; \
-		touch $(VENV)/others/$$v/.ran-$$$$; \
-	done; rm -f $(VENV)/others/*/.ran-$$$$
+		test $$there/.ready -nt constraints.txt && test $$there/.ready -nt pyproject.toml || { \
+			$$p -m venv $$there && $$there/bin/pip install -q --retries 1 --timeout 20 -c constraints.txt -e . && \
+			touch $$there/.ready; } || \
+			{ echo "skipped: what it needs is not to be had for Python $$v here"; continue; }; \
+		FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor || exit 1; \
+	done; test "$$ran" != " " || echo "skipped: there is no other Python here"
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation peers runs growth exudyn

@@ -64,7 +64,7 @@ def main(arguments: list[str] | None = None) -> int:
     rng = random.Random(options.seed)
     with tempfile.TemporaryDirectory(prefix="faults_") as name:
         folder = Path(name)
-        (folder / "sweep.toml").write_text(SWEEP)
+        (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8", newline="\n")
         environment = {**os.environ, "FLEXCLEAR_RESULTS": f"{folder}/results", "FLEXCLEAR_KERNELS": f"{folder}/kernels"}
         print("| what was done | faults | found | harmless | taken |\n|---|---:|---:|---:|---:|")
         found = list[Counter[str]]()

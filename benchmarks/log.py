@@ -46,7 +46,7 @@ def today() -> Session:
 def read(path: Path) -> list[Session]:
     """All sessions of a file, in their order."""
     found: list[Session] = []
-    for line in map(json.loads, path.read_text().splitlines() if path.exists() else ()):
+    for line in map(json.loads, path.read_text(encoding="utf-8").splitlines() if path.exists() else ()):
         if "measured" in line:
             found.append(Session(**line))
         else:
@@ -68,10 +68,10 @@ def latest(path: Path) -> list[Session]:
 def append(path: Path, session: Session, *, history: bool) -> None:
     """Add a session. history: keep what it measured anew; else the older records of its cases go."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("a") as file:
+    with path.open("a", encoding="utf-8", newline="\n") as file:
         file.writelines(_lines(session))
     if not history:
-        path.write_text("".join(line for kept in latest(path) for line in _lines(kept)))
+        path.write_text("".join(line for kept in latest(path) for line in _lines(kept)), encoding="utf-8", newline="\n")
 
 
 def _lines(session: Session) -> list[str]:
@@ -100,7 +100,7 @@ class Memory:
     def __init__(self, family: str, spec: Family, *, trusting: bool = False, folder: Path | None = None) -> None:
         self.spec, self.trusting = spec, trusting
         self.file = (folder or results_root() / "benchmarks") / f"{family}.jsonl"
-        lines = self.file.read_text().splitlines() if self.file.exists() else []
+        lines = self.file.read_text(encoding="utf-8").splitlines() if self.file.exists() else []
         self.known = {line["of"]: line for line in map(json.loads, lines)}
 
     def recall(self, case: Case) -> list[Record] | None:
@@ -116,7 +116,7 @@ class Memory:
         line = {"of": _identity(case), "sources": sources(self.spec, case), "records": records}
         self.known[line["of"]] = line
         self.file.parent.mkdir(parents=True, exist_ok=True)
-        with self.file.open("a") as file:
+        with self.file.open("a", encoding="utf-8", newline="\n") as file:
             file.write(json.dumps(line) + "\n")
 
     def forget(self, cases: list[Case]) -> None:
@@ -124,7 +124,9 @@ class Memory:
         if self.spec.modules is None and self.file.exists():
             for case in cases:
                 self.known.pop(_identity(case), None)
-            self.file.write_text("".join(json.dumps(line) + "\n" for line in self.known.values()))
+            self.file.write_text(
+                "".join(json.dumps(line) + "\n" for line in self.known.values()), encoding="utf-8", newline="\n"
+            )
 
 
 def _identity(case: Case) -> str:
@@ -156,7 +158,7 @@ def _tree() -> Sources:
 def _processor() -> str:
     information = Path("/proc/cpuinfo")
     if information.exists():
-        for line in information.read_text().splitlines():
+        for line in information.read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()

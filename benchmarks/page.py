@@ -43,7 +43,7 @@ def of_page(page: str) -> dict[str, Family]:
 def write(page: str, logs: Path = log.FOLDER, into: Path = DOCS) -> Path:
     """Write a page, and what stands beside it, from the logs in a folder; returns the page."""
     (into / page).parent.mkdir(parents=True, exist_ok=True)
-    (into / page).write_text(text(page, logs))
+    (into / page).write_text(text(page, logs), encoding="utf-8", newline="\n")
     for path, content in beside(page, logs).items():
         (into / path).parent.mkdir(parents=True, exist_ok=True)
         (into / path).write_bytes(content)
@@ -59,7 +59,7 @@ def text(page: str, logs: Path = log.FOLDER) -> str:
             shown = family.show(records(sessions[name]))
             parts |= {name: shown} if isinstance(shown, str) else {f"{name} {part}": of for part, of in shown.items()}
     parts["measured"] = where({name: of for name, of in sessions.items() if of})
-    return filled((DOCS / page).read_text(), parts, f"docs/{page}")
+    return filled((DOCS / page).read_text(encoding="utf-8"), parts, f"docs/{page}")
 
 
 def beside(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:

@@ -196,7 +196,7 @@ def _ends(name: str) -> tuple[str, str]:
 def _recipe(recipe: Path, name: str, material: str, folder: Path) -> Path:
     """The recipe of a rod of another material; of the four-bar's, longer and with its own names of frames."""
     density, modulus, poisson = MATERIALS[material]
-    text = recipe.read_text()
+    text = recipe.read_text(encoding="utf-8")
     text = re.sub(r"(?m)^density = .*$", f"density = {density}", text)
     text = re.sub(r"(?m)^youngs_modulus = .*$", f"youngs_modulus = {modulus}", text)
     text = re.sub(r"(?m)^poisson = .*$", f"poisson = {poisson}", text)
@@ -205,5 +205,5 @@ def _recipe(recipe: Path, name: str, material: str, folder: Path) -> Path:
         text = text.replace("big_end", "B").replace("small_end", "C")
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / f"{name}-{material}.toml"
-    target.write_text(text)
+    target.write_text(text, encoding="utf-8", newline="\n")
     return target

@@ -242,7 +242,8 @@ def report(scene: Scene | str | Path) -> Path:
 def open(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
 
-    Nothing is run.  Raises InputError when there is nothing yet.
+    The path of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that one, under the file's name.
+    Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of this program.
     """
     return _stages("run").results(scene)
 

@@ -11,13 +11,13 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError, InputError
-from flexclear.pipeline.core.foreign import require_file
+from flexclear.pipeline.core.foreign.checks import require_file
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import compose, is_file
 from flexclear.pipeline.core.version import version
@@ -49,7 +49,13 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     if not scene.is_file():
         raise InputError(name, "there is no such file")
     files = _opened(scene, settings)
-    top = Path(os.path.commonpath([path.parent for path in files]))
+    try:
+        top = Path(os.path.commonpath([path.parent for path in files]))
+    except ValueError:
+        raise InputError(name, "has files on several drives", "copy them to one") from None
+    for path in files:
+        if not path.relative_to(top).as_posix().isprintable():
+            raise InputError(str(path), "has a name that other systems cannot read", "rename it")
     done = _run(scene, settings, os.environ)
     hidden = _hidden(top)
     facts = {
@@ -123,7 +129,11 @@ def _run(scene: Path, settings: Sequence[str], environment: Mapping[str, str]) -
     return subprocess.run(
         [sys.executable, "-m", "flexclear", "run", str(scene), *changes, "--verbose"],
         cwd=scene.parent,
-        env={**environment, "PYTHONPATH": os.pathsep.join([str(TREE), environment.get("PYTHONPATH", "")])},
+        env={
+            **environment,
+            "PYTHONPATH": os.pathsep.join([str(TREE), environment.get("PYTHONPATH", "")]),
+            "PYTHONIOENCODING": "utf-8:backslashreplace",
+        },
         capture_output=True,
         text=True,
         encoding="utf-8",
@@ -152,8 +162,15 @@ def _bytes(path: Path, files: Sequence[Path]) -> bytes:
     if path.suffix != ".toml":
         return content
     for other in files:
-        content = content.replace(str(other).encode(), Path(os.path.relpath(other, path.parent)).as_posix().encode())
+        near = Path(os.path.relpath(other, path.parent)).as_posix()
+        for text in _spellings(other):
+            content = content.replace(os.fsencode(text), near.encode())
     return content
+
+
+def _spellings(path: PurePath) -> tuple[str, ...]:
+    """How TOML may write a path: on Windows with two strokes in "...", with one in '...', or with /."""
+    return json.dumps(str(path), ensure_ascii=False)[1:-1], str(path), path.as_posix()
 
 
 def _packed(content: Mapping[str, bytes]) -> bytes:

@@ -143,7 +143,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
         found.append(said)
         for path, file in pictures.items():
             (page.parent / path).write_bytes(file.read_bytes())
-    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"), encoding="utf-8")
+    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"), encoding="utf-8", newline="\n")
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:

@@ -11,7 +11,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from flexclear.pipeline.core import machine
+from flexclear.pipeline.core import machine, system
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
@@ -31,7 +31,9 @@ LIBRARIES = (
 #: without these only pictures of shapes are missing
 OPTIONAL = ("pyvista", "vtk", "imageio")
 #: least space that is no reason to worry [B]
-LITTLE_MEMORY, LITTLE_DISK = 1e9, 2e9
+LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
+#: characters of the longest path below the results, but for names of scenes that are longer than usual
+DEEPEST = 130
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
 GRAVITY, T = 9.81, 0.1
 SCENE = f"""
@@ -52,7 +54,11 @@ pose = {{}}
 #: run apart, where nothing is compiled: that would take longer than all else
 RUN = """import sys
 from flexclear import pipeline
-found = pipeline.run(sys.argv[1])
+from flexclear.pipeline.core.errors import FlexclearError
+try:
+    found = pipeline.run(sys.argv[1])
+except FlexclearError as error:
+    sys.exit(str(error))
 print(float(found.position.sel(body="ball", axis="z")[-1]))
 """
 #: integration is exact to its tolerance, 1e-10 of metres
@@ -109,19 +115,23 @@ def findings() -> Iterator[tuple[str, str, bool]]:
     missing = [name for name in LIBRARIES if versions[name] == "absent"]
     yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
     yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
-    root = results_root()
-    yield (
-        "results",
-        f"{root}, {machine.size(machine.disk(root))} free",
-        machine.disk(root) > LITTLE_DISK and _writable(root),
-    )
+    yield "results", *_results(results_root())
     yield "kernels", *_kernels()
     yield "graphics", *_graphics()
     yield "self-test", *_self_test()
 
 
-def _writable(folder: Path) -> bool:
-    return os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK)
+def _results(root: Path) -> tuple[str, bool]:
+    """The folder of results, the space there, and what else keeps results from being written."""
+    free = machine.disk(root)
+    wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
+    if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
+        wrong.append("nothing can be written there: FLEXCLEAR_RESULTS names another folder")
+    if len(str(root)) + DEEPEST > system.longest_path():
+        wrong.append(
+            f"longer than paths to files may be here ({system.longest_path()} characters with {DEEPEST} of ours)"
+        )
+    return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
 
 
 def _kernels() -> tuple[str, bool]:
@@ -132,7 +142,12 @@ def _kernels() -> tuple[str, bool]:
         folder = writable(kernel_root(), said.append)
     except FlexclearError as error:
         return str(error), False
-    return said[0] if said else f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled", not said
+    if said:
+        return f"{said[0]}: FLEXCLEAR_KERNELS names another folder", False
+    text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
+    if machine.disk(folder) < LITTLE_FOR_KERNELS:
+        return f"{text}; only {machine.size(machine.disk(folder))} free: FLEXCLEAR_KERNELS names another folder", False
+    return text, True
 
 
 def _graphics() -> tuple[str, bool]:
@@ -145,17 +160,27 @@ def _graphics() -> tuple[str, bool]:
 
 def _self_test() -> tuple[str, bool]:
     expected = -0.5 * GRAVITY * T**2
-    with tempfile.TemporaryDirectory() as folder:
-        (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8")
-        done = subprocess.run(
-            [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
-            env={**os.environ, "NUMBA_DISABLE_JIT": "1", "FLEXCLEAR_RESULTS": folder, "PYTHONPATH": str(TREE)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+    paths = os.pathsep.join([str(TREE), os.environ.get("PYTHONPATH", "")])  # where the libraries may be, too
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
+            # results and kernels have lines of their own
+            apart = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
+            done = subprocess.run(
+                [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
+                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **apart},
+                capture_output=True,
+                encoding="utf-8",
+                errors="replace",
+                check=False,
+            )
+    except OSError as error:
+        return f"a free fall cannot be computed: {error.strerror} ({error.filename})", False
     lines = done.stdout.split()
     if done.returncode or not lines:
-        return f"a free fall cannot be computed: {done.stderr.strip().splitlines()[-1:]}", False
+        said = done.stderr.strip().splitlines()
+        # of a traceback only the last line is for users
+        told = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        return f"a free fall cannot be computed: {' '.join(line.strip() for line in told)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import InputError
@@ -15,11 +16,11 @@ def refuse_namesakes(scenes: list[Scene]) -> None:
     """InputError when two files given together have one name."""
     found: dict[str, Path] = {}
     for scene in scenes:
-        path = _file(scene)
-        if path is not None and found.setdefault(scene.name, path) != path:
+        path, name = _file(scene), portable.folded(scene.name)  # as Windows and macOS name folders
+        if path is not None and found.setdefault(name, path) != path:
             raise InputError(
                 str(path),
-                f"is called '{scene.name}', as {found[scene.name]} is, and their results would take each other's place",
+                f"is called '{scene.name}', as {found[name]} is, and their results would take each other's place",
                 "rename one, or call the command from a folder above both, which names them by their paths",
             )
 

@@ -211,10 +211,18 @@ def graph(scene: Scene) -> Graph:
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:
-    """What there is of a scene below results/runs, as a tree; nothing is run.  InputError when there is nothing."""
+    """What there is of a scene below results/runs, or in a file with a dataset, as a tree; nothing is run.
+
+    InputError when there is nothing, or the file holds something else.
+    """
     import xarray as xr
 
     import_module("flexclear.pipeline.core.artifacts.modal")
+    if str(scene).endswith(".nc"):
+        from flexclear.pipeline.core.foreign import dataset
+
+        path = Path(str(scene))
+        return xr.DataTree.from_dict({path.stem: dataset.read(path)}, name=path.absolute().parent.name)
     name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
     name = scene_name(Path(name)) if name.endswith(".toml") else name
     folder = results_root() / "runs" / name
@@ -336,7 +344,7 @@ def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
 
 def _edits(settings: Sequence[str]) -> str:
     """What was changed, as part of a folder's name: of what is long the beginning, and a digest of the whole."""
-    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings)
+    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
     return told if len(told.encode()) <= LONGEST_EDITS else f"{told[:40]},{sha256(told.encode())[:16]}"
 
 

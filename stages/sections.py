@@ -69,8 +69,8 @@ def write_page(
     folder.mkdir(exist_ok=True)
     for name, picture in pictures.items():
         (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
-    (folder / "verdicts.csv").write_text(csv_text(verdicts), encoding="utf-8")
-    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem), encoding="utf-8")
+    (folder / "verdicts.csv").write_text(csv_text(verdicts), encoding="utf-8", newline="\n")
+    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem), encoding="utf-8", newline="\n")
 
 
 def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:

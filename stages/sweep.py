@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 #: of the shown files, without their endings
 NAME = "sweep"
+#: what a sweep without a file is called
+UNNAMED = "sweep"
 #: finished points are stored after so many seconds, later after that share of the time so far
 OFTEN, SHARE = 2.0, 0.01
 
@@ -85,7 +87,7 @@ def of_scene(
     """The dataset of a sweep that a table describes as a file does, but for its scene; see `pipeline.sweep`."""
     from flexclear.pipeline.core.scene.sweep import read_sweep
 
-    plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, "sweep"), scene, "sweep")
+    plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
     with engine(width(workers), scheduler) as found:
         return bring(plan, found, run.workplace())
 
@@ -173,7 +175,8 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
 def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
     monitor = desk.place.monitor
     monitor.start(1)
-    name = monitor.begin(desk.plan.sweep.name, "sweep")
+    sweep, scene = desk.plan.sweep, desk.plan.scene
+    name = monitor.begin(scene.name if sweep.name == UNNAMED else sweep.name, "sweep")
     packed = {family.key: pickle.dumps(family.work) for family in desk.plan.families}
     failed = True
     try:

@@ -159,7 +159,7 @@ def _memory() -> Record:
 
 
 def _resident() -> float:
-    lines = Path("/proc/self/status").read_text().splitlines()
+    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
     return float(next(line for line in lines if line.startswith("VmRSS")).split()[1]) / 1e3
 
 

@@ -30,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"docs/{page} is not what the sources say: python -m benchmarks.site writes it again")
         else:
             (DOCS / page).parent.mkdir(parents=True, exist_ok=True)
-            (DOCS / page).write_text(text)
+            (DOCS / page).write_text(text, encoding="utf-8", newline="\n")
             print(f"docs/{page}")
     return int(options.check and bool(old))
 
@@ -43,7 +43,7 @@ def stale() -> dict[str, str]:
 
 def _written(page: str) -> str | None:
     path = DOCS / page
-    return path.read_text() if path.is_file() else None
+    return path.read_text(encoding="utf-8") if path.is_file() else None
 
 
 if __name__ == "__main__":

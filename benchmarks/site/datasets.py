@@ -51,7 +51,11 @@ the recipes run as tests.
 
 def text() -> str:
     """The page."""
-    parts = [HEAD, "## Recipes\n\n", *(_recipe(path.read_text()) for path in sorted(RECIPES.glob("*.py")))]
+    parts = [
+        HEAD,
+        "## Recipes\n\n",
+        *(_recipe(path.read_text(encoding="utf-8")) for path in sorted(RECIPES.glob("*.py"))),
+    ]
     known: set[str] = set()
     for heading, (where, schema) in DATASETS.items():
         own = {name: v for name, v in schema.items() if heading != "Vibrations" or name not in artifacts.EQUILIBRIUM}

@@ -9,5 +9,5 @@ from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 def text() -> str:
     """The README, with its links told from docs/."""
-    page = (TREE / "README.md").read_text()
+    page = (TREE / "README.md").read_text(encoding="utf-8")
     return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)

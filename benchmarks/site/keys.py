@@ -219,7 +219,7 @@ def _examples(kind: str) -> dict[str, str]:
     found: dict[str, str] = {}
     folders = {"scene": ("scenes",), "recipe": ("meshes", "scenes"), "sweep": ("scenes/sweeps",)}[kind]
     for path in sorted(path for folder in folders for path in (TREE / folder).rglob("*.toml")):
-        for place, part in _parts(tomllib.loads(path.read_text())):
+        for place, part in _parts(tomllib.loads(path.read_text(encoding="utf-8"))):
             name = next((part[key] for key in ("type", "law", "integrator") if isinstance(part.get(key), str)), "")
             text = _toml(place, part)
             if name and place and (name not in found or len(text) < len(found[name])):

@@ -11,6 +11,8 @@ import shutil
 import signal
 import stat
 import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,10 @@ from typing import Any
 FICLONE = 0x40049409
 #: the request that the system send a signal when the parent dies (linux/prctl.h)
 PR_SET_PDEATHSIG = 1
+#: where Windows keeps whether paths may be long, and characters of a path when they may and when not
+FILE_SYSTEM, LONG_PATH, SHORT_PATH = r"SYSTEM\CurrentControlSet\Control\FileSystem", 32767, 259
+#: how long a file is waited for that another program has open, and between two attempts [s]
+PATIENCE, PAUSE = 2.0, 0.05
 #: access to a process of Windows that allows to ask whether it runs, and what it answers then (winbase.h, minwinbase.h)
 QUERY_LIMITED, STILL_ACTIVE, ACCESS_DENIED = 0x1000, 259, 5
 
@@ -84,6 +90,29 @@ def peak_memory() -> int:
     return peak if sys.platform == "darwin" else 1024 * peak
 
 
+def limit_itself(memory: float, seconds: float) -> None:
+    """Let this process take so much more memory [B] and processor time [s], and write no file, where systems do that.
+
+    Beyond its time it is ended by SIGXCPU; memory is limited on Linux alone.
+    """
+    resource = _module("resource")
+    if resource is None:
+        return
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    limits = {
+        "RLIMIT_CPU": int(used.ru_utime + used.ru_stime + seconds) + 1,
+        "RLIMIT_FSIZE": 0,
+        "RLIMIT_CORE": 0,
+    }
+    pages = _text("/proc/self/statm").split()
+    if pages:
+        limits["RLIMIT_AS"] = int(int(pages[0]) * os.sysconf("SC_PAGE_SIZE") + memory)
+    for name, soft in limits.items():
+        kind = getattr(resource, name)
+        _, hard = resource.getrlimit(kind)
+        resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
+
+
 def share(source: Any, target: Any) -> bool:
     """Whether an open file could be made to share the bytes of another (Linux, on file systems that can)."""
     fcntl = _module("fcntl")
@@ -97,14 +126,32 @@ def share(source: Any, target: Any) -> bool:
 
 
 def replace(made: Path, path: Path) -> None:
-    """Give a file the name of another, which may be read-only: Windows does not replace such."""
-    try:
-        os.replace(made, path)
-    except PermissionError:
-        if not path.exists() or os.access(path, os.W_OK):
-            raise
-        path.chmod(stat.S_IREAD | stat.S_IWRITE)
-        os.replace(made, path)
+    """Give a file the name of another one, which is gone: Windows keeps what is read-only, and what is open."""
+    _insist(lambda: os.replace(made, path), path)
+
+
+def remove(path: Path) -> None:
+    """Remove a file where there is one, under the same conditions."""
+    with contextlib.suppress(FileNotFoundError):
+        _insist(lambda: os.unlink(path), path)
+
+
+def _insist(change: Callable[[], None], path: Path) -> None:
+    """Do what takes a file away; whoever has it open (a viewer, an indexer, a virus scanner) may let it go soon."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return change()
+        except PermissionError as error:
+            if not path.is_file() or not os.access(path.parent, os.W_OK):
+                raise
+            if not path.stat().st_mode & stat.S_IWRITE:
+                path.chmod(stat.S_IREAD | stat.S_IWRITE)
+            elif time.monotonic() > end:
+                why = f"{path.name} is protected, or open in another program"
+                raise PermissionError(error.errno, why, str(path)) from None
+            else:
+                time.sleep(PAUSE)
 
 
 def sync_folder(folder: Path) -> None:
@@ -115,6 +162,17 @@ def sync_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def longest_path() -> int:
+    """Characters of a path that files can have: few on a Windows that was not told otherwise."""
+    registry = _module("winreg")
+    if registry is None:
+        return sys.maxsize
+    with contextlib.suppress(OSError), registry.OpenKey(registry.HKEY_LOCAL_MACHINE, FILE_SYSTEM) as key:
+        if registry.QueryValueEx(key, "LongPathsEnabled")[0]:
+            return LONG_PATH
+    return SHORT_PATH
 
 
 def free_space(folder: Path) -> int:

@@ -215,8 +215,9 @@ PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (
 #: of surfaces has
 CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
-#: along the axis and per moment about it; preload: normal force that is always there
-BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
+#: along the axis and per moment about it; preload: normal force that is always there; kinks: as of CONTACT_NUMBERS;
+#: turning_kink: size of sliding speeds of a law that bends where sliding reverses, or 0
+BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6 kinks:2 turning_kink")
 COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
@@ -261,6 +262,9 @@ LOAD = work("force:3 moment:3 value rate stored power loss")
 #: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
 #: origin; loss: what it takes per normal force [m/s]
 BEARING = work("load slip loss unit_moment:3 unit_force:3")
+#: what bends the friction of a bearing where it reverses: sliding velocity, force along the axis, moment about it and
+#: forces at both ends as they press; now, in further rows at the start of the step, and at its end
+BENDS = work("sliding:3 along about one_end:2 other_end:2")
 #: reactions of the joints with friction: without it, then per normal force of each bearing; moment about the second
 #: frame's origin, force
 REACTIONS = work("moment:3 force:3")

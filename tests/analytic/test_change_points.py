@@ -12,6 +12,7 @@ import xarray as xr
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import change_points as cp
@@ -299,3 +300,20 @@ def test_a_loose_pin_beside_the_loop_does_not_keep_it_from_passing(solver: Table
     assert len(dataset.pass_time) == 1
     # the neighbour that tells how long the run can be believed starts beside it, though the crank turns
     assert float(dataset.twin_separation[0]) < 1e-3
+
+
+def test_a_drive_that_leads_a_loose_loop_out_of_reach_is_told_when_it_does() -> None:
+    """Contacts give way where ideal joints do not; the rocker of the scene turns by 1.5 rad in 50 ms."""
+    start, travel, end = 1.4454684956268313, 1.5, 0.05
+    step = {"type": "step", "start": 0.0, "end": end, "change": travel}
+    law = {"type": "sum", "laws": [{"type": "constant", "value": start}, step]}
+    edits = {"drive": {"out": {"joint": "D", "law": law}}, "time.end": 2.0 * end}
+    scene = load_scene(TREE / "scenes" / "checks" / "clearance_four_bar.toml", override=edits)
+    with pytest.raises(SolverError, match=r"joint C: .*drive out leads out of reach.*\[drive\.out\]") as told:
+        integrate(scene, {}, silent)
+    # folded, crank and coupler are 0.2 m long together; the pin is 10 mm deep when the rocker, of 0.2 m, has gone on by
+    # some 0.05 rad, a thirtieth of its travel
+    folded = np.arccos((0.2**2 - 0.3**2 - 0.2**2) / (2 * 0.3 * 0.2))
+    roots = np.roots([-2.0, 3.0, 0.0, -(folded - start) / travel])
+    limit = end * next(r for r in roots.real if 0.0 < r < 1.0)
+    assert limit < float(str(told.value).split("t = ")[1].split(" s")[0]) < 1.2 * limit

@@ -3,45 +3,59 @@
 from __future__ import annotations
 
 import ast
+import io
 import os
+import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
+import tomllib
+from collections.abc import Callable
+from pathlib import Path, PureWindowsPath
 
 import pytest
 
-from flexclear.pipeline.core import system
+import flexclear as fc
+from flexclear.pipeline.core import portable, system
+from flexclear.pipeline.core.errors import InputError
+from flexclear.stages import bundle, doctor, owner
+from flexclear.stages.__main__ import COMMANDS, main
+from tests.architecture import windows_rules as rules
 
-#: what Windows does not have, of modules and of `os` and `signal`
-MODULES = ("fcntl", "resource", "grp", "pwd", "termios")
-FUNCTIONS = ("sched_getaffinity", "geteuid", "getuid", "setsid", "fork", "killpg", "sysconf", "getpgid")
+#: what of `os` and `signal` is not on Windows, or means something else there
+ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
 #: the one module that may ask for them
 ONE = "pipeline/core/system.py"
 
-#: takes all of that away, then runs a command as `python -m flexclear` does
-WITHOUT = f"""
-import os, signal, sys
-for name in {MODULES!r}:
-    sys.modules[name] = None
-for name in {FUNCTIONS!r}:
-    delattr(os, name)
-del signal.SIGKILL
-from flexclear.stages.__main__ import main
-sys.exit(main(sys.argv[1:]))
-"""
-
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    paths = {"PYTHONPATH": str(folder), "FLEXCLEAR_RESULTS": str(folder / "results_of_test")}
     return subprocess.run(
         [sys.executable, *arguments],
         cwd=folder,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1", **paths, **environment},
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1", **variables(folder), **environment},
         capture_output=True,
         text=True,
         check=False,
     )
+
+
+def variables(folder: Path) -> dict[str, str]:
+    return {"PYTHONPATH": str(folder), "FLEXCLEAR_RESULTS": str(folder / "results_of_test")}
+
+
+@pytest.fixture(scope="module")
+def windows(without_links: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """A command in that checkout, and all processes of it, as far as can be under the rules of Windows."""
+    hooks = tmp_path_factory.mktemp("hooks")
+    shutil.copy(rules.__file__, hooks / "sitecustomize.py")
+
+    def command(*arguments: str) -> str:
+        paths = os.pathsep.join([str(hooks), str(without_links)])
+        done = run(without_links, "-m", "flexclear", *arguments, PYTHONPATH=paths)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    return command
 
 
 @pytest.fixture(scope="module")
@@ -74,30 +88,65 @@ def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
                 and isinstance(node.value, ast.Name)
                 and node.value.id in ("os", "signal")
             ):
-                names += [node.attr] if node.attr in (*FUNCTIONS, "SIGKILL", "link", "kill") else []
-            found += [f"{place}: {name}" for name in names if name in (*MODULES, *FUNCTIONS, "SIGKILL", "link", "kill")]
+                names.append(node.attr)
+            found += [f"{place}: {name}" for name in names if name in ELSEWHERE]
     assert found == []
 
 
 def test_all_text_is_read_and_written_as_utf_8(root: Path) -> None:
-    """Windows takes the console's code page for it otherwise."""
+    """Windows takes the console's code page for it otherwise, and ends lines with two characters."""
     found = []
-    for path in (p for name in ("pipeline", "stages") for p in sorted((root / name).rglob("*.py"))):
+    for path in (p for name in ("pipeline", "stages", "benchmarks") for p in sorted((root / name).rglob("*.py"))):
         for node in ast.walk(ast.parse(path.read_bytes())):
-            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
-                given = {keyword.arg for keyword in node.keywords}
-                if node.func.attr in ("read_text", "write_text") and not given & {"encoding", None}:
-                    found.append(f"{path.relative_to(root)}:{node.lineno}")
+            wanted = _asked(node)
+            if wanted:
+                found += [f"{path.relative_to(root)}:{node.lineno} {name}" for name in wanted]
     # a distribution's own reader knows its encoding
     assert [place for place in found if "fingerprint.py" not in place] == []
 
 
-def test_the_pipeline_runs_without_posix_and_without_links(without_links: Path) -> None:
-    done = run(without_links, "-c", WITHOUT, "run", "checks/pendulum", "checks/spring_pendulum")  # in two workers
-    assert done.returncode == 0, done.stderr
-    assert (without_links / "results_of_test" / "runs" / "checks" / "pendulum" / "run.nc").is_file()
-    again = run(without_links, "-c", WITHOUT, "why", "checks/pendulum")
-    assert again.stdout.count("fresh") == 2, again.stdout + again.stderr
+def _asked(node: ast.AST) -> set[str]:
+    """What a call that opens text has to say and does not."""
+    if not isinstance(node, ast.Call):
+        return set()
+    name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+    given = {keyword.arg for keyword in node.keywords}
+    if None in given:
+        return set()
+    if name in ("read_text", "write_text"):
+        return {"encoding", *(["newline"] if name == "write_text" else [])} - given
+    of_path = isinstance(node.func, ast.Attribute)
+    owner_of = getattr(node.func.value, "id", "") if of_path else ""
+    if name != "open" or owner_of in ("os", "xr", "fc", "zipfile", "webbrowser"):
+        return set()
+    modes = [keyword.value for keyword in node.keywords if keyword.arg == "mode"] + node.args[0 if of_path else 1 :][:1]
+    mode = modes[0].value if modes and isinstance(modes[0], ast.Constant) else "r"
+    return set() if "b" in str(mode) else {"encoding", *(["newline"] if set(str(mode)) & set("wax") else [])} - given
+
+
+def test_workers_are_made_without_fork(root: Path) -> None:
+    """Windows has none, and on macOS what the system's libraries hold does not outlive it."""
+    found = []
+    for path in (p for name in ("pipeline", "stages") for p in sorted((root / name).rglob("*.py"))):
+        text = path.read_text(encoding="utf-8")
+        pools = re.findall(r"ProcessPoolExecutor\(.+|multiprocessing\.(?:Pool|Process|Manager|Queue|set_start)", text)
+        found += [f"{path.name}: {call}" for call in pools if "mp_context" not in call]
+        found += [path.name for method in re.findall(r"get_context\((.*)\)", text) if method != '"spawn"']
+    assert found == []
+
+
+def test_the_pipeline_runs_under_the_rules_of_windows(windows: Callable[..., str], without_links: Path) -> None:
+    windows("run", "checks/pendulum", "checks/spring_pendulum")  # in two workers, which have the same rules
+    shown = without_links / "results_of_test" / "runs" / "checks" / "pendulum" / "run.nc"
+    before = shown.read_bytes()
+    assert windows("why", "checks/pendulum").count("fresh") == 2
+    shown.chmod(0o644)
+    shown.write_bytes(b"edited")
+    windows("run", "checks/pendulum")
+    assert shown.read_bytes() == before
+    assert shown.with_name("run.edited.nc").read_bytes() == b"edited"
+    left = [path for path in shown.parents[3].rglob("*") if path.suffix in (".tmp", ".lock", ".part")]
+    assert left == []
 
 
 def test_a_flexible_body_is_made_without_links(without_links: Path) -> None:
@@ -132,3 +181,133 @@ def test_a_running_process_is_alive_and_one_that_ended_is_not() -> None:
         assert system.alive(process.pid)
         process.communicate(b"\n")
     assert not system.alive(process.pid)
+
+
+@pytest.fixture
+def held(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """A file that somebody else has open for as many attempts as the list says."""
+    left, replace, unlink = [0], os.replace, os.unlink
+
+    def refusing(change: Callable[..., None]) -> Callable[..., None]:
+        def tried(*paths: Path) -> None:
+            if left[0]:
+                left[0] -= 1
+                raise PermissionError(13, "Permission denied")
+            change(*paths)
+
+        return tried
+
+    monkeypatch.setattr(os, "replace", refusing(replace))
+    monkeypatch.setattr(os, "unlink", refusing(unlink))
+    return left
+
+
+def test_a_file_that_is_open_elsewhere_is_waited_for(tmp_path: Path, held: list[int]) -> None:
+    new, old = tmp_path / "new", tmp_path / "old"
+    new.write_bytes(b"new")
+    old.write_bytes(b"old")
+    held[0] = 3
+    system.replace(new, old)
+    assert old.read_bytes() == b"new"
+    held[0] = 3
+    system.remove(old)
+    assert not old.exists()
+
+
+def test_a_file_that_stays_open_elsewhere_is_named(
+    tmp_path: Path, held: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(system, "PATIENCE", 0.0)
+    new, old = tmp_path / "new", tmp_path / "run.nc"
+    new.write_bytes(b"new")
+    old.write_bytes(b"old")
+    held[0] = 1000
+    with pytest.raises(PermissionError, match=r"run\.nc is protected, or open in another program"):
+        system.replace(new, old)
+    assert old.read_bytes() == b"old"
+
+
+@pytest.mark.parametrize("page", ["cp1252", "cp437", "ascii"])
+def test_a_console_of_any_code_page_shows_the_help_of_all_commands(page: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    said = io.BytesIO()
+    for verb in COMMANDS:
+        monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(said, encoding=page, write_through=True))
+        with pytest.raises(SystemExit) as ended:
+            main([verb, "--help"])
+        assert ended.value.code == 0
+        sys.stdout.detach()
+    assert said.getvalue().count(b"usage: ") == len(COMMANDS)
+
+
+@pytest.mark.parametrize("name", ["aux", "Con", "COM1", "lpt9", "nul"])
+def test_a_body_with_files_has_no_name_of_a_device(root: Path, name: str) -> None:
+    with pytest.raises(InputError, match=rf"\[body\.{name}\]: '{name}' is a device on Windows"):
+        renamed(root, {"rod": name})
+
+
+def test_names_of_many_bytes_are_refused_before_files_are_called_by_them(root: Path) -> None:
+    with pytest.raises(InputError, match="200 bytes in UTF-8 at most"):
+        renamed(root, {"rod": "\u5b57" * 67})
+    renamed(root, {"rod": "\u5b57" * 66})
+
+
+def test_bodies_with_files_differ_by_more_than_capitals(root: Path) -> None:
+    with pytest.raises(InputError, match="called as 'rod' but for capitals"):
+        renamed(root, {"rod": "rod", "other": "ROD"})
+
+
+def renamed(root: Path, names: dict[str, str]) -> fc.Scene:
+    """The scene of one clamped rod with copies of the rod under these names."""
+    scene = fc.load_scene(root / "scenes" / "checks" / "clamped_rod.toml")
+    table = scene.model_dump(mode="json", exclude_none=True)
+    rod = table["body"].pop("rod")
+    return fc.load_scene({**table, "body": {**table["body"], **dict.fromkeys(names.values(), rod)}, "joint": {}})
+
+
+def test_a_title_that_is_a_device_names_no_folder(root: Path) -> None:
+    scene = fc.load_scene(root / "scenes" / "checks" / "pendulum.toml")
+    table = scene.model_dump(mode="json", exclude_none=True) | {"title": "Aux"}
+    assert fc.load_scene(table).name == "aux-scene"
+
+
+def test_names_are_the_same_where_any_system_takes_them_for_the_same() -> None:
+    assert portable.folded("Gru\u0308n") == portable.folded("GR\u00dcN") == "gr\u00fcn"
+    assert portable.is_device("NUL.toml")
+    assert not portable.is_device("console")
+
+
+def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path, root: Path) -> None:
+    scenes = []
+    for name in ("one/Pin", "two/pin"):
+        path = tmp_path / f"{name}.toml"
+        path.parent.mkdir()
+        shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
+        scenes.append(fc.load_scene(path))
+    with pytest.raises(InputError, match="take each other's place"):
+        owner.refuse_namesakes(scenes)
+
+
+def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) -> None:
+    for text in ('body.a.mesh = "..\\meshes\\rod.toml"', 'body.a.mesh = "C:\\users\\rod.toml"'):
+        (tmp_path / "a.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(InputError, match=r"a\.toml, line 1: .*\n  hint: write / between folders"):
+            fc.load_scene(tmp_path / "a.toml")
+    with pytest.raises(InputError, match="hint: write / between folders"):
+        fc.load_scene("meshes\\rod.toml")
+
+
+def test_a_path_of_windows_is_found_however_toml_writes_it() -> None:
+    path = PureWindowsPath("C:\\mine\\rod.toml")
+    written = "a = 'C:\\mine\\rod.toml'\nb = \"C:\\\\mine\\\\rod.toml\"\nc = 'C:/mine/rod.toml'"
+    assert set(tomllib.loads(written).values()) == {str(path), path.as_posix()}
+    for spelling in bundle._spellings(path):
+        written = written.replace(spelling, "rod.toml")
+    assert set(tomllib.loads(written).values()) == {"rod.toml"}
+
+
+def test_a_folder_of_results_that_is_too_deep_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert doctor._results(tmp_path)[1]
+    monkeypatch.setattr(system, "longest_path", lambda: 259)
+    told, fine = doctor._results(tmp_path / ("deep" * 40))
+    assert not fine
+    assert "longer than paths to files may be here (259 characters" in told

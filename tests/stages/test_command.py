@@ -168,6 +168,12 @@ def test_cite_names_methods_that_are_used_and_no_others(command: Said):
     assert "Lankarani" not in ideal
     assert "Hairer" in ideal
     assert "Table 1" in ideal
+    _, pendulum, _ = command("cite", "checks/pendulum")
+    assert "Hairer" in pendulum
+    assert "PID" not in pendulum
+    assert "dynamics.contact" not in pendulum
+    _, controlled, _ = command("cite", "checks/controllers")
+    assert "PID" in controlled
 
 
 def test_report_lists_only_commands_that_do_something(command: Said):

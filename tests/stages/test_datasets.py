@@ -16,6 +16,8 @@ import flexclear as fc
 from benchmarks.site import datasets, keys
 from benchmarks.site.__main__ import stale
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
+from flexclear.pipeline.core.artifacts.store import write_dataset
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.dynamics import simulate
@@ -141,6 +143,27 @@ def test_units_are_those_of_each_entry_where_some_slide_and_others_turn(root: Pa
     alike = simulate(load_scene(root / "scenes" / "checks" / "pendulum.toml", {"time.end": 0.01}), {}, silent)
     assert alike["joint_position"].attrs["units"] == "rad"
     assert "joint_position_units" not in alike.coords
+
+
+def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
+    """Read by a child process, as files of others are, to the same values and names; anything else is told."""
+    run = simulate(load_scene(root / "scenes" / "checks" / "pendulum.toml", {"time.end": 0.01}), {}, silent)
+    write_dataset(tmp_path / "mine.nc", run)
+    for path in (tmp_path / "mine.nc", str(tmp_path / "mine.nc")):
+        tree = fc.open(path)
+        xr.testing.assert_identical(tree["mine"].to_dataset(), xr.load_dataset(path))
+    (tmp_path / "text.nc").write_text("no dataset")
+    (tmp_path / "cut.nc").write_bytes((tmp_path / "mine.nc").read_bytes()[:-1000])
+    xr.Dataset({"a": ("x", [1.0, 2.0])}).to_netcdf(tmp_path / "other.nc", engine="netcdf4")
+    said = {
+        "none": "there is no file",
+        "text": "cannot be read",
+        "cut": "cannot be read",
+        "other": "none that flexclear",
+    }
+    for name, words in said.items():
+        with pytest.raises(InputError, match=words):
+            fc.open(tmp_path / f"{name}.nc")
 
 
 def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:

@@ -78,6 +78,29 @@ def test_the_rest_is_estimated_by_the_later_pace_where_that_changes():
     assert " 40% 9 min " in screen.getvalue().splitlines()[-1]
 
 
+def test_a_stretch_that_gets_slow_is_told_before_it_ends():
+    """Less than a sample's share is done in it, and what is left grows with each look."""
+    monitor, screen, clock = watched(terminal=True)
+    name = monitor.begin("a", "simulate")
+    told = []
+    for now, share in [*((float(k), k / 50) for k in range(11)), (100.0, 0.201), (1000.0, 0.202)]:
+        clock.now = now
+        monitor.update(name, share, "")
+        told.append(screen.getvalue().split("\r\033[K")[-1])
+    assert told[10].endswith("20% 40.0 s left")
+    # ten samples of 1 s and 0.02 fade to sum 0.8^k = 3.57 of one, and the one that goes on counts whole:
+    # (3.57 + 90) s for 3.57 0.02 + 0.001, of which 0.799 is left; then (3.57 + 990) s for 3.57 0.02 + 0.002
+    assert told[11].endswith("20% 17 min 12 s left")
+    assert told[12].endswith("20% 180 min 1 s left")
+
+
+def test_a_single_task_is_not_counted():
+    monitor, screen, _ = watched(terminal=False)
+    monitor.start(1)
+    monitor.begin("a", "sweep")
+    assert screen.getvalue() == "flexclear: a: sweep\n"
+
+
 def test_a_terminal_keeps_one_line_with_everything_that_runs():
     monitor, screen, clock = watched(terminal=True)
     first, second = monitor.begin("a", "simulate"), monitor.begin("b", "mesh rod1")

@@ -127,7 +127,8 @@ def temporary(path: Path) -> Iterator[Path]:
     try:
         yield made
     finally:
-        made.unlink(missing_ok=True)
+        with contextlib.suppress(PermissionError):  # a library that failed has it still open, on Windows: `sweep` will
+            system.remove(made)
 
 
 def settle(made: Path, path: Path) -> None:
@@ -164,10 +165,19 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
     try:
         yield mine is not None
     finally:
-        if mine is not None:
-            with contextlib.suppress(OSError):  # Windows removes no file that is open: `sweep` will
-                path.unlink(missing_ok=True)  # while it is held: who waits for it will look for the file again
+        stays = mine is not None and not _unlinked(path)  # while it is held: who waits will look for the file again
         lock.release()
+        if stays:  # Windows removes no file that is open; nor this one, where somebody else holds it by now
+            _unlinked(path)
+
+
+def _unlinked(path: Path) -> bool:
+    """Whether there is no such file any more."""
+    try:
+        path.unlink(missing_ok=True)
+    except OSError:
+        return False
+    return True
 
 
 def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:

@@ -11,13 +11,13 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexclear.pipeline.core import system
 from flexclear.pipeline.core.artifacts.disk import (
     checked,
     copy,
@@ -179,7 +179,7 @@ class Store:
         known = last.files.get(name) if last is not None else None
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
-            os.replace(target, aside)
+            system.replace(target, aside)
             self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:

@@ -145,14 +145,16 @@ Inertia = Annotated[
 
 #: names of bodies and frames: letters of any script, digits, underscores and hyphens
 _NAME = r"\w[\w-]*"
-#: files are called by them
-LONGEST_NAME = 100
+#: files are called by them, whose names have 255 bytes at most, and ours more than that of the part
+LONGEST_NAME, LONGEST_BYTES = 100, 200
 
 
 def part_name(name: str) -> str:
     """A part's name that may stand in places such as ``body.FRAME`` and in names of files; ValueError otherwise."""
     if len(name) > LONGEST_NAME or not re.fullmatch(_NAME, name):
         raise ValueError(f"'{name}' is no name: it is made of up to {LONGEST_NAME} letters, digits, _ and -")
+    if len(name.encode()) > LONGEST_BYTES:
+        raise ValueError(f"'{name}' is too long for the name of a file: {LONGEST_BYTES} bytes in UTF-8 at most")
     if name == "source":
         raise ValueError("'source' is no name for a part: it says where values come from")
     return name

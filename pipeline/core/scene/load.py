@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.errors import InputError, shown
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
@@ -75,7 +76,8 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
         scene = Scene.model_validate(found)
     except ValidationError as error:
         raise input_errors("scene", error, Scene) from None
-    scene._name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
+    name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
+    scene._name = f"{name}-scene" if portable.is_device(name) else name
     return scene
 
 
@@ -250,6 +252,8 @@ def _parsed(text: str) -> dict[str, Any]:
 
 
 def _neighbours(path: Path) -> str | None:
+    if any("\\" in part for part in path.parts) or not str(path).isprintable():  # it separates folders on Windows only
+        return "write / between folders: every system takes it"
     names = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
     return suggestion(path.name, names) if names else None
 

@@ -38,7 +38,7 @@ CHOOSING = ("type", "law")
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 
 #: a message of a whole scene that opens with the place that it is about
-_NAMED = re.compile(r"([a-z_]+(?:\.[a-z_]+)+): ")
+_NAMED = re.compile(r"([a-z_]+(?:\.[\w-]+)+): ")
 
 #: how pydantic calls, in a place, the alternative of a number or text that a validator reads
 VALIDATORS = ("function-", "constrained-", "literal[")

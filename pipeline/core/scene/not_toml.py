@@ -61,6 +61,8 @@ def _said(message: str, line: str) -> tuple[str, str | None]:
     if twice:
         name = ".".join(re.findall(r"'([^']*)'", twice[1]))
         return f"the table [{name}] is there twice", "give it another name, or join both"
+    if "Unescaped '\\'" in text or "hex value" in text:
+        return f'\\ begins a special character in "...": {line.strip()}', "write / between folders, on Windows, too"
     if text == "Cannot overwrite a value":
         return f"a key is given twice: {line.strip()}", "take one of the two away"
     if "key part" in text and line.strip().endswith("{"):

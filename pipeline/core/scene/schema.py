@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.scene.clearance import (
     CONTACTS,
     BallOnPlane,
@@ -255,6 +256,21 @@ class Scene(Part):
                 known = ", ".join(self.flexible()) or "none"
                 raise ValueError(f"output.stress: '{name}' is no flexible body of this scene; flexible ones: {known}")
 
+    def _bodies_have_files_of_their_own(self) -> None:
+        """Results are sent from one system to another: meshes and modes of bodies are files called by their names."""
+        found: dict[str, str] = {}
+        for name in self.recipes():
+            if portable.is_device(name):
+                raise ValueError(
+                    f"body.{name}: '{name}' is a device on Windows, and files are called by this name: give it another"
+                )
+            other = found.setdefault(portable.folded(name), name)
+            if other != name:
+                raise ValueError(
+                    f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "
+                    "and macOS do not tell apart: give it another"
+                )
+
     @model_validator(mode="before")
     @classmethod
     def _method_by_need(cls, table: Any) -> Any:
@@ -275,6 +291,7 @@ class Scene(Part):
         self._samples_can_be_made()
         self._quantities_are_there()
         self._stressed_bodies_are_flexible()
+        self._bodies_have_files_of_their_own()
 
     def by_need(self) -> bool:
         """Whether the integrator is chosen for the accuracy that is asked for."""

@@ -193,5 +193,8 @@ def _value(value: Any) -> str:
 
 
 def relative(target: Path, base: Path) -> str:
-    """How a file names another one that it extends: from its own folder on."""
-    return Path(os.path.relpath(base.resolve(), target.resolve().parent)).as_posix()
+    """How a file names another one that it extends: from its own folder on; in full where that is on another drive."""
+    try:
+        return Path(os.path.relpath(base.resolve(), target.resolve().parent)).as_posix()
+    except ValueError:
+        return base.resolve().as_posix()

@@ -13,13 +13,16 @@ from flexclear.pipeline.core import system
 LOOK = 1.0
 
 
-def follow(parent: int) -> None:
+def follow(parent: int, *, by_main_thread: bool = True) -> None:
     """In a process that `parent` started: end when it does; Ctrl-C is left to it, which ends its children.
 
     parent: its number, as it says itself: by now the system may have given this process another one.
+    by_main_thread: whether it was that thread of the parent that started this process; what the system sends at
+    the end of a parent comes at the end of the thread.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    system.end_with_parent()
+    if by_main_thread:
+        system.end_with_parent()
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 

@@ -54,6 +54,11 @@ class Opened:
             finally:
                 self.busy = False
 
+    def learn(self, name: str, then: str) -> None:
+        """Note a file that another process has read, with the digest that it found."""
+        if name not in self.written and not self._left_out(name) and self.read.setdefault(name, then) != then:
+            raise changed(name)
+
     def _left_out(self, name: str) -> bool:
         # where modules are looked for there may be archives, which need not be there
         code = name.endswith(CODE) or name in sys.path
@@ -68,6 +73,16 @@ def note(path: Path) -> None:
     """A file is about to be read in a way that Python does not tell of."""
     if _current is not None:
         _current.see(path, writing=False)
+
+
+def told(read: Mapping[str, str], base: Path) -> None:
+    """Files that another process has read for this one, as its `watched` found them.
+
+    Raises ResourceError where such a file was another one when this process read it itself.
+    """
+    if _current is not None:
+        for place, then in read.items():
+            _current.learn(os.path.normpath(base / place), then)
 
 
 @contextmanager
@@ -108,8 +123,13 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
         if now == ABSENT and name.startswith(temporary):
             continue  # the task's own, made by a library
         if now != then:
-            raise ResourceError(f"{name} changed while it was read; run again")
+            raise changed(name)
         found[_place(name, base)] = then
+
+
+def changed(name: str) -> ResourceError:
+    """What is told of a file that was not the same all the time."""
+    return ResourceError(f"{name} changed while it was read; run again")
 
 
 def _place(name: str, base: Path) -> str:

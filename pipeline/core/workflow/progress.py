@@ -83,7 +83,7 @@ class Monitor:
             others += 1
             name = f"{plain} ({others})"
         self.jobs[name] = Job(name, self.clock(), said=self.clock())
-        self._show(f"{self._count()} {name}")
+        self._show(f"{self._count()}{name}")
         return name
 
     def update(self, name: str, fraction: float | None, text: str) -> None:
@@ -103,7 +103,7 @@ class Monitor:
         job.fraction, job.text = fraction, text
         if self.rewrites or self.verbose or news or self.clock() - job.said >= SPARSE:
             job.said = self.clock()
-            self._show(f"{self._count()} {self._line(job)}")
+            self._show(f"{self._count()}{self._line(job)}")
 
     def finish(self, name: str, *, failed: bool) -> None:
         """A task has ended."""
@@ -111,7 +111,7 @@ class Monitor:
         self.done += 1
         seconds = self.clock() - job.begun
         if not self.rewrites and (failed or seconds >= 1.0):
-            self._show(f"{self._count()} {name} {'failed' if failed else 'done'} after {duration(seconds)}")
+            self._show(f"{self._count()}{name} {'failed' if failed else 'done'} after {duration(seconds)}")
         elif self.rewrites:
             self._show("")
 
@@ -127,15 +127,24 @@ class Monitor:
         LOG.warning("%s", text)
 
     def _count(self) -> str:
-        return f"[{self.done}/{self.total}]"
+        """How many tasks are done, where there are several."""
+        return f"[{self.done}/{self.total}] " if self.total > 1 else ""
 
     def _line(self, job: Job) -> str:
         parts = [job.name]
         if job.fraction is not None:
             parts.append(f"{job.fraction:4.0%}")
             if len(job.samples) >= SAMPLES:
-                parts.append(f"{duration(pace(job.samples) * (1.0 - job.fraction))} left")
+                parts.append(f"{duration(self._pace(job) * (1.0 - job.fraction))} left")
         return " ".join([*parts, *([job.text] if job.text else [])])
+
+    def _pace(self, job: Job) -> float:
+        """Seconds per share; what goes on counts as soon as it is slower than what was before."""
+        known = pace(job.samples)
+        if job.since is None or job.fraction is None:
+            return known
+        spent, share = self.clock() - job.since[0], job.fraction - job.since[1]
+        return pace([*job.samples, (spent, share)]) if spent > known * share else known
 
     def _show(self, text: str) -> None:
         if self.quiet:
@@ -144,7 +153,7 @@ class Monitor:
             LOG.info("%s", text)
         elif self.clock() - self.drawn >= REDRAW or not text:
             self.drawn = self.clock()
-            line = f"{self._count()} " + " | ".join(self._line(job) for job in self.jobs.values())
+            line = self._count() + " | ".join(self._line(job) for job in self.jobs.values())
             self._write(_clear(self.out) + line[: _columns(self.out)])
 
     def _write(self, text: str) -> None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -251,7 +251,7 @@ def _relay(reports: Any, monitor: Monitor) -> None:
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
     if isinstance(result, Failure):
-        plan.failed[id(task)] = result
+        plan.failed[id(task)] = replace(result, task=task)  # a worker has a copy of it
     else:
         plan.done[id(task)] = result
 

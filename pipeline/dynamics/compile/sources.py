@@ -131,18 +131,33 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),
         "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
-    touching = parts.surfaces or parts.stops
-    if touching and scheme.located:
-        located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
-        regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
-        given["events"] = f"{located}({regimes})"
-    elif touching:
-        given["events"] = _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    events = _events(imports, parts, scheme)
+    if events:
+        given["events"] = events
     if parts.closures:
         given["poses"] = _import(imports, f"{INTEGRATORS}.singular_step", "OVER_POSES")
     _import(imports, DYNAMICS, "memory as m")
     maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
     return _file(f"steps of {scheme}", imports, "steps", maker, given, ADVANCE)
+
+
+def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
+    """What the stepper looks for in each step; nothing for the default, which is nothing."""
+    touching, chosen = parts.surfaces or parts.stops, not scheme.fixed
+    if touching and not scheme.located:
+        return _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    kinks = []
+    if parts.frictions and chosen:
+        kinks.append(_import(imports, f"{INTEGRATORS}.friction_kinks", "CONTACT_KINKS"))
+    if parts.joint_frictions and chosen:
+        kinks.append(_import(imports, f"{INTEGRATORS}.joint_friction_kinks", "BEARING_KINKS"))
+    if touching:
+        located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
+        regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
+        return f"{located}({', '.join([regimes, *kinks])})"
+    if kinks:
+        return f"{_import(imports, f'{INTEGRATORS}.joint_friction_kinks', 'kinks_alone')}({kinks[0]})"
+    return ""
 
 
 def _joints(parts: Parts) -> tuple[dict[str, str], Imports]:

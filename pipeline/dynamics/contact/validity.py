@@ -61,12 +61,18 @@ def refuse_deep(name: str, joint: Any, depth: float) -> None:
 
     name: in words.
     """
-    if depth > joint.radius > 0.0:
-        raise SolverError(
-            f"{name}: the surfaces went {depth:.3g} m deep into each other, more than the inner surface's radius "
-            f"({joint.radius:.3g} m), so that its centre left through the outer surface; there is no contact law for "
-            "that: choose a stiffer contact, a slower impact or smaller loads"
-        )
+    if told := pressed_through(name, joint, depth):
+        raise SolverError(f"{told}: choose a stiffer contact, a slower impact or smaller loads")
+
+
+def pressed_through(name: str, joint: Any, depth: float) -> str:
+    """What is told of such a contact; nothing of others. Arguments: as of `refuse_deep`."""
+    if not depth > joint.radius > 0.0:
+        return ""
+    return (
+        f"{name}: the surfaces went {depth:.3g} m deep into each other, more than the inner surface's radius "
+        f"({joint.radius:.3g} m), so that its centre left through the outer surface; there is no contact law for that"
+    )
 
 
 def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resolved]) -> str:

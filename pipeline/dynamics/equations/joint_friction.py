@@ -110,6 +110,7 @@ def make_unit_wrench(traction: Callable) -> Callable:
         else:
             push = scale(force[0], along)
             moment = add(scale(radius * force[1], along), cross(at(w, b + m.FRAME.origin), push))
+        put(w, m.BENDS.row(h, e) + m.BENDS.sliding, slip)
         put(w, o + m.BEARING.unit_moment, moment)
         put(w, o + m.BEARING.unit_force, push)
         w[o + m.BEARING.slip], w[o + m.BEARING.loss] = np.sqrt(dot(slip, slip)), -dot(force, slip)
@@ -224,6 +225,18 @@ def _sized(v):
 
 
 @kernel
+def note_bends(h, w, e, along, about, one_end, other_end):
+    """Write what bearing e carries to BENDS; forces at its ends by their components across the axis."""
+    o, j, k = m.BENDS.row(h, e), m.BEARINGS.joint(h, e), m.BEARINGS.axis(h, e)
+    site = m.RUBBING.site_a(h, j) if m.BEARINGS.side(h, e) == 0 else m.RUBBING.site_b(h, j)
+    axes = at9(w, m.SITE_FRAMES.row(h, site) + m.FRAME.axes)
+    one, other = axis(axes, (k + 1) % 3), axis(axes, (k + 2) % 3)
+    w[o + m.BENDS.along], w[o + m.BENDS.about] = along, about
+    w[o + m.BENDS.one_end], w[o + m.BENDS.one_end + 1] = dot(one, one_end), dot(other, one_end)
+    w[o + m.BENDS.other_end], w[o + m.BENDS.other_end + 1] = dot(one, other_end), dot(other, other_end)
+
+
+@kernel
 def load(h, f, w, e, M, F):
     """Normal force of bearing e for what its joint carries, and its gradients by M and F."""
     o = m.BEARING_NUMBERS.row(h, e)
@@ -237,6 +250,7 @@ def load(h, f, w, e, M, F):
     near, at_near = _sized(sub(half, tilt))
     far, at_far = _sized(add(half, tilt))
     axial, torsion = f[o + m.BEARING_NUMBERS.axial], f[o + m.BEARING_NUMBERS.torsion]
+    note_bends(h, w, e, axial * along, torsion * about, sub(half, tilt), add(half, tilt))
     size = near + far + axial * abs(along) + torsion * abs(about) + preload
     by_M = scale(lever, cross(sub(at_far, at_near), n))
     by_M = add(by_M, scale(torsion if about >= 0.0 else -torsion, n))

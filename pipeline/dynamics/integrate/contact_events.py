@@ -19,10 +19,11 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
-from flexclear.pipeline.dynamics.integrate.friction_kinks import make_end_on_kink
+from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end_on_kink, together, watch_nothing
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event
 from flexclear.pipeline.dynamics.integrate.stepper import RESTART
+from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import at, dot, sub
 
@@ -299,33 +300,19 @@ def stepped_over(h, f, w, n, c):
 
 
 def make_resolve_events(
-    evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any, regimes: Callable
+    evaluate: Callable,
+    attempt: Callable,
+    extend: Callable,
+    project: Callable,
+    method: Any,
+    regimes: Callable,
+    kinks: Kinks | None,
 ) -> Callable:
     """The kernel resolve_events(h, f, w, n, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
-    interpolate, last = method.interpolate, method.last
-    spare = method.slopes - 1  # row of SLOPES that no stage uses
-
-    @kernel
-    def evaluate_at(h, f, w, n, step, theta):
-        """Evaluate the dense output at a share of the step."""
-        interpolate(h, w, theta, h[m.Y_STAGE])
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE], slope(h, spare))
-        n[m.EVALUATIONS] += 1
-
+    last = method.last
+    evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
     follow_contacts = make_follow_contacts(evaluate, evaluate_at, extend, method, regimes)
     locate_change = make_locate_change(evaluate_at)
-
-    @kernel
-    def repeat(h, f, w, n, step):
-        """Make the step again with another length, loops closed at its end; False when it cannot be done."""
-        n[m.EVALUATIONS] += 1
-        if not attempt(h, f, w, n, step):
-            return False
-        t, final = w[h[m.CONTROL] + m.TIME] + step, slope(h, last)
-        evaluate(h, f, w, n, t, h[m.Y_NEW], final)
-        used = project(h, f, w, n, t, h[m.Y_NEW], final, 1e-3 * w[h[m.CONTROL] + m.RTOL] * w[h[m.CONTROL] + m.LENGTH])
-        n[m.EVALUATIONS] += max(used, 0)
-        return used >= 0
 
     @kernel
     def end_on_event(h, f, w, n, step, c):
@@ -341,7 +328,8 @@ def make_resolve_events(
             step += gap / rate
         return step, True
 
-    end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, regimes)
+    end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
+    end, accept = (kinks.end, kinks.accept) if kinks else (watch_nothing, watch_nothing)
 
     @kernel
     def first_change(h, f, w, n, step):
@@ -378,6 +366,7 @@ def make_resolve_events(
         t = w[h[m.CONTROL] + m.TIME]
         for shortened in range(MOST_SHORTENED + 1):
             watch_end(h, w)
+            end(h, w)
             which, first, ready = first_change(h, f, w, n, step)
             length = end_on_kink(h, f, w, n, step, first if which >= 0 else 1.0, ready)
             if length < 0.0:
@@ -385,10 +374,13 @@ def make_resolve_events(
             if length > 0.0:
                 n[m.IMMEDIATE] = 0
                 watch_end(h, w)
+                end(h, w)
+                accept(h, w)
                 extend(h, f, w, n, length)
                 return 0, follow_contacts(h, f, w, n, length, True, rows, events), t + length, length
             if which < 0:
                 n[m.IMMEDIATE] = 0
+                accept(h, w)
                 return 0, follow_contacts(h, f, w, n, step, ready, rows, events), t_new, step
             if first * step <= 1e-15 * max(abs(t), step):
                 return change_at_start(h, f, w, n, which, events), True, t, step
@@ -411,13 +403,21 @@ def make_resolve_events(
     return resolve_events
 
 
-def located(regimes: Callable) -> tuple[Callable, Callable, Callable]:
+def located(regimes: Callable, *families: Kinks) -> tuple[Callable, Callable, Callable]:
     """What the stepper calls at the start of a segment, the maker of what it calls after each step, and `any_closed`.
 
     regimes: whether contacts have regimes of sticking (`contact_phases.regimes` or `contact_phases.no_regimes`).
+    families: of the kinks of friction on which steps end.
     """
+    kinks = together(families)
+    start_kinks = kinks.start if kinks else watch_nothing
+
+    @kernel
+    def start(h, w):
+        watch_start(h, w)
+        start_kinks(h, w)
 
     def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-        return make_resolve_events(evaluate, attempt, extend, project, method, regimes)
+        return make_resolve_events(evaluate, attempt, extend, project, method, regimes, kinks)
 
-    return watch_start, make, any_closed
+    return start, make, any_closed

@@ -4,8 +4,6 @@ None of these changes the equations, so that no step ends on them; they are loca
 taken, as precisely as the integration itself. The force of a strongly damped contact peaks early in compression, so
 that its own trend is followed, not the penetration's. Each leaves a row of the motion, as an event that ends a step
 does: an impact is shorter than most output intervals, and forces and accelerations have their extremes in it.
-
-Source: Brent (1973), *Algorithms for Minimization without Derivatives*, ch. 5 (maxima).
 """
 
 from __future__ import annotations
@@ -16,15 +14,12 @@ from typing import Any
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event, snapshot
+from flexclear.pipeline.dynamics.integrate.within_step import make_locate_level, make_maximum
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: share of the step over which trends at its end are measured; a force's peak nearer to the end than this is
 #: the force at the end, to the square of this
 BACK = 1e-3
-#: a root's last correction, as a share of the step: what is left is its square, nearly; a maximum's, since it is flat
-NEAR, NEAR_MAXIMUM = 1e-8, 1e-6
-GOLDEN = 0.3819660112501051
-MOST_LOOKS = 60
 
 
 # What is watched at the ends of a step -------------------------------------------------------------------------------
@@ -103,7 +98,7 @@ def make_follow_contacts(
     has_regimes: `regimes` or `no_regimes`.
     """
     last, spare, interpolate = method.last, method.slopes - 1, method.interpolate
-    locate_level, maximum = make_searches(evaluate_at)
+    locate_level, maximum = make_locate_level(evaluate_at), make_maximum(evaluate_at)
 
     @kernel
     def measure_trends(h, f, w, n, step):
@@ -165,7 +160,7 @@ def make_follow_contacts(
         """The deepest point of this compression, as an event."""
         o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
         rate, before, after = now + m.TOUCH.rate, w[o + m.WATCH.rate0], w[o + m.WATCH.rate1]
-        theta = locate_level(h, f, w, n, step, rate, 0.0, 0.0, 1.0, before, after)
+        theta = locate_level(h, f, w, n, step, rate, 0.0, 0.0, 0.0, 1.0, before, after)
         event = events[add_event(events, n, c, m.COMPRESSION, w[h[m.CONTROL] + m.TIME] + theta * step)]
         event[m.EVENT.speed], event[m.EVENT.peak_depth] = 0.0, -w[now + m.TOUCH.gap]
         event[m.EVENT.peak_force] = w[now + m.TOUCH.normal_force]
@@ -178,7 +173,7 @@ def make_follow_contacts(
     def record_passage(h, f, w, n, step, c, a, b, fa, fb, rows, events):
         """Sticking begins or ends between the shares a and b of the step, as an event."""
         slip = m.TOUCH.row(h, c) + m.TOUCH.slip
-        theta = locate_level(h, f, w, n, step, slip, stick_speed(h, f, c), a, b, fa, fb)
+        theta = locate_level(h, f, w, n, step, slip, stick_speed(h, f, c), 0.0, a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
         add_event(events, n, c, kind, w[h[m.CONTROL] + m.TIME] + theta * step)
         record_here(h, w, n, step, theta, rows)
@@ -226,64 +221,3 @@ def make_follow_contacts(
         return ready
 
     return follow_contacts
-
-
-def make_searches(evaluate_at: Callable) -> tuple[Callable, Callable]:
-    """The kernels locate_level and maximum, which look for values of w[place] on the dense output of a step."""
-
-    @kernel
-    def locate_level(h, f, w, n, step, place, level, a, b, fa, fb):
-        """Share of the step in (a, b) where w[place] = level, fa and fb from it at the ends (Illinois rule)."""
-        side, theta = 0, b
-        for _ in range(MOST_LOOKS):
-            before = theta
-            theta = (a * fb - b * fa) / (fb - fa)
-            if not a < theta < b:
-                theta = 0.5 * (a + b)
-            evaluate_at(h, f, w, n, step, theta)
-            value = w[place] - level
-            if value == 0.0 or abs(theta - before) <= NEAR:
-                return theta
-            if (value > 0.0) == (fb > 0.0):
-                b, fb = theta, value
-                fa, side = (0.5 * fa, 1) if side == 1 else (fa, 1)
-            else:
-                a, fa = theta, value
-                fb, side = (0.5 * fb, -1) if side == -1 else (fb, -1)
-        return theta
-
-    @kernel
-    def maximum(h, f, w, n, step, place, sign):
-        """Largest sign * w[place] within the step, and where: parabolas through the best three, or golden sections."""
-        a, b, d, e = 0.0, 1.0, 0.0, 0.0
-        x = second = third = GOLDEN
-        evaluate_at(h, f, w, n, step, x)
-        fx = f_second = f_third = sign * w[place]
-        for _ in range(MOST_LOOKS):
-            middle = 0.5 * (a + b)
-            if abs(x - middle) <= 2.0 * NEAR_MAXIMUM - 0.5 * (b - a):
-                break
-            r, q = (x - second) * (f_third - fx), (x - third) * (f_second - fx)
-            p, q = (x - third) * q - (x - second) * r, 2.0 * (q - r)
-            p, q = (-p, q) if q > 0.0 else (p, -q)
-            wild = abs(p) >= abs(0.5 * q * e) or p <= q * (a - x) or p >= q * (b - x)
-            if abs(e) <= NEAR_MAXIMUM or wild:
-                e = b - x if x < middle else a - x
-                d = GOLDEN * e
-            else:
-                e, d = d, p / q
-            u = x + (d if abs(d) >= NEAR_MAXIMUM else (NEAR_MAXIMUM if d > 0.0 else -NEAR_MAXIMUM))
-            evaluate_at(h, f, w, n, step, u)
-            fu = sign * w[place]
-            if fu >= fx:
-                a, b = (x, b) if u >= x else (a, x)
-                third, f_third, second, f_second, x, fx = second, f_second, x, fx, u, fu
-            else:
-                a, b = (u, b) if u < x else (a, u)
-                if fu >= f_second or second == x:
-                    third, f_third, second, f_second = second, f_second, u, fu
-                elif fu >= f_third or third in (x, second):
-                    third, f_third = u, fu
-        return fx, x
-
-    return locate_level, maximum

@@ -4,6 +4,8 @@ A step over such a kink has less derivatives than its method and its error estim
 chance: at single tolerances ten times and more off the trend. Where an accepted step has passed a kink, it is made
 again with its end there, as near as the tolerance asks; both sides are smooth. Nothing begins afresh.
 
+Here is what all kinks share, and those of contacts; `joint_friction_kinks` has those of ideal joints.
+
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6
 (discontinuous equations).
 """
@@ -11,52 +13,111 @@ Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.contact_phases import no_regimes
+from flexclear.pipeline.dynamics.integrate.within_step import make_locate_level
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: how near to a kink a step ends, as a share of its speed over the root of the tolerance: what a step errs that ends so
-#: far beyond falls with the square of it
+#: how near to a kink a step ends, as a share of what it is measured by over the root of the tolerance: what a step errs
+#: that ends so far beyond falls with the square of it
 NEAR = 0.1
-#: speeds per contact at which its law may bend
+#: speeds per contact or bearing at which its law may bend
 SPEEDS = 2
-MOST_LOOKS, MOST_REPEATS = 20, 3
+MOST_REPEATS = 3
 #: a step that would be a smaller share of the tried one, or of the time reached, ends where it did
 SHORTEST = 1e-12
+#: what `first` gives where a step passes no kink
+NONE = (2.0, -1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+
+
+class Kinks(NamedTuple):
+    """Kernels of a family of kinks.
+
+    start(h, w), end(h, w): note what is watched at the start of a segment and at the end of a step, where it has just
+    been evaluated; accept(h, w): that end is the start of the next one.
+    first(h, f, w, n) -> (share, place, level, near, a, b, fa, fb): the kink that a step passes first, at about this
+    share of it: where w[place] passes the level between the shares a and b, at which it is off by fa and fb (only known
+    at the ends of the step); how near to the level is there; or NONE.
+    """
+
+    start: Callable
+    end: Callable
+    accept: Callable
+    first: Callable
 
 
 @kernel
-def nearness(h, w, level):
-    """How far from a kink [m/s] counts as there."""
-    return NEAR * np.sqrt(w[h[m.CONTROL] + m.RTOL]) * level
+def watch_nothing(h, w):
+    """What is watched of contacts anyway is enough."""
 
 
 @kernel
-def passes(w, o, level, near):
-    """Whether the sliding speed passes a level between the ends of a step neither of which lies on it."""
-    first, second = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level
+def nearness(h, w, size):
+    """How far from a kink counts as there, in what it is measured by, of this size."""
+    return NEAR * np.sqrt(w[h[m.CONTROL] + m.RTOL]) * size
+
+
+@kernel
+def passes(first, second, near):
+    """Whether distances from a level at the ends of a step say that it is passed, while neither end lies on it."""
     return first * second < 0.0 and min(abs(first), abs(second)) > near
 
 
 @kernel
-def first_kink(h, f, w, n, before):
-    """Contact that passes a kink first, before a share of the step, and the speed of the kink; -1 without one."""
-    which, speed, least = -1, 0.0, before
+def first_of_contacts(h, f, w, n):
+    """The kink that a closed contact passes first (`Kinks.first`)."""
+    found = NONE
     for c in range(h[m.N_CONTACTS]):
         if n[n[m.MODE] + c] != 1:
             continue
         o, kinks = m.WATCH.row(h, c), m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.kinks
         for k in range(SPEEDS):
             level = f[kinks + k]
-            if not level > 0.0 or not passes(w, o, level, nearness(h, w, level)):
-                continue
-            share = (w[o + m.WATCH.slip0] - level) / (w[o + m.WATCH.slip0] - w[o + m.WATCH.slip1])
-            if share < least:
-                which, speed, least = c, level, share
-    return which, speed
+            first, second, near = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level, nearness(h, w, level)
+            if level > 0.0 and passes(first, second, near) and first / (first - second) < found[0]:
+                share, place = first / (first - second), m.TOUCH.row(h, c) + m.TOUCH.slip
+                found = (share, place, level, near, 0.0, 1.0, first, second)
+    return found
+
+
+CONTACT_KINKS = Kinks(watch_nothing, watch_nothing, watch_nothing, first_of_contacts)
+
+
+def _beside(one: Kinks, other: Kinks) -> Kinks:
+    """Two families as one."""
+    start_one, start_other, end_one, end_other = one.start, other.start, one.end, other.end
+    accept_one, accept_other, first_one, first_other = one.accept, other.accept, one.first, other.first
+
+    @kernel
+    def start(h, w):
+        start_one(h, w)
+        start_other(h, w)
+
+    @kernel
+    def end(h, w):
+        end_one(h, w)
+        end_other(h, w)
+
+    @kernel
+    def accept(h, w):
+        accept_one(h, w)
+        accept_other(h, w)
+
+    @kernel
+    def first(h, f, w, n):
+        a, b = first_one(h, f, w, n), first_other(h, f, w, n)
+        return a if a[0] <= b[0] else b
+
+    return Kinks(start, end, accept, first)
+
+
+def together(kinks: tuple[Kinks, ...]) -> Kinks | None:
+    """Families of kinks as one; None where there are none."""
+    return reduce(_beside, kinks) if kinks else None
 
 
 @kernel
@@ -65,44 +126,33 @@ def no_kinks(h, f, w, n, step, before, ready):
     return 0.0
 
 
-def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, regimes: Callable) -> Callable:
+def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, kinks: Kinks | None) -> Callable:
     """The kernel end_on_kink(h, f, w, n, step, before, ready): length of the step that ends on a kink instead.
 
     0 without one before a share of the step; -1 when the step cannot be made again. ready: the dense output.
-    evaluate_at, repeat: of `contact_events`.  regimes: tells whether any contact has friction.
+    evaluate_at, repeat: of `within_step`.
     """
-    if regimes is no_regimes:
+    if kinks is None:
         return no_kinks
+    first_kink, locate_level = kinks.first, make_locate_level(evaluate_at)
 
     @kernel
-    def share_of_kink(h, f, w, n, step, c, level):
-        """Share of the step at which the sliding speed of contact c reaches a level, on the dense output."""
-        o, slip, near = m.WATCH.row(h, c), m.TOUCH.row(h, c) + m.TOUCH.slip, nearness(h, w, level)
-        a, b, fa, fb, side = 0.0, 1.0, w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level, 0
-        theta = 0.5
-        for _ in range(MOST_LOOKS):
-            theta = (a * fb - b * fa) / (fb - fa)
-            evaluate_at(h, f, w, n, step, theta)
-            value = w[slip] - level
-            if abs(value) <= near:
-                return theta
-            if (value > 0.0) == (fb > 0.0):
-                b, fb = theta, value
-                fa, side = (0.5 * fa, 1) if side == 1 else (fa, 1)
-            else:
-                a, fa = theta, value
-                fb, side = (0.5 * fb, -1) if side == -1 else (fb, -1)
-        return theta
+    def value_at(h, f, w, n, step, theta, place, level):
+        """How far beyond the level w[place] is at a share of the step."""
+        evaluate_at(h, f, w, n, step, theta)
+        return w[place] - level
 
     @kernel
-    def land(h, f, w, n, step, theta, c, level):
-        """Make the step end on the level, from a first guess: its length; -1 when it cannot be made."""
-        slip, near = m.TOUCH.row(h, c) + m.TOUCH.slip, nearness(h, w, level)
-        length, before, off_before = theta * step, 0.0, w[m.WATCH.row(h, c) + m.WATCH.slip0] - level
+    def land(h, f, w, n, step, theta, place, level, near, before, off_before):
+        """Make the step end on the level, from a first guess: its length; -1 when it cannot be made.
+
+        before, off_before: another share of the step, and how far beyond the level it is.
+        """
+        length, before = theta * step, before * step
         for k in range(MOST_REPEATS):
             if not repeat(h, f, w, n, length):
                 return -1.0
-            off = w[slip] - level
+            off = w[place] - level
             if abs(off) <= near or k == MOST_REPEATS - 1 or off == off_before:
                 return length
             better = length - off * (length - before) / (off - off_before)
@@ -113,17 +163,21 @@ def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, 
 
     @kernel
     def end_on_kink(h, f, w, n, step, before, ready):
-        if w[h[m.CONTROL] + m.FIXED] > 0.0:
-            return 0.0
-        c, level = first_kink(h, f, w, n, before)
-        if c < 0:
+        share, place, level, near, a, b, fa, fb = first_kink(h, f, w, n)
+        if not share < before:
             return 0.0
         if not ready:
             extend(h, f, w, n, step)
-        theta = share_of_kink(h, f, w, n, step, c, level)
+        if a > 0.0:
+            fa = value_at(h, f, w, n, step, a, place, level)
+        if b < 1.0:
+            fb = value_at(h, f, w, n, step, b, place, level)
+        if fa * fb >= 0.0:  # the way to it is bent
+            return 0.0
+        theta = locate_level(h, f, w, n, step, place, level, near, a, b, fa, fb)
         if not theta < before or theta * step <= SHORTEST * max(abs(w[h[m.CONTROL] + m.TIME]), step):
             return 0.0
-        length = land(h, f, w, n, step, theta, c, level)
+        length = land(h, f, w, n, step, theta, place, level, near, a, fa)
         if length < 0.0:
             return 0.0 if repeat(h, f, w, n, step) else -1.0
         return length

@@ -164,6 +164,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], column
         m.LOAD: int(h[m.N_LOADS]),
         m.WATCH: contacts,
         m.BEARING: bearings,
+        m.BENDS: 3 * bearings,
         m.REACTIONS: int(h[m.N_RUBBING]) * (1 + bearings),
     }
     lengths = {table.place: table.size * count for table, count in tables.items()} | {

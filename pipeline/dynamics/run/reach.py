@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run import singular
@@ -32,6 +33,32 @@ def beyond_reach(engine: Engine) -> str:
     told = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
     engine.w[:], engine.n[:] = kept
     return told
+
+
+def require_shallow(engine: Engine) -> None:
+    """SolverError for a contact that is pressed through its socket at the stepper's state.
+
+    Contacts give way where ideal joints do not, so that a drive leads a loop with clearance beyond its reach in ever
+    shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
+    """
+    from flexclear.pipeline.dynamics.contact.validity import pressed_through
+
+    model, kept = engine.model, (engine.w.copy(), engine.n.copy())
+    t = float(engine.control[m.TIME])
+    engine.attempt(engine.view(m.Y).copy(), t)
+    gaps = engine.table(m.TOUCH)["gap"].copy()
+    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
+    engine.w[:], engine.n[:] = kept
+    for contact, gap in zip(model.contacts, gaps, strict=True):
+        if told := pressed_through(contact.words, contact.joint, -float(gap)):
+            remedy = "choose a stiffer contact, a slower impact or smaller loads"
+            if model.drives and np.any(powers > 0.0):
+                drive = model.drives[int(np.argmax(powers))]
+                remedy = (
+                    f"drive {drive} leads out of reach: shorten the travel in [drive.{drive.partition('.')[0]}], or "
+                    f"change lengths; else {remedy}"
+                )
+            raise SolverError(f"at t = {t:.6g} s: {told}: {remedy}")
 
 
 def end_in_pose(engine: Engine, rows: np.ndarray) -> str:

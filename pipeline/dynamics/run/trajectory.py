@@ -18,6 +18,7 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.pace import Judge, crawls
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
+from flexclear.pipeline.dynamics.run.reach import require_shallow
 from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
 from flexclear.pipeline.dynamics.run.singular_start import start_motion
 from flexclear.pipeline.dynamics.run.specialised import settle
@@ -299,9 +300,11 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
         elif status != m.PAUSED:
             if not _rescued(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
-        elif reason := judge.verdict(engine):
-            raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
         else:
+            if engine.model.contacts:
+                require_shallow(engine)
+            if reason := judge.verdict(engine):
+                raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
             settle(engine, progress)
             _warn(engine, tape, progress)
             if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):

@@ -236,7 +236,7 @@ def _becomes_chaotic(data: Data) -> Outcome:
     """Periodic without clearance is a matter of course; quasi-periodic with it, chaotic with the rod's modes too."""
     if not SECTIONS.is_file():
         return _one_stroke(data)
-    with SECTIONS.open(newline="") as file:
+    with SECTIONS.open(newline="", encoding="utf-8") as file:
         found = {row["scene"]: row for row in csv.DictReader(file)}
     wanted = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
     told = [f"{_set(model) or model.label} {_motion(found[model.scene])}" for model in wanted]

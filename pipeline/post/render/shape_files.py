@@ -1,4 +1,4 @@
-"""Surfaces from files: the only place besides `pipeline.structure` that reads meshes, and only to draw them."""
+"""Surfaces from files, to be drawn."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.foreign import require_mesh
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.foreign import mesh as foreign_mesh
+from flexclear.pipeline.core.foreign.apart import UnreadableError
+from flexclear.pipeline.core.foreign.checks import require_mesh
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 
@@ -23,21 +24,17 @@ _SIDES = {
 
 def read(path: Path, unit: float) -> Surface:
     """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
-    import meshio
-
     require_mesh(path, f"{path}", LARGEST)
-    opened.note(path)  # some readers are not written in Python
     try:
-        # meshio takes text for the length of a binary file, to see that it is none
-        with np.errstate(over="ignore"), opened.ordinary_only():
-            mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:  # meshio ends the process for what it does not know
-        said = str(error) if not isinstance(error, SystemExit) else "meshio does not know its format"
+        mesh = foreign_mesh.read(path)
+    except UnreadableError as error:
         raise InputError(
-            f"{path}", f"is no surface that can be drawn: {said}", "give an STL, VTK, PLY or OBJ file"
+            f"{path}", f"is no surface that can be drawn: {error}", "give an STL, VTK, PLY or OBJ file"
         ) from None
     faces = []
     for block in mesh.cells:
+        if block.data.ndim != 2:
+            continue  # polygons
         if block.type in ("triangle", "quad"):
             faces.append(surfaces.triangulated(block.data.astype(int)))
         elif block.type in _SIDES:

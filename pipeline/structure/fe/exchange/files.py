@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import csv
-import zipfile
 from dataclasses import dataclass
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +11,10 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.errors import FlexclearError, InputError, shown
-from flexclear.pipeline.core.foreign import require_file
+from flexclear.pipeline.core.foreign import archive
+from flexclear.pipeline.core.foreign.apart import UnreadableError
+from flexclear.pipeline.core.foreign.checks import require_file
 from flexclear.pipeline.structure.fe.exchange import market
 from flexclear.pipeline.structure.fe.exchange.market import COPIES, SMALLER
 from flexclear.pipeline.structure.fe.model import Model
@@ -106,11 +105,7 @@ def read_npz(path: Path, where: str) -> Contents:
     """A file as `write_npz` makes it; InputError when something is missing."""
     require_file(path, where)
     try:
-        with zipfile.ZipFile(path) as packed:
-            need = sum(entry.file_size for entry in packed.infolist())
-        machine.require_memory(COPIES * need, f"{where}: '{path.name}' unpacked", SMALLER)
-        with np.load(path, allow_pickle=False) as file:
-            data = {name: file[name] for name in file.files}
+        data = archive.read(path, where, COPIES, SMALLER)
         found = Table(
             _array(data, "node", "iu"), _array(data, "component", "iu"), _array(data, "position", "iuf", (None, 3))
         )
@@ -127,7 +122,7 @@ def read_npz(path: Path, where: str) -> Contents:
             data[name] = _array(data, name, "iuf", None)
     except FlexclearError:
         raise
-    except Exception as error:  # damaged, it makes readers of zip, zlib and NumPy fail in ways of their own
+    except Exception as error:  # what arrays are lacking or do not fit makes NumPy and SciPy fail in many ways
         reason = shown(str(error) or type(error).__name__)
         raise InputError(where, f"'{path.name}' holds no matrices: {reason}", "write it with exchange.files") from None
     return Contents(matrices[0], matrices[1], found, data)
@@ -165,11 +160,8 @@ def _matrix(path: Path, where: str) -> sp.coo_array:
     require_file(path, where)
     try:
         return market.read(path, where)
-    except FlexclearError:
-        raise
-    except Exception as error:  # damaged, it makes readers of text and archives fail in ways of their own
-        reason = shown(str(error) or type(error).__name__)
-        raise InputError(where, f"'{path.name}' is no MatrixMarket file: {reason}") from None
+    except UnreadableError as error:
+        raise InputError(where, f"'{path.name}' is no MatrixMarket file: {error}") from None
 
 
 def _component(text: str) -> int:
@@ -183,12 +175,9 @@ def _table(path: Path, where: str, count: int) -> Table:
     """The table of so many rows; one more is read, so that a longer one is noticed."""
     require_file(path, where)
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))
-        node = np.array([int(row["node"]) for row in rows])
-        position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows])
-        component = np.array([_component(row["component"]) for row in rows])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, csv.Error, OverflowError) as error:
+        rows = market.read_unknowns(path, count)
+        component = np.array([_component(text) for text in rows["component"]])
+    except ValueError as error:
         hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
         raise InputError(where, f"'{path.name}' is no table of unknowns: {error}", hint) from None
-    return Table(node, component, position.reshape(-1, 3))
+    return Table(rows["node"], component, rows["position"])

@@ -9,17 +9,20 @@ Source: Boisvert, Pozo and Remington (1996), The Matrix Market exchange formats:
 from __future__ import annotations
 
 import bz2
+import csv
 import gzip
 import warnings
 from collections.abc import Callable
 from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 import numpy as np
 import scipy.sparse as sp
 
 from flexclear.pipeline.core import machine
+from flexclear.pipeline.core.foreign import apart
 
 #: what a file holds is in memory so many times while it is checked and brought into SI units
 COPIES = 4.0
@@ -32,20 +35,47 @@ OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
 def read(path: Path, where: str) -> sp.coo_array:
-    """A real matrix, coordinates or array, general or symmetric; ValueError in words when it is not.
+    """A real matrix, coordinates or array, general or symmetric; `apart.UnreadableError` in words when it is not.
 
-    Raises ResourceError when its header promises more than memory can hold.
+    Raises ResourceError when its header promises more than memory can hold, and as `apart.read` does.
     """
+    found = apart.read(entries, path, where, apart.allowed())
+    return sp.coo_array((found["value"], (found["row"], found["column"])), shape=tuple(found["shape"]))
+
+
+def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
+    """What `read` says, in the child: shape, row, column and value. allowed: bytes of memory."""
     with OPENERS.get(path.suffix, open)(path, "rt", encoding="utf-8", errors="strict") as file:
         layout, symmetric = _kind(file.readline(LONGEST))
         rows, columns, *rest = _sizes(file)
         count = rest[0] if rest else rows * columns
-        machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER)
+        machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER, allowed)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of a file without entries, which is told below
             # one more than there should be: packed files have no end that their size tells
-            entries = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
-    return _sparse(entries, rows, columns, count, symmetric) if layout else _dense(entries, rows, columns, symmetric)
+            held = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
+    found = _sparse(held, rows, columns, count, symmetric) if layout else _dense(held, rows, columns, symmetric)
+    return {"shape": list(found.shape), "row": found.row, "column": found.col, "value": found.data}
+
+
+def read_unknowns(path: Path, count: int) -> dict[str, Any]:
+    """A table of unknowns, of so many rows at most and one more, which tells that it is longer.
+
+    node: numbers.  component: texts.  position: shape (rows, 3).  Raises `apart.UnreadableError`.
+    """
+    found: dict[str, Any] = apart.read(unknowns, path, count)
+    return found
+
+
+def unknowns(path: Path, count: int) -> dict[str, Any]:
+    """What `read_unknowns` says, in the child."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))
+    return {
+        "node": np.array([int(row["node"]) for row in rows], dtype=np.int64),
+        "component": [str(row["component"]) for row in rows],
+        "position": np.array([[float(row[axis]) for axis in "xyz"] for row in rows]).reshape(-1, 3),
+    }
 
 
 def _kind(line: str) -> tuple[bool, bool]:

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
-import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.foreign import require_mesh
+from flexclear.pipeline.core.foreign import mesh as foreign_mesh
+from flexclear.pipeline.core.foreign.apart import UnreadableError
+from flexclear.pipeline.core.foreign.checks import require_mesh
+from flexclear.pipeline.core.foreign.mesh import Mesh
 from flexclear.pipeline.core.units import UNITS
-from flexclear.pipeline.core.workflow import opened
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
@@ -23,8 +21,6 @@ NAMES = {element.cell: name for name, element in ELEMENTS.items()}
 #: cells that may come along; those of faces name surfaces
 FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 BESIDES = ("vertex", "line", "line3", *FACES)
-#: what meshio keeps among the sets of cells of a Gmsh 4 file, but numbers of curves and points
-NO_CELLS = "gmsh:bounding_entities"
 #: an integer array of cell data with more values than this numbers the cells and names no regions
 MOST_REGIONS = 1000
 REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
@@ -45,33 +41,15 @@ def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
     return Geometry(NAMES[name], nodes, inverse.reshape(cells.shape), node_regions, cell_regions)
 
 
-def _read(path: Path, where: str) -> Any:
-    import meshio  # slow to import, and only meshes from files need it
-
+def _read(path: Path, where: str) -> Mesh:
     require_mesh(path, where)
-    _note_companions(path)
-    said = io.StringIO()
     try:
-        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), opened.ordinary_only():
-            return meshio.read(path)
-    except SystemExit:
-        # meshio prints its reason and ends the process where the content is not what it knows of that suffix
-        words = " ".join(said.getvalue().split())
-        raise InputError(where, f"meshio cannot read '{path.name}': {words}", REWRITE) from None
-    except Exception as error:
-        reason = str(error) or type(error).__name__
-        raise InputError(where, f"meshio cannot read '{path.name}': {reason}", REWRITE) from None
+        return foreign_mesh.read(path)
+    except UnreadableError as error:
+        raise InputError(where, f"meshio cannot read '{path.name}': {error}", REWRITE) from None
 
 
-def _note_companions(path: Path) -> None:
-    """XDMF keeps its numbers in HDF5 files, which a library in C opens."""
-    if path.suffix in (".xdmf", ".xmf"):
-        words = re.split(r"[\s<>]+", path.read_text(encoding="utf-8", errors="replace"))
-        for name in {word.partition(".h5:")[0] for word in words if ".h5:" in word}:
-            opened.note(path.parent / f"{name}.h5")
-
-
-def _cell_type(mesh: Any, where: str) -> str:
+def _cell_type(mesh: Mesh, where: str) -> str:
     found = {block.type: sum(len(b.data) for b in mesh.cells if b.type == block.type) for block in mesh.cells}
     solid = {name: count for name, count in found.items() if name not in BESIDES}
     listed = ", ".join(f"{count} {name}" for name, count in (solid or found).items()) or "no cells at all"
@@ -86,7 +64,7 @@ def _cell_type(mesh: Any, where: str) -> str:
     return name
 
 
-def _cells(blocks: list[Any], nodes: int, points: int, where: str) -> np.ndarray:
+def _cells(blocks: list[np.ndarray], nodes: int, points: int, where: str) -> np.ndarray:
     """Nodes of all solid cells, shape (cells, nodes); readers may have lost some on the way."""
     wrong = [np.shape(block)[1:] for block in blocks if np.shape(block)[1:] != (nodes,)]
     if wrong:
@@ -100,14 +78,14 @@ def _cells(blocks: list[Any], nodes: int, points: int, where: str) -> np.ndarray
     return cells
 
 
-def _points(mesh: Any, where: str) -> np.ndarray:
+def _points(mesh: Mesh, where: str) -> np.ndarray:
     points = np.asarray(mesh.points, dtype=float)
     if points.shape[1] != 3 or not np.isfinite(points).all():
         raise InputError(where, "the nodes' coordinates are not three finite numbers each", REWRITE)
     return points
 
 
-def _regions(mesh: Any, solid: list[int], renumber: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+def _regions(mesh: Mesh, solid: list[int], renumber: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Regions of solid cells (indices into all of them) and of nodes (renumbered), by name.
 
     Numbers of faces and of solid cells may be counted apart: where a group has both, its nodes are those of the faces.
@@ -122,26 +100,18 @@ def _regions(mesh: Any, solid: list[int], renumber: np.ndarray) -> tuple[dict[st
                 of_cells.setdefault(name, []).append(first[solid.index(k)] + chosen[k])
             if len(chosen[k]) and (not faces or k in faces):
                 of_nodes.setdefault(name, []).append(block.data[chosen[k]].ravel())
-    for name, nodes in (mesh.point_sets or {}).items():
-        of_nodes.setdefault(str(name), []).append(np.asarray(nodes, dtype=np.int64).ravel())
+    for name, nodes in mesh.point_sets.items():
+        of_nodes.setdefault(name, []).append(nodes)
     cells = {name: np.unique(np.concatenate(parts)) for name, parts in of_cells.items()}
     numbers = {name: np.unique(renumber[np.concatenate(parts)]) for name, parts in of_nodes.items()}
     return cells, {name: found[found >= 0] for name, found in numbers.items()}
 
 
-def _cell_groups(mesh: Any) -> list[tuple[str, list[np.ndarray]]]:
+def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
     """Named groups of cells: for each block, the indices that belong to it."""
-    groups: list[tuple[str, list[np.ndarray]]] = []
-    for name, chosen in (mesh.cell_sets or {}).items():
-        if name == NO_CELLS:
-            continue
-        parts = [np.empty(0, dtype=np.int64) if c is None else np.asarray(c, dtype=np.int64).ravel() for c in chosen]
-        groups.append((str(name), parts))
-    named = {(int(tag), int(dim)): str(name) for name, (tag, dim) in (mesh.field_data or {}).items()}
-    for key, data in (mesh.cell_data or {}).items():
-        values = [np.asarray(part) for part in data]
-        if any(part.dtype.kind not in "iu" or part.ndim != 1 for part in values):
-            continue
+    groups = list(mesh.cell_sets.items())
+    named = {(tag, dim): name for name, (tag, dim) in mesh.field_data.items()}
+    for key, values in mesh.cell_data.items():
         different = np.unique(np.concatenate(values))
         for value in different if len(different) <= MOST_REGIONS else ():
             chosen = [np.flatnonzero(part == value) for part in values]
@@ -152,7 +122,7 @@ def _cell_groups(mesh: Any) -> list[tuple[str, list[np.ndarray]]]:
 
 
 def _physical(
-    mesh: Any, tag: int, chosen: list[np.ndarray], named: dict[tuple[int, int], str]
+    mesh: Mesh, tag: int, chosen: list[np.ndarray], named: dict[tuple[int, int], str]
 ) -> list[tuple[str, list[np.ndarray]]]:
     """A Gmsh tag's groups by their names; tags of surfaces and volumes are counted apart."""
     found = []

@@ -1,0 +1,19 @@
+"""Names of files that every system takes and tells apart: results are sent from one to another."""
+
+from __future__ import annotations
+
+import unicodedata
+
+#: names of devices on Windows, whatever their suffix
+#: (https://learn.microsoft.com/windows/win32/fileio/naming-a-file)
+DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{k}" for port in ("com", "lpt") for k in "0123456789¹²³")])
+
+
+def folded(name: str) -> str:
+    """What stands for all names that some system takes for the same: capitals and small letters, composed or not."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def is_device(name: str) -> bool:
+    """Whether a name, with any suffix, is that of a device on Windows, where no file can have it."""
+    return folded(name.partition(".")[0].rstrip()) in DEVICES

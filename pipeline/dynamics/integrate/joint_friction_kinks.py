@@ -1,0 +1,183 @@
+"""Steps end where the friction of an ideal joint bends.
+
+It does so at the sliding speeds that its law names, where sliding reverses if the law has bristles, and where something
+that presses reverses, since loads are sums of magnitudes: the force along an axis, the moment about it, and the forces
+at both ends where they lie in a plane. A vector that reverses passes zero; one that passes zero at a distance turns
+smoothly.
+
+A joint that is driven to and fro passes its speeds twice within a step that its error estimate may accept, when the
+sliding speeds at both ends are the same. So they are looked for on the straight way between the sliding velocities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.friction_kinks import (
+    NONE,
+    SPEEDS,
+    Kinks,
+    make_end_on_kink,
+    nearness,
+    passes,
+)
+from flexclear.pipeline.dynamics.integrate.stepper import none_closed
+from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_repeat
+from flexclear.pipeline.dynamics.kernels import kernel
+
+#: a vector reverses that passes zero within this share of its way: where a mechanism moves in a plane that is rounding
+REVERSES = 1e-6
+
+
+@kernel
+def at_start(h, e):
+    """Row of BENDS of bearing e at the start of the step."""
+    return m.BENDS.row(h, h[m.N_BEARINGS] + e)
+
+
+@kernel
+def at_end(h, e):
+    """The same at its end."""
+    return m.BENDS.row(h, 2 * h[m.N_BEARINGS] + e)
+
+
+@kernel
+def _copy(h, w, source, target):
+    for k in range(m.BENDS.size * h[m.N_BEARINGS]):
+        w[target + k] = w[source + k]
+
+
+@kernel
+def watch_start(h, w):
+    """Note what bends the friction of all bearings where a segment starts, which has just been evaluated."""
+    _copy(h, w, m.BENDS.row(h, 0), at_start(h, 0))
+
+
+@kernel
+def watch_end(h, w):
+    """The same at the end of a step."""
+    _copy(h, w, m.BENDS.row(h, 0), at_end(h, 0))
+
+
+@kernel
+def end_becomes_start(h, w):
+    """The end of an accepted step is the start of the next."""
+    _copy(h, w, at_end(h, 0), at_start(h, 0))
+
+
+@kernel
+def magnitude(w, a, size):
+    """Of a vector in w."""
+    square = 0.0
+    for k in range(size):
+        square += w[a + k] * w[a + k]
+    return np.sqrt(square)
+
+
+@kernel
+def closest(w, a, b, size):
+    """Share of the straight way between two vectors in w where it is closest to zero, its distance, and its length."""
+    way, along, distance = 0.0, 0.0, 0.0
+    for k in range(size):
+        d = w[b + k] - w[a + k]
+        way, along = way + d * d, along - d * w[a + k]
+    share = along / way if way > 0.0 else 0.0
+    for k in range(size):
+        there = w[a + k] + share * (w[b + k] - w[a + k])
+        distance += there * there
+    return share, np.sqrt(distance), np.sqrt(way)
+
+
+@kernel
+def speed_passed(h, f, w, e, level):
+    """The kink of bearing e at a sliding speed (`Kinks.first`)."""
+    a, b, near = at_start(h, e) + m.BENDS.sliding, at_end(h, e) + m.BENDS.sliding, nearness(h, w, level)
+    place = m.BEARING.row(h, e) + m.BEARING.slip
+    first, second = magnitude(w, a, 3) - level, magnitude(w, b, 3) - level
+    if passes(first, second, near):
+        return first / (first - second), place, level, near, 0.0, 1.0, first, second
+    share, distance, _ = closest(w, a, b, 3)
+    inside = distance - level
+    if not (0.0 < share < 1.0 and inside < -near and min(first, second) > -near):
+        return NONE
+    if first > near:
+        return share * first / (first - inside), place, level, near, 0.0, share, first, inside
+    if second > near:
+        back = (1.0 - share) * second / (second - inside)
+        return 1.0 - back, place, level, near, share, 1.0, inside, second
+    return NONE
+
+
+@kernel
+def reversal(h, w, e, field, size, near):
+    """The kink of bearing e where a vector of BENDS reverses (`Kinks.first`)."""
+    now, a, b = m.BENDS.row(h, e) + field, at_start(h, e) + field, at_end(h, e) + field
+    share, distance, way = closest(w, a, b, size)
+    apart = min(magnitude(w, a, size), magnitude(w, b, size)) > near
+    if not (0.0 < share < 1.0 and distance <= REVERSES * way and apart):
+        return NONE
+    k = 0
+    for i in range(1, size):
+        if abs(w[b + i] - w[a + i]) > abs(w[b + k] - w[a + k]):
+            k = i
+    return share, now + k, 0.0, near, 0.0, 1.0, w[a + k], w[b + k]
+
+
+@kernel
+def sooner(one, other):
+    """Which of two kinks a step passes first."""
+    return one if one[0] <= other[0] else other
+
+
+@kernel
+def first_of_bearings(h, f, w, n):
+    """The kink that a bearing passes first (`Kinks.first`)."""
+    found = NONE
+    for e in range(h[m.N_BEARINGS]):
+        numbers, load = m.BEARING_NUMBERS.row(h, e), nearness(h, w, w[m.BEARING.row(h, e) + m.BEARING.load])
+        for k in range(SPEEDS):
+            level = f[numbers + m.BEARING_NUMBERS.kinks + k]
+            if level > 0.0:
+                found = sooner(found, speed_passed(h, f, w, e, level))
+        turning = f[numbers + m.BEARING_NUMBERS.turning_kink]
+        if turning > 0.0:
+            found = sooner(found, reversal(h, w, e, m.BENDS.sliding, 3, nearness(h, w, turning)))
+        found = sooner(found, reversal(h, w, e, m.BENDS.along, 1, load))
+        found = sooner(found, reversal(h, w, e, m.BENDS.about, 1, load))
+        found = sooner(found, reversal(h, w, e, m.BENDS.one_end, 2, load))
+        found = sooner(found, reversal(h, w, e, m.BENDS.other_end, 2, load))
+    return found
+
+
+BEARING_KINKS = Kinks(watch_start, watch_end, end_becomes_start, first_of_bearings)
+
+
+def kinks_alone(kinks: Kinks) -> tuple[Callable, Callable, Callable]:
+    """`events` of scenes with kinks and without contacts, as `contact_events.located` gives them."""
+    start, end, accept = kinks.start, kinks.end, kinks.accept
+
+    def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+        evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
+        end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
+
+        @kernel
+        def resolve_events(h, f, w, n, step, t_new, rows, events):
+            end(h, w)
+            length = end_on_kink(h, f, w, n, step, 1.0, False)
+            if length < 0.0:
+                n[m.STATUS] = m.LOST_CLOSURE
+                return -1, False, t_new, step
+            if length == 0.0:
+                accept(h, w)
+                return 0, False, t_new, step
+            end(h, w)
+            accept(h, w)
+            return 0, False, w[h[m.CONTROL] + m.TIME] + length, length
+
+        return resolve_events
+
+    return start, make, none_closed

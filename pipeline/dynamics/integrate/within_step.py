@@ -1,0 +1,121 @@
+"""Looking into a step by its dense output, and making it again: what events and kinks of friction are located with.
+
+Source: Brent (1973), *Algorithms for Minimization without Derivatives*, ch. 5 (maxima); Dowell & Jarratt (1971), *BIT*
+11, 168-174 (the Illinois rule).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.kernels import kernel
+
+#: a root's last correction, as a share of the step: what is left is its square, nearly; a maximum's, since it is flat
+NEAR, NEAR_MAXIMUM = 1e-8, 1e-6
+GOLDEN = 0.3819660112501051
+MOST_LOOKS = 60
+
+
+def make_evaluate_at(evaluate: Callable, method: Any) -> Callable:
+    """The kernel evaluate_at(h, f, w, n, step, theta): evaluates the dense output at a share of the step."""
+    interpolate, spare = method.interpolate, method.slopes - 1  # a row of SLOPES that no stage uses
+
+    @kernel
+    def evaluate_at(h, f, w, n, step, theta):
+        interpolate(h, w, theta, h[m.Y_STAGE])
+        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE], slope(h, spare))
+        n[m.EVALUATIONS] += 1
+
+    return evaluate_at
+
+
+def make_repeat(evaluate: Callable, attempt: Callable, project: Callable, method: Any) -> Callable:
+    """The kernel repeat(h, f, w, n, step): the step again with another length; False when it cannot be made."""
+    last = method.last
+
+    @kernel
+    def repeat(h, f, w, n, step):
+        """Make the step again with another length, loops closed at its end."""
+        n[m.EVALUATIONS] += 1
+        if not attempt(h, f, w, n, step):
+            return False
+        t, final = w[h[m.CONTROL] + m.TIME] + step, slope(h, last)
+        evaluate(h, f, w, n, t, h[m.Y_NEW], final)
+        used = project(h, f, w, n, t, h[m.Y_NEW], final, 1e-3 * w[h[m.CONTROL] + m.RTOL] * w[h[m.CONTROL] + m.LENGTH])
+        n[m.EVALUATIONS] += max(used, 0)
+        return used >= 0
+
+    return repeat
+
+
+def make_locate_level(evaluate_at: Callable) -> Callable:
+    """The kernel locate_level(h, f, w, n, step, place, level, enough, a, b, fa, fb) -> share of the step."""
+
+    @kernel
+    def locate_level(h, f, w, n, step, place, level, enough, a, b, fa, fb):
+        """Share of the step in (a, b) where w[place] = level, fa and fb from it at the ends (Illinois rule).
+
+        It is also found where w[place] is no further from the level than `enough`.
+        """
+        side, theta = 0, b
+        for _ in range(MOST_LOOKS):
+            before = theta
+            theta = (a * fb - b * fa) / (fb - fa)
+            if not a < theta < b:
+                theta = 0.5 * (a + b)
+            evaluate_at(h, f, w, n, step, theta)
+            value = w[place] - level
+            if abs(value) <= enough or abs(theta - before) <= NEAR:
+                return theta
+            if (value > 0.0) == (fb > 0.0):
+                b, fb = theta, value
+                fa, side = (0.5 * fa, 1) if side == 1 else (fa, 1)
+            else:
+                a, fa = theta, value
+                fb, side = (0.5 * fb, -1) if side == -1 else (fb, -1)
+        return theta
+
+    return locate_level
+
+
+def make_maximum(evaluate_at: Callable) -> Callable:
+    """The kernel maximum(h, f, w, n, step, place, sign) -> largest sign * w[place] within the step, and where."""
+
+    @kernel
+    def maximum(h, f, w, n, step, place, sign):
+        """Largest sign * w[place] within the step, and where: parabolas through the best three, or golden sections."""
+        a, b, d, e = 0.0, 1.0, 0.0, 0.0
+        x = second = third = GOLDEN
+        evaluate_at(h, f, w, n, step, x)
+        fx = f_second = f_third = sign * w[place]
+        for _ in range(MOST_LOOKS):
+            middle = 0.5 * (a + b)
+            if abs(x - middle) <= 2.0 * NEAR_MAXIMUM - 0.5 * (b - a):
+                break
+            r, q = (x - second) * (f_third - fx), (x - third) * (f_second - fx)
+            p, q = (x - third) * q - (x - second) * r, 2.0 * (q - r)
+            p, q = (-p, q) if q > 0.0 else (p, -q)
+            wild = abs(p) >= abs(0.5 * q * e) or p <= q * (a - x) or p >= q * (b - x)
+            if abs(e) <= NEAR_MAXIMUM or wild:
+                e = b - x if x < middle else a - x
+                d = GOLDEN * e
+            else:
+                e, d = d, p / q
+            u = x + (d if abs(d) >= NEAR_MAXIMUM else (NEAR_MAXIMUM if d > 0.0 else -NEAR_MAXIMUM))
+            evaluate_at(h, f, w, n, step, u)
+            fu = sign * w[place]
+            if fu >= fx:
+                a, b = (x, b) if u >= x else (a, x)
+                third, f_third, second, f_second, x, fx = second, f_second, x, fx, u, fu
+            else:
+                a, b = (u, b) if u < x else (a, u)
+                if fu >= f_second or second == x:
+                    third, f_third, second, f_second = second, f_second, u, fu
+                elif fu >= f_third or third in (x, second):
+                    third, f_third = u, fu
+        return fx, x
+
+    return maximum
