@@ -78,19 +78,21 @@ class Sources:
         return self.read[name]
 
     def _reach(self, wanted: frozenset[str]) -> dict[str, Module]:
-        found: dict[str, Module] = {}
+        found, seen = dict[str, Module](), set[str]()
         waiting = sorted(wanted)
         for name in waiting:
             if self.module(name) is None:
                 raise LookupError(f"no module {name} under {self.root}")
         while waiting:
             name = waiting.pop()
-            module = self.module(name)
-            if name in found or module is None:
+            if name in seen:
                 continue
-            found[name] = module
-            waiting.extend(module.own)
-            waiting.extend(parents(name))
+            seen.add(name)
+            module = self.module(name)
+            if module is not None:
+                found[name] = module
+                waiting.extend(module.own)
+                waiting.extend(parents(name))
         return found
 
     def _parse(self, path: Path, name: str) -> Module:

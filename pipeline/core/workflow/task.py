@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from json.encoder import encode_basestring
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -109,13 +111,29 @@ def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
     """
+    found: list[tuple[str, str]] = []
+    _gather(node, place, found)
+    return found
+
+
+def _gather(node: Any, place: str, found: list[tuple[str, str]]) -> None:
+    """`flatten` into a list: a report has tens of thousands of leaves."""
+    kind = type(node)
+    if kind is str:
+        found.append((place, encode_basestring(node)))
+        return
+    if kind is float and math.isfinite(node):
+        found.append((place, repr(node)))
+        return
     if isinstance(node, Mapping) and node:
         items = [(str(name), value) for name, value in node.items()]
-    elif isinstance(node, (list, tuple)) and any(isinstance(x, (Mapping, list, tuple)) for x in node):
+    elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
         items = [(str(n), value) for n, value in enumerate(node)]
     else:
-        return [(place, _JSON.encode(node))]
-    return [leaf for name, value in items for leaf in flatten(value, f"{place}.{name}".lstrip("."))]
+        found.append((place, _JSON.encode(node)))
+        return
+    for name, value in items:
+        _gather(value, f"{place}.{name}" if place else name.lstrip("."), found)
 
 
 def reasons(new: Mapping[str, str], last: Mapping[str, str] | None, unknown: frozenset[str] = frozenset()) -> list[str]:
