@@ -4,6 +4,7 @@ KIND = "benchmark"
 NAMES = {
     "evaluation": "evaluation:FAMILY",
     "runs": "runs:FAMILY",
+    "commands": "commands:FAMILY",
     "growth": "growth:FAMILY",
     "peers": "peers:FAMILY",
     "exudyn": "exudyn:FAMILY",
