@@ -18,8 +18,14 @@ __all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simula
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
-    """What `simulated` gives, as a dataset."""
-    return simulated(scene, bundles, progress).to_xarray()
+    """What `simulated` gives, as a dataset; so is what there is of a run that is asked to stop."""
+    from flexclear.pipeline.core.errors import StoppedError
+
+    try:
+        return simulated(scene, bundles, progress).to_xarray()
+    except StoppedError as stopped:
+        stopped.partial = stopped.partial and stopped.partial.to_xarray()
+        raise
 
 
 def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> LabelledArrays:
