@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,7 +85,7 @@ def _page(
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
-    assumed = by_weight(json.loads(attributes.get("assumptions", "{}")), run)
+    assumed = by_weight(scene.assumptions(), run)
     parts: list[Any] = [
         Part("film", "The mechanism moving", _moving(graph, place, records)),
         Part("run", "The run", _media(place, graph.overview, records, FIGURES)),

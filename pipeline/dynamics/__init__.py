@@ -24,7 +24,8 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     try:
         return simulated(scene, bundles, progress).to_xarray()
     except StoppedError as stopped:
-        stopped.partial = stopped.partial and stopped.partial.to_xarray()
+        if stopped.partial is not None:
+            stopped.partial = stopped.partial.to_xarray()
         raise
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.algebra import first_largest, rotation_between
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
 from flexclear.pipeline.core.quantities import IMPACT, PARTED
@@ -99,7 +99,7 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variable
     found: Variables = {}
     for name, (dims, values) in series.items():
         found[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
-        found[f"peak_{name}_time"] = (dims, run["time"].values[values.argmax(axis=0)])
+        found[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
     if "event_peak_force" in run:
         found["peak_force"] = (("contact",), _peak_force(run))
     return found
@@ -142,8 +142,3 @@ def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:
 def parameters(run: xr.Dataset | LabelledArrays) -> dict:
     """The scene's parameters as the run's attributes tell them; empty when they do not."""
     return json.loads(run.attrs.get("parameters", "{}"))
-
-
-def assumptions(run: xr.Dataset | LabelledArrays) -> dict[str, str]:
-    """Place -> ``assumed: why``, as the run's attributes tell them."""
-    return json.loads(run.attrs.get("assumptions", "{}"))

@@ -205,6 +205,17 @@ def test_extremes_are_those_of_all_rows():
     assert float(post.peak_reaction.sel(joint="A1")) == float(post.reaction.sel(joint="A1").max())
 
 
+@pytest.mark.parametrize("nudge", [-1.0, 1.0])
+def test_rounding_does_not_choose_between_two_equal_peaks(nudge: float):
+    """A stroke that ends as it began has its largest acceleration twice."""
+    run = synthetic.run("sps4/csj", clearance=True)
+    acceleration = np.zeros_like(run.acceleration.values)
+    acceleration[3] = -70.0
+    acceleration[-4] = 70.0 * (1.0 + nudge * np.finfo(float).eps)
+    post = derive(run.assign(acceleration=(run.acceleration.dims, acceleration)))
+    assert (post.peak_acceleration_time == run.time.values[3]).all()
+
+
 def test_sections_are_never_interpolated():
     time = np.array([0.0, 0.1, 0.2, 0.3])
     (found,) = at_times(time, np.array([0.1, 0.15, 0.3]), 10.0 * time)

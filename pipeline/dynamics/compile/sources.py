@@ -113,6 +113,8 @@ def _retract(parts: Parts) -> str:
 def _observe(parts: Parts) -> str:
     given, imports = _forces(parts)
     given = {"evaluate": "calls.evaluate", "project": _projection(imports, parts), **given}
+    if parts.harmonics:
+        given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
     if parts.couplings:
         given["couplings"] = _closures(imports, parts)
     if parts.joint_frictions and parts.closures:

@@ -109,14 +109,15 @@ def references(scene: Scene) -> str:
 
 
 def attributes(scene: Scene) -> dict[str, str]:
-    """What the run was made from: parameters, assumptions, sources, references, versions; no times, no file names."""
+    """What the run was made from: parameters, references, versions; no times, no file names.
+
+    Where values come from stands in what is derived from the run: a sentence about a value runs nothing again.
+    """
     parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
         del parameters["body"][body]["mesh"]
     return {
         "parameters": json.dumps(parameters, sort_keys=True),
-        "assumptions": json.dumps(scene.assumptions(), sort_keys=True),
-        "sources": json.dumps(scene.sources(), sort_keys=True),
         "references": references(scene),
         "versions": " ".join(f"{name} {library_version(name)}" for name in ("numpy", "numba", "scipy", "xarray")),
     }
