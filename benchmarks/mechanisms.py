@@ -110,14 +110,14 @@ def trajectory(engine: Engine) -> Trajectory:
 
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
-    """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
+    """A state of the run without contact ("free") and, where all contacts press at a time, one of those."""
     record = m.record(run.rows, run.contacts)
     found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
     if run.contacts:
         forces = observed(engine, run).touch["normal_force"]
         found["in contact"] = np.flatnonzero(np.all(forces > 0.0, axis=1))
     # the middle of the candidates: at the very start much is zero
-    middles = {name: rows[len(rows) // 2] for name, rows in found.items()}
+    middles = {name: rows[len(rows) // 2] for name, rows in found.items() if len(rows)}
     return {
         name: State(float(record.time[k]), record.modes[k], record.latched[k], record.state[k])
         for name, k in middles.items()

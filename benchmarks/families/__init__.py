@@ -5,6 +5,7 @@ NAMES = {
     "evaluation": "evaluation:FAMILY",
     "runs": "runs:FAMILY",
     "growth": "growth:FAMILY",
+    "ensembles": "ensembles:FAMILY",
     "peers": "peers:FAMILY",
     "exudyn": "exudyn:FAMILY",
     "integrators": "integrators:FAMILY",

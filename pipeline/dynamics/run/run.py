@@ -159,8 +159,8 @@ def follow(
         except StiffError as stiff:
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
-            wanted, engine, left = engine.straight.wanted, other(heir), stiff.handover
-            engine.straight.wanted = wanted
+            straight, engine, left = engine.straight, other(heir), stiff.handover
+            engine.straight.wanted, engine.straight.exact = straight.wanted, straight.exact
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
