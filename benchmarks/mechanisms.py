@@ -59,17 +59,9 @@ class State:
     y: np.ndarray
 
 
-def first(name: str) -> str:
-    """The scene of a model of the paper's mechanism in the first layout."""
-    return "sps4/variants/first" if name == "ideal" else f"sps4/variants/first_{name}"
-
-
 def mechanism(name: str) -> Mechanism:
-    """A model of the paper's mechanism, such as `far_cb`, with up-to-date bundles; FlexclearError when there are none.
-
-    In the first layout (``scenes/sps4/variants/first_*.toml``), in which the logs of these benchmarks were measured.
-    """
-    scene = load_scene(find_scene(first(name)))
+    """A model of the paper's mechanism, such as `far_cb`, with fresh bundles; FlexclearError when there are none."""
+    scene = load_scene(find_scene(f"sps4/{name}"))
     return Mechanism(name, scene, bundles(scene))
 
 
