@@ -17,10 +17,11 @@ from flexclear.pipeline.core.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.dynamics.run.engine import Engine, another
+from flexclear.pipeline.dynamics.run.observation import frames
 from flexclear.pipeline.dynamics.run.run import observed
 from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: two codes are compared at multiples of this [s], unless more rarely
 SAMPLING = 1e-3
@@ -64,8 +65,10 @@ class Error:
 class Rung:
     """One of our runs: by what, its time once [s], how wrong it is, and how to time it once more [s].
 
-    bare: how to time its integration alone [s], whose samples are states.  straight: how to time it by the code for its
-    wiring alone, with which sweeps and ensembles step [s]; None for methods that do not use it.
+    bare: how to time its integration alone [s], whose samples are states.  alike: how to time its integration with the
+    body's position and velocity in the samples, as two sensors of another code have them [s]; alike_error: how wrong
+    these are.  straight: how to time the whole run by the code for its wiring alone, with which sweeps and ensembles
+    step [s]; None for methods that do not use it.
     """
 
     integrator: str
@@ -75,6 +78,8 @@ class Rung:
     error: Error
     time: Callable[[], float]
     bare: Callable[[], float]
+    alike: Callable[[], float]
+    alike_error: Error
     straight: Callable[[], float] | None
 
 
@@ -118,11 +123,50 @@ def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
                 run = _run(mine)
             except SolverError:
                 continue
-            error, timers = reference.error(_regular(run, body, reference.sampling)), _timers(mine)
-            rungs.append(Rung(integrator, rtol, int(run.attrs["evaluations"]), timers[0](), error, *timers))
+            rungs.append(_rung(mine, run, body, reference))
             if len(rungs) > 1 and rungs[-1].seconds > DEAR * min(r.seconds for r in rungs):
                 break  # tighter ones are dearer still
     return rungs
+
+
+def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> Rung:
+    engine = mine.engine()
+    start, what = consistent_start(engine), mine.scene.solver
+    error = reference.error(_regular(run, body, reference.sampling))
+    alike_error = reference.error(_sensed(engine, integrate(engine, start, silent), body, reference.sampling))
+
+    def whole(engine: Engine) -> float:
+        return once(lambda: observed(engine, integrate(engine, start, silent)))
+
+    @cache
+    def straight() -> Engine:
+        made = another(engine)
+        specialise(made)
+        return made
+
+    return Rung(
+        what.integrator,
+        what.rtol,
+        int(run.attrs["evaluations"]),
+        whole(engine),
+        error,
+        lambda: whole(engine),
+        lambda: once(lambda: integrate(engine, start, silent)),
+        lambda: once(lambda: _sensed(engine, integrate(engine, start, silent), body, reference.sampling)),
+        alike_error,
+        None if engine.method.traits.reads_all else lambda: whole(straight()),
+    )
+
+
+def _sensed(engine: Engine, run: Trajectory, body: str, sampling: float) -> Samples:
+    """Position and velocity of a rigid body's centre of mass in the samples, as the integration left them."""
+    model, time = engine.model, run.time
+    rows = run.rows[_sampled(time, sampling)]
+    link = model.mechanism.link_of[body]
+    frame, place = frames(engine, rows).links[:, link], model.links[link].places[body]
+    arm = frame["axes"] @ (place.p + place.R @ np.array(model.scene.body[body].com))  # type: ignore[union-attr]
+    position = frame["origin"] + arm + model.mechanism.origin
+    return Samples(rows[:, 0], position, frame["velocity"] + np.cross(frame["omega"], arm))
 
 
 def _at(here: Mechanism, integrator: str, rtol: float, sampling: float) -> Mechanism:
@@ -137,32 +181,13 @@ def _run(here: Mechanism) -> xr.Dataset:
 def _regular(run: xr.Dataset, body: str, sampling: float) -> Samples:
     """The rows at multiples of the sampling time; those of events lie in between."""
     time, motion = run["time"].values, run.sel(body=body)
-    here = np.abs(time / sampling - np.round(time / sampling)) < 1e-6
+    here = _sampled(time, sampling)
     return Samples(time[here], motion["position"].values[here], motion["velocity"].values[here])
 
 
-Timer = Callable[[], float]
-
-
-def _timers(here: Mechanism) -> tuple[Timer, Timer, Timer | None]:
-    """Of a run with all that is recorded of its rows, of its integration alone, and of the first by straight code."""
-    engine = here.engine()
-    start = consistent_start(engine)
-
-    def whole(engine: Engine) -> float:
-        return once(lambda: observed(engine, integrate(engine, start, silent)))
-
-    @cache
-    def straight() -> Engine:
-        made = another(engine)
-        specialise(made)
-        return made
-
-    return (
-        lambda: whole(engine),
-        lambda: once(lambda: integrate(engine, start, silent)),
-        None if engine.method.traits.reads_all else lambda: whole(straight()),
-    )
+def _sampled(time: np.ndarray, sampling: float) -> np.ndarray:
+    """Which times are multiples of the sampling time."""
+    return np.asarray(np.abs(time / sampling - np.round(time / sampling)) < 1e-6)
 
 
 def cheapest(rungs: list[Rung], good: Callable[[Error], bool]) -> Rung | None:

@@ -59,17 +59,9 @@ class State:
     y: np.ndarray
 
 
-def first(name: str) -> str:
-    """The scene of a model of the paper's mechanism in the first layout."""
-    return "sps4/variants/first" if name == "ideal" else f"sps4/variants/first_{name}"
-
-
 def mechanism(name: str) -> Mechanism:
-    """A model of the paper's mechanism, such as `far_cb`, with up-to-date bundles; FlexclearError when there are none.
-
-    In the first layout (``scenes/sps4/variants/first_*.toml``), in which the logs of these benchmarks were measured.
-    """
-    scene = load_scene(find_scene(first(name)))
+    """A model of the paper's mechanism, such as `far_cb`, with fresh bundles; FlexclearError when there are none."""
+    scene = load_scene(find_scene(f"sps4/{name}"))
     return Mechanism(name, scene, bundles(scene))
 
 
@@ -110,14 +102,14 @@ def trajectory(engine: Engine) -> Trajectory:
 
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
-    """A state of the run without contact ("free") and, where there are contacts, one in which all of them press."""
+    """A state of the run without contact ("free") and, where all contacts press at a time, one of those."""
     record = m.record(run.rows, run.contacts)
     found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
     if run.contacts:
         forces = observed(engine, run).touch["normal_force"]
         found["in contact"] = np.flatnonzero(np.all(forces > 0.0, axis=1))
     # the middle of the candidates: at the very start much is zero
-    middles = {name: rows[len(rows) // 2] for name, rows in found.items()}
+    middles = {name: rows[len(rows) // 2] for name, rows in found.items() if len(rows)}
     return {
         name: State(float(record.time[k]), record.modes[k], record.latched[k], record.state[k])
         for name, k in middles.items()

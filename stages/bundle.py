@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
-from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
+from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError, InputError
 from flexclear.pipeline.core.foreign.checks import require_file
@@ -56,12 +56,13 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     for path in files:
         if not path.relative_to(top).as_posix().isprintable():
             raise InputError(str(path), "has a name that other systems cannot read", "rename it")
-    done = _run(scene, settings, os.environ)
+    done, digest = _run(scene, settings, os.environ)
     hidden = _hidden(top)
     facts = {
         "scene": scene.relative_to(top).as_posix(),
         "settings": [_without(text, hidden) for text in settings],
         "exit_code": done.returncode,
+        "run": digest,
         "flexclear": version(),
         "sources": source_digest(),
         "python": platform.python_version(),
@@ -88,9 +89,13 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         folder = Path(name).resolve()
         facts, log = _unpack(path, folder)
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
-        done = _run(folder / FILES / facts["scene"], facts["settings"], environment)
+        done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
         said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST:]
     told = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
+    if digest and facts.get("run"):
+        told += [
+            f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
+        ]
     now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
     then = {**facts["libraries"], "python": facts["python"]}
     told += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
@@ -124,22 +129,28 @@ def _recipes(scene: Path) -> list[Path]:
     return []
 
 
-def _run(scene: Path, settings: Sequence[str], environment: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+def _run(
+    scene: Path, settings: Sequence[str], environment: Mapping[str, str]
+) -> tuple[subprocess.CompletedProcess[str], str]:
+    """What running a scene says, and the sha256 of the dataset of the run, if there is one."""
     changes = [word for text in settings for word in ("--set", text)]
-    return subprocess.run(
-        [sys.executable, "-m", "flexclear", "run", str(scene), *changes, "--verbose"],
-        cwd=scene.parent,
-        env={
-            **environment,
-            "PYTHONPATH": os.pathsep.join([str(TREE), environment.get("PYTHONPATH", "")]),
-            "PYTHONIOENCODING": "utf-8:backslashreplace",
-        },
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        errors="replace",
-        check=False,
-    )
+    with tempfile.TemporaryDirectory(prefix="flexclear_run_") as folder:
+        dataset = Path(folder) / "run.nc"
+        done = subprocess.run(
+            [sys.executable, "-m", "flexclear", "run", str(scene), *changes, "--verbose", "--out", str(dataset)],
+            cwd=scene.parent,
+            env={
+                **environment,
+                "PYTHONPATH": os.pathsep.join([str(TREE), environment.get("PYTHONPATH", "")]),
+                "PYTHONIOENCODING": "utf-8:backslashreplace",
+            },
+            capture_output=True,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            check=False,
+        )
+        return done, digest_of(dataset) if dataset.is_file() else ""
 
 
 def _hidden(top: Path) -> dict[str, str]:

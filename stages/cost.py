@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import as_json, cost_design, cost_peers, kernels, run, s4_simulate
@@ -136,14 +137,15 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
     """
     from flexclear.pipeline.post.cost.page import markdown
 
-    (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
     found = []
-    for name, (study, folder) in studies.items():
-        said, pictures = told(name, study, folder, page.stem)
-        found.append(said)
-        for path, file in pictures.items():
-            (page.parent / path).write_bytes(file.read_bytes())
-    page.write_text(markdown(tuple(found), f"{page.as_posix()}{options}"), encoding="utf-8", newline="\n")
+    with disk_limits(page.parent):
+        (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
+        for name, (study, folder) in studies.items():
+            said, pictures = told(name, study, folder, page.stem)
+            found.append(said)
+            for path, file in pictures.items():
+                publish(page.parent / path, file.read_bytes())
+        publish(page, markdown(tuple(found), f"{page.as_posix()}{options}").encode())
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:

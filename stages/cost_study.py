@@ -58,14 +58,14 @@ def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:
     """The paper's own choice of method and step, as a marked point."""
-    from flexclear.pipeline.post.cost.study import cost, relative_errors
+    from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
     from flexclear.pipeline.post.cost.work_precision import Mark
 
     mine = [p for p in points if p.group == "paper" and "refused" not in runs[p.key].attrs]
     if not mine:
         return None
     reference = runs[next(p.key for p in points if p.group == "reference")]
-    errors = relative_errors(runs[mine[0].key], reference, chosen)
+    errors = relative_errors(runs[mine[0].key], reference, chosen, believed(points, runs))
     return Mark("paper's choice", cost(runs[mine[0].key], "cpu_seconds"), errors)
 
 

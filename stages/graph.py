@@ -21,6 +21,7 @@ from flexclear.stages import (
     s4_linear,
     s4_sections,
     s4_simulate,
+    s5_post,
     s6_render,
     s7_overview,
 )
@@ -156,7 +157,8 @@ class Graph:
     def post(self) -> Task:
         """What is derived from the run."""
         inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
-        return self._scene_task("post", "flexclear.stages.s5_post:run", {}, inputs, names={"nc": "post.nc"})
+        params = s5_post.params(self.scene)
+        return self._scene_task("post", "flexclear.stages.s5_post:run", params, inputs, names={"nc": "post.nc"})
 
     @cached_property
     def render(self) -> dict[str, Task]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,10 +31,23 @@ FIGURES = {
     "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
     "energy.png": ("Energy", "Energies over time, and the error of their balance"),
 }
-#: of a run's attributes, those that tell how it was made
-COST = ("method", "method_reason", "evaluations", "steps", "rejected_steps", "jacobians", "projections")
-STABILITY = ("switched", "stiff_share", "redundant_closure_rows", "accuracy_verdict")
-PROVENANCE = ("scene", "versions", "Conventions")
+#: of a run's attributes, those that tell how it was made, and what they are called
+COST = {
+    "method": "integrator",
+    "method_reason": "why this one",
+    "evaluations": "evaluations of the equations of motion",
+    "steps": "steps",
+    "rejected_steps": "steps made again, shorter, since their error was too large",
+    "jacobians": "Jacobians of the equations",
+    "projections": "times the closed loops were put together again",
+}
+STABILITY = {
+    "switched": "another integrator went on",
+    "stiff_share": "share of the steps that stability made shorter than accuracy would have",
+    "redundant_closure_rows": "conditions of closed loops that follow from the others",
+    "accuracy_verdict": "accuracy asked for",
+}
+PROVENANCE = {"scene": "scene", "versions": "versions of the libraries", "Conventions": "conventions of the datasets"}
 
 
 def make(graph: Graph, place: Workplace, *, folder: bool = False) -> Path:
@@ -86,7 +98,7 @@ def _page(
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
-    assumed = by_weight(json.loads(attributes.get("assumptions", "{}")), run)
+    assumed = by_weight(scene.assumptions(), run)
     parts: list[Any] = [
         Part("film", "The mechanism moving", _moving(graph, place, records)),
         Part("run", "The run", _media(place, graph.overview, records, FIGURES)),
@@ -108,16 +120,19 @@ def _page(
     return page(scene.title, lead, parts, answer(dataset, run, doubts))
 
 
-def _told(attributes: Mapping[Any, Any], names: tuple[str, ...]) -> dict[str, str]:
-    """Attributes in words; whole numbers in groups of three."""
+def _told(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
+    """Attributes by what they are called; whole numbers in groups of three, shares in per cent."""
     found = {}
-    for name in names:
+    for name, label in names.items():
         value = attributes.get(name)
         if value not in (None, ""):
             whole = isinstance(value, int) or (getattr(value, "dtype", None) is not None and value.dtype.kind in "iu")
-            found[name.replace("_", " ")] = (
-                f"{int(value):,}" if whole else f"{value:.4g}" if isinstance(value, float) else str(value)
-            )
+            if name.endswith("_share"):
+                found[label] = f"{100.0 * float(value):.3g} %"
+            elif whole:
+                found[label] = f"{int(value):,}"
+            else:
+                found[label] = f"{value:.4g}" if isinstance(value, float) else str(value)
     return found
 
 

@@ -17,12 +17,13 @@ if TYPE_CHECKING:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``index.html`` and ``paper.md``, out of the results folder.
 
-    params: the folder, the run of each scene below it, the scene whose film and pictures are shown, and the digest of
-    everything that is shown, so that the page is written again when any of it changes.
+    params: the folder, the run of each scene below it, where its values come from, the scene whose film and pictures
+    are shown, and the digest of everything that is shown, so that the page is written again when any of it changes.
     """
     from flexclear.pipeline.post import report
 
     results = Path(params["results"])
-    attributes = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})
+    told = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})
+    attributes = {scene: {**found, **params["origins"][scene]} for scene, found in told.items()}
     content = report.collect(results, attributes, params["rendered"], TREE)
     return {"index.html": report.page(content), "paper.md": report.paper_markdown(content).encode()}

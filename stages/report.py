@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import kernels, run, s4_simulate, s6_render, timing
+from flexclear.stages import kernels, run, s4_simulate, s5_post, s6_render, timing
 from flexclear.stages.figure import FIGURES
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import DATA, Workplace, check
@@ -163,6 +163,7 @@ def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Grap
         params={
             "results": str(place.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
+            "origins": {graph.scene.name: s5_post.origins(graph.scene) for graph in graphs},
             "rendered": HEADLINE,
             "digests": sorted(record.digest for record in records.values()),
         },

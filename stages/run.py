@@ -30,6 +30,7 @@ from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import limit, owner
 from flexclear.stages.graph import STAGES, Graph
+from flexclear.stages.s5_post import origins
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -201,7 +202,9 @@ def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
     # in this process: workers would run a caller's script again from its top
     outcome = place.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
+    return place.store.load(outcome.records[id(task)]).assign_attrs(
+        title=scene.title, scene=scene.name, **origins(scene)
+    )
 
 
 def graph(scene: Scene) -> Graph:

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, views, shapes, limits, and places and names of files are not part of it,
-    nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run, nor
-    whether that may be missed."""
+    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and places and names of files are not
+    part of it, nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run,
+    nor whether that may be missed."""
     unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
     left_out: dict[str, Any] = dict.fromkeys(unseen, True)
     left_out["body"] = {"__all__": set(UNSEEN)}
@@ -32,15 +32,15 @@ def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> d
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.recipes():
         table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
-    return {"scene": without_file_names(table)}
+    return {"scene": without_origins(table)}
 
 
-def without_file_names(node: Any) -> Any:
-    """The same, but for the names of files that laws were read from: their numbers are there."""
+def without_origins(node: Any) -> Any:
+    """The same, but for sources, and the names of files that laws were read from, whose numbers are there."""
     if isinstance(node, dict):
         read = node.get("type") == "table" and "points" in node
-        return {k: "" if read and k == "file" else without_file_names(value) for k, value in node.items()}
-    return [without_file_names(item) for item in node] if isinstance(node, list) else node
+        return {k: "" if read and k == "file" else without_origins(v) for k, v in node.items() if k != "source"}
+    return [without_origins(item) for item in node] if isinstance(node, list) else node
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
@@ -63,13 +63,15 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for text in lacks:
         progress(None, text)
     with stopping.until(scene.limits.time, scene.limits.time_words):
-        found = dynamics.simulate(scene, reduced, progress)
+        found = dynamics.simulated(scene, reduced, progress)
     told = "\n".join(filter(None, [str(found.attrs.get("warnings", "")), *lacks]))
     return {"nc": found.assign_attrs(warnings=told) if told else found}
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
     """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
+    if not reduced:
+        return []
     from flexclear.pipeline.core.artifacts import deficits
 
     found = []

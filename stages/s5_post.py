@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.workflow.task import given_arrays
+
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
     from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.schema import Scene
 
 
-def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The post dataset (schema POST)."""
-    from flexclear.pipeline.post import derive
+@given_arrays
+def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
+    """The post dataset (schema POST), with what the scene says of where its values come from."""
+    from flexclear.pipeline.post import derived
 
-    return {"nc": derive(inputs["run"], inputs.get("ensemble"))}
+    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["told"])}
+
+
+def params(scene: Scene) -> dict[str, Any]:
+    """Attributes that no run depends on: `sources` and `assumptions`, place in the scene -> text, as JSON."""
+    return {"told": origins(scene)}
+
+
+def origins(scene: Scene) -> dict[str, str]:
+    """Where values come from, as attributes of datasets."""
+    found = {"sources": scene.sources(), "assumptions": scene.assumptions()}
+    return {name: json.dumps(texts, sort_keys=True) for name, texts in found.items()}

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages import as_json, limit, run
 from flexclear.stages.graph import Graph
@@ -66,11 +67,12 @@ def write_page(
     from flexclear.pipeline.post.verdict_page import csv_text, markdown
 
     folder = page.parent / page.stem
-    folder.mkdir(exist_ok=True)
-    for name, picture in pictures.items():
-        (folder / f"{name.replace('/', '_')}.png").write_bytes(picture)
-    (folder / "verdicts.csv").write_text(csv_text(verdicts), encoding="utf-8", newline="\n")
-    page.write_text(markdown(verdicts, sections, page.as_posix(), page.stem), encoding="utf-8", newline="\n")
+    with disk_limits(page.parent):
+        folder.mkdir(exist_ok=True)
+        for name, picture in pictures.items():
+            publish(folder / f"{name.replace('/', '_')}.png", picture)
+        publish(folder / "verdicts.csv", csv_text(verdicts).encode())
+        publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
 
 
 def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:

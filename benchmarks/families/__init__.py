@@ -4,8 +4,10 @@ KIND = "benchmark"
 NAMES = {
     "evaluation": "evaluation:FAMILY",
     "runs": "runs:FAMILY",
+    "commands": "commands:FAMILY",
     "cold": "cold:FAMILY",
     "growth": "growth:FAMILY",
+    "ensembles": "ensembles:FAMILY",
     "peers": "peers:FAMILY",
     "exudyn": "exudyn:FAMILY",
     "integrators": "integrators:FAMILY",

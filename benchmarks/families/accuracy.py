@@ -13,7 +13,6 @@ from dataclasses import asdict
 from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
-from benchmarks.mechanisms import first
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.post.cost.page import Studied, sections
@@ -21,8 +20,8 @@ from flexclear.pipeline.post.plotting.table import Table, as_markdown, from_mark
 from flexclear.stages import cost
 from flexclear.stages.run import find_scene, workplace
 
-#: models of the paper's mechanism, in the layout in which Exudyn's runs are logged
-SCENES = tuple(first(name) for name in ("ideal", "csj", "far_cb", "far_csj_cb_damped", "far_csj_cb"))
+#: models of the paper's mechanism
+SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_damped", "sps4/far_csj_cb")
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:

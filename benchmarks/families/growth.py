@@ -1,4 +1,4 @@
-"""What absent effects cost, and how the cost grows with the number of loops and of modes.
+"""What absent effects cost, and how the cost grows with the number of loops, modes, contacts, rods and outputs.
 
 The N-four-bar: N + 1 upright rods on revolute joints, their tops joined by N rods. In space, planar loops with
 revolute joints alone are redundant; here the joining rods have a spherical joint at each end and may spin about their
@@ -7,7 +7,7 @@ own axes, which leaves the planar motion as it is and every closure independent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,8 +16,10 @@ import numpy as np
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
 from benchmarks.page import Columns, percent, short, spread, table
-from benchmarks.timing import interleaved, slope
+from benchmarks.timing import interleaved, once, slope
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
@@ -28,28 +30,47 @@ from flexclear.stages.run import bundles
 LOOPS = (5, 10, 20, 40, 80)
 #: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies
 MODES, FLEXIBLE = (6, 13, 24, 48), "far_cb"
+#: what else there are numbers of
+PARTS = ("contacts", "flexible rods", "outputs")
 #: of its run from which a state is taken [s]
 MOMENT = 1e-3
+#: joints of the scene with one contact that get its clearance, one after the other; rods that become flexible
+LOOSE, CLEARANCE = ("A1", "A2", "A3", "A4", "C"), "csj"
+RODS = ("rod1", "rod2", "rod3", "rod4")
+#: outputs of a run, of which the least are its events' rows, too
+OUTPUTS = (180, 1800, 18000)
 #: what the fullest scene loses, and the scene that never had it
 ABSENT = {"clearance and flexibility": "ideal", "flexibility": "csj", "clearance": "far_cb"}
-ROUNDS = 25
+ROUNDS, RUNS = 25, 3
+#: from a rod's lower end to its centre of mass [m]
+HALF_ROD = 0.12
 #: evaluations of a round, for one loop or scene
 EVALUATIONS = 4000
 
 
 def cases() -> list[Case]:
-    """Absent effects, then numbers of loops and of modes."""
-    grown = [Case(f"{n} {what}", n) for what, numbers in (("loops", LOOPS), ("modes", MODES)) for n in numbers]
+    """Absent effects, then numbers of loops, modes, contacts, flexible rods and outputs."""
+    ranges = {
+        "loops": LOOPS,
+        "modes": MODES,
+        "contacts": range(1, len(LOOSE) + 1),
+        "flexible rods": range(1, len(RODS) + 1),
+        "outputs": OUTPUTS,
+    }
+    grown = [Case(f"{n} {what}", n) for what, numbers in ranges.items() for n in numbers]
     return [Case(effect) for effect in ABSENT] + grown
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each; numbers of loops take turns, and so do those of modes."""
+    """A record for each; numbers of one kind take turns."""
     for case in cases:
         if case.name in ABSENT:
             yield case, [_absent(case.name)]
     yield from _loops([case for case in cases if case.name.endswith("loops")])
     yield from _modes([case for case in cases if case.name.endswith("modes")])
+    yield from _parts(with_contacts, "contacts", cases)
+    yield from _parts(with_flexible_rods, "flexible rods", cases)
+    yield from _outputs([case for case in cases if case.name.endswith("outputs")])
 
 
 def _absent(effect: str) -> Record:
@@ -90,26 +111,51 @@ def _loops(cases: Sequence[Case]) -> Measured:
 
 def _modes(cases: Sequence[Case]) -> Measured:
     """Evaluations by the kernels and, where there is such, by straight code."""
-    tasks, known = dict[str, Callable[[], float]](), dict[str, Record]()
-    full = mechanism(FLEXIBLE)
+    known, engines, full = dict[str, Record](), dict[str, Engine](), mechanism(FLEXIBLE)
     for case in cases:
-        engine = with_modes(full, case.of).engine()
+        engine = engines[case.name] = with_modes(full, case.of).engine()
         arrays = engine.model.arrays
         known[case.name] = {
             "modes": case.of,
             "held": int(arrays.table(m.FLEXES)["n_held"][0]),
             "products": len(arrays.table(m.MOMENTS)),
         }
+    for case, told in _both_ways(cases, engines):
+        yield case, [known[case.name] | told]
+
+
+def _parts(made: Callable[[int], Mechanism], what: str, cases: Sequence[Case]) -> Measured:
+    """Evaluations with so many parts of a kind, in free flight."""
+    mine = [case for case in cases if case.name.endswith(what)]
+    for case, told in _both_ways(mine, {case.name: made(case.of).engine() for case in mine}):
+        yield case, [{what: case.of, **told}]
+
+
+def _both_ways(cases: Sequence[Case], engines: Mapping[str, Engine]) -> Iterator[tuple[Case, Record]]:
+    """Times of evaluations by the kernels and, where there is such, by straight code."""
+    tasks = dict[str, Callable[[], float]]()
+    for name, engine in engines.items():
         state = states(engine, trajectory(engine))["free"]
-        tasks[case.name] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
+        tasks[name] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
         specialise(engine)
         if engine.h[m.RATES] != engine.h[m.EVALUATE]:
-            tasks[f"{case.name}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS // 4, straight=True)
+            tasks[f"{name}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS // 4, straight=True)
     times = interleaved(tasks, ROUNDS)
     for case in cases:
         straight = times.get(f"{case.name}, straight")
-        told = {"straight": straight.told("us")} if straight else {}
-        yield case, [known[case.name] | times[case.name].told("us") | told]
+        yield case, times[case.name].told("us") | ({"straight": straight.told("us")} if straight else {})
+
+
+def _outputs(cases: Sequence[Case]) -> Measured:
+    """Whole runs from scene to dataset that differ in the number of outputs alone."""
+    full, tasks = mechanism(CLEARANCE), dict[str, Callable[[], float]]()
+    for case in cases:
+        end = full.scene.time.end - full.scene.time.start
+        here = full.with_scene(case.name, edited(full.scene, {"output.interval": end / case.of}))
+        tasks[case.name] = partial(once, partial(dynamics.simulate, here.scene, here.bundles, silent))
+    times = interleaved(tasks, RUNS)
+    for case in cases:
+        yield case, [{"outputs": case.of, **times[case.name].told("s")}]
 
 
 def with_modes(full: Mechanism, count: int) -> Mechanism:
@@ -117,6 +163,29 @@ def with_modes(full: Mechanism, count: int) -> Mechanism:
     (body,) = full.scene.flexible()
     scene = edited(full.scene, {f"body.{body}.modes.count": count, "time.end": MOMENT})
     return Mechanism(f"{count} modes", scene, bundles(scene))
+
+
+def with_contacts(count: int) -> Mechanism:
+    """The mechanism with so many loose joints, for a moment."""
+    full = mechanism(CLEARANCE)
+    loose = full.scene.joint[LOOSE[0]]
+    more = {name: loose.model_copy(update={"between": full.scene.joint[name].between}) for name in LOOSE[1:count]}
+    scene = full.scene.model_copy(update={"joint": full.scene.joint | more})
+    return full.with_scene(f"{count} contacts", edited(scene, {"time.end": MOMENT}))
+
+
+def with_flexible_rods(count: int) -> Mechanism:
+    """The mechanism with so many flexible rods, for a moment."""
+    full, rigid = mechanism(FLEXIBLE).scene, mechanism("ideal").scene.model_dump(mode="json")["body"]
+    changes: dict[str, Any] = {"time.end": MOMENT}
+    for name in RODS[1:count]:
+        flexible = full.body[RODS[0]].model_dump(mode="json", exclude_none=True)
+        along, across = (np.array(rigid[name]["pose"]["axes"][axis]) for axis in "zx")
+        bottom = np.array(rigid[name]["pose"]["position"]) - HALF_ROD * along / np.linalg.norm(along)
+        pose = {"position": bottom.tolist(), "axes": {"x": along.tolist(), "y": across.tolist()}}
+        changes[f"body.{name}"] = flexible | {"pose": pose}
+    scene = edited(full, changes)
+    return Mechanism(f"{count} flexible rods", scene, bundles(scene))
 
 
 def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
@@ -193,36 +262,63 @@ def show(records: list[Record]) -> str:
         parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
     if modes:
         parts.append(_of_modes(modes))
+    parts += [_of_parts(found, what) for what in PARTS if (found := [r for r in records if what in r])]
     return "\n\n".join(parts + [f"{r['case']} skipped: {r['reason']}" for r in records if "reason" in r])
+
+
+def _straight(r: Record) -> Any:
+    return r.get("straight", {}).get("us")
+
+
+def _exponent(records: list[Record], number: str, of: Callable[[Record], Any]) -> Callable[[Record], str]:
+    """The exponent of growth from each record to the next."""
+
+    def to_here(r: Record) -> str:
+        before = records[records.index(r) - 1] if r is not records[0] else r
+        if before is r or not (of(before) and of(r)):
+            return ""
+        return f"{slope([before[number], r[number]], [of(before), of(r)]):.2f}"
+
+    return to_here
+
+
+def _of_parts(records: list[Record], what: str) -> str:
+    """The table over numbers of contacts, flexible rods or outputs."""
+    exponent = _exponent(records, what, lambda one: one.get("us", one.get("s")))
+    if what == "outputs":
+        runs: Columns = {
+            what: lambda r: str(r[what]),
+            "simulate stage [s]": lambda r: spread(r, "s", 3),
+            "exponent": exponent,
+        }
+        return table(records, runs)
+    columns: Columns = {
+        what: lambda r: str(r[what]),
+        "us per evaluation": lambda r: spread(r, "us", 2),
+        "exponent": exponent,
+        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
+        "its exponent": _exponent(records, what, _straight),
+    }
+    return table(records, columns)
 
 
 def _of_modes(records: list[Record]) -> str:
     """The table over numbers of modes, with exponents from each one to the next."""
-
-    def to_here(r: Record, of: Callable[[Record], Any]) -> str:
-        before = records[records.index(r) - 1] if r is not records[0] else r
-        if before is r or not (of(before) and of(r)):
-            return ""
-        return f"{slope([before['modes'], r['modes']], [of(before), of(r)]):.2f}"
-
-    def straight(r: Record) -> Any:
-        return r.get("straight", {}).get("us")
-
     columns: Columns = {
         "modes": lambda r: str(r["modes"]),
         "of them held": lambda r: str(r["held"]),
         "integrals of two modes": lambda r: str(r["products"]),
         "us per evaluation": lambda r: spread(r, "us", 2),
-        "exponent": lambda r: to_here(r, lambda one: one["us"]),
+        "exponent": _exponent(records, "modes", lambda one: one["us"]),
         "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
-        "its exponent": lambda r: to_here(r, straight),
+        "its exponent": _exponent(records, "modes", _straight),
     }
     return table(records, columns)
 
 
 FAMILY = Family(
-    what="what absent effects cost, and growth with the number of loops and of modes",
-    takes="4 min",
+    what="what absent effects cost, and growth with the numbers of loops, modes, contacts, rods and outputs",
+    takes="6 min",
     page="benchmarks.md",
     cases=cases,
     measure=measure,

@@ -12,7 +12,6 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
-from benchmarks.mechanisms import first
 from benchmarks.page import Columns, table
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import SolverError
@@ -22,7 +21,7 @@ from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.stages.run import find_scene
 
-SCENE = first("csj")
+SCENE = "sps4/csj"
 RTOLS = (1e-6, 1e-8, 1e-10, 1e-12)
 REFERENCE: dict[str, Any] = {"integrator": "dop853", "rtol": 1e-13}
 #: times at which velocities are compared are multiples of this [s]

@@ -220,7 +220,7 @@ def _is_mesh_study(row: Row) -> bool:
 
 
 def _layouts(rows: dict[str, list[Row]]) -> str:
-    return layouts.told(rows["layouts"], rows)
+    return layouts.told(rows["layouts"])
 
 
 def _label(row: Row) -> str:

@@ -42,7 +42,7 @@ MOST_COMPLETE = (25, 37)
 LARGE_SETS = 0.5
 #: factors of the recipe's elements
 FINER = (1, 2, 4)
-#: other layouts of the mechanism: every so manieth of the identified family on this grid [m], and the one that is taken
+#: layouts of the mechanism: that of the scenes, and every so manieth of the identified family on this grid [m]
 LAYOUT_GRID, EVERY = 0.02, 10
 #: there, the sets: the paper's two as few as it has them, and Craig-Bampton, of which the last stands for the full rod
 LAYOUT_SETS = (("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 13), ("craig-bampton", 25))
@@ -55,7 +55,7 @@ class Case:
     """One scene with one mode set.
 
     place: of the prismatic joint [mm].  condition: of the modes, FULL or RIGID.  finer: factor of the elements.
-    layout: of the mechanism; the first one but for the group of rows that looks at others.
+    layout: of the mechanism, where it is not that of the scenes.
     """
 
     place: int
@@ -64,7 +64,7 @@ class Case:
     clearance: bool = False
     finer: int = 1
     members: int = field(default=0)
-    layout: Layout = identify.FIRST
+    layout: Layout | None = None
 
     @property
     def label(self) -> str:
@@ -83,12 +83,14 @@ def modes(case: Case) -> dict[str, Any]:
 def scene(case: Case) -> Scene:
     """The paper's scene in the case's layout, with the joint at its place and the rod of its mode set."""
     stem, folder = ("", "sps4") if case.place == 0 else (f"prismatic_{case.place}mm", "sps4/variants")
-    moved = edits(case.layout, flexible=case.condition != RIGID, along=1e-3 * case.place)
+    moved: dict[str, Any] = {}
+    if case.layout is not None:
+        moved = edits(case.layout, flexible=case.condition != RIGID, along=1e-3 * case.place)
     if case.condition == RIGID:
         name = "_".join(part for part in (stem, "csj" if case.clearance else "") if part) or "ideal"
         return load_scene(find_scene(f"{folder}/{name}"), moved)
     name = "_".join(part for part in (stem, "far_csj_cb" if case.clearance else "far_cb") if part)
-    changes: dict[str, Any] = moved | {f"body.{ROD}.modes": modes(case)}
+    changes = moved | {f"body.{ROD}.modes": modes(case)}
     if case.clearance:
         changes["ensemble.members"] = case.members
     return load_scene(find_scene(f"{folder}/{name}"), changes)
@@ -113,7 +115,7 @@ def task(case: Case) -> Task:
 
 def _where(case: Case) -> str:
     """What is special to a case's mechanism, for progress reports."""
-    if case.layout == identify.FIRST:
+    if case.layout is None:
         return f"{case.place} mm"
     return "layout " + ", ".join(f"{1e3 * getattr(case.layout, name):.1f}" for name in ("ay", "bx", "by")) + " mm"
 
@@ -193,10 +195,10 @@ def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Cas
 
 @cache
 def layouts() -> tuple[Layout, ...]:
-    """The identified layout that is taken, then members of its family by falling regularity."""
+    """The identified layout that is taken, members of its family by falling regularity, and last the first layout."""
     family = sorted(identify.family(LAYOUT_GRID), key=lambda member: member.answer.condition)
     found = [identify.chosen(identify.family()), *family[::EVERY]]
-    return tuple(member.layout for member in found)
+    return (*(member.layout for member in found), identify.FIRST)
 
 
 def of_layout(layout: Layout, members: int) -> list[Case]:

@@ -23,8 +23,10 @@ from benchmarks.reference_conditions.design import (
     PLACES,
     RIGID,
 )
+from flexclear.pipeline.post.models import FAR_CB, FAR_FIXED, FAR_FREE
 
-COLORS = dict(zip(CONDITIONS, ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000"), strict=True))
+#: those of the paper's models where they have such modes, the others from the same palette
+COLORS = dict(zip(CONDITIONS, (FAR_FREE.color, FAR_FIXED.color, "#56B4E9", "#CC79A7", FAR_CB.color), strict=True))
 MARKERS = dict(zip(CONDITIONS, "osDv^", strict=True))
 #: shares of error below this are drawn at it
 FLOOR = 1e-7

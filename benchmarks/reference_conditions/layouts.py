@@ -9,15 +9,13 @@ from functools import partial
 
 from benchmarks.family import Record as Row
 from benchmarks.page import Columns, table
-from benchmarks.reference_conditions.claims import CLAIMS, Claim, Rows, numbers_of
+from benchmarks.reference_conditions.claims import CLAIMS, Claim, Rows
 from benchmarks.reference_conditions.design import FULL, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
 
-#: the first layout, whose verdicts stand beside
-FIRST_PLACE = 0
 PLACE = ("layout", "ax", "ay", "bx", "by", "height")
 LAYOUT: Columns = {
-    "layout": lambda r: str(r["layout"]),
+    "layout": lambda r: "first" if r.get("first") else str(r["layout"]),
     "A [mm]": lambda r: f"±{1e3 * r['ax']:.1f}, ±{1e3 * r['ay']:.1f}",
     "B [mm]": lambda r: f"±{1e3 * r['bx']:.1f}, ±{1e3 * r['by']:.1f}",
     "height [mm]": lambda r: f"{1e3 * r['height']:.1f}",
@@ -38,20 +36,20 @@ def verdicts(rows: list[Row]) -> list[tuple[Claim, dict[int, tuple[bool, str]]]]
     return [(claim, {layout: claim.test(here) for layout, here in of.items()}) for claim in CLAIMS]
 
 
-def told(rows: list[Row], first: dict[str, list[Row]]) -> str:
-    """How many layouts each statement holds for, what that says of it, and the numbers behind it.
+def told(rows: list[Row]) -> str:
+    """How many identified layouts each statement holds for, what that says of it, and the numbers behind it.
 
-    first: the rows of the scenes' own layout, by group, where they are there.
+    Rows that say `first` are those of the layout that was assumed before, whose verdict stands beside.
     """
+    identified = [row for row in rows if not row.get("first")]
+    before = verdicts([row for row in rows if row.get("first")])
     judged = []
-    for claim, outcomes in verdicts(rows):
+    for (claim, outcomes), (_, assumed) in zip(verdicts(identified), before, strict=True):
         good = sum(holds for holds, _ in outcomes.values())
-        own = None
-        if "far" in first and "clearance" in first:
-            own = claim.test(numbers_of(first, FIRST_PLACE))[0]
+        own = next((holds for holds, _ in assumed.values()), None)
         judged.append([claim.paper, _yes(own), f"{good} of {len(outcomes)}", _verdict(good, len(outcomes), own)])
     head = ("statement", "first layout", "identified layouts", "over all of them")
-    examples = "\n".join(_numbers(claim, outcomes) for claim, outcomes in verdicts(rows))
+    examples = "\n".join(_numbers(claim, outcomes) for claim, outcomes in verdicts(identified))
     shown = "Of each statement one layout for which it holds, and one for which it does not:"
     return f"{pipe_table(head, judged)}\n\n{_peaks(rows)}\n\n{shown}\n\n{examples}"
 
@@ -95,9 +93,9 @@ def _peaks(rows: list[Row]) -> str:
     lines = []
     for layout in layouts:
         found = [peak(*which)[layout] for which in sets]
-        place = {name: found[0][name] for name in PLACE}
+        place = {name: found[0][name] for name in PLACE} | ({"first": True} if found[0].get("first") else {})
         lines.append(place | {f"{w[0]} {r['count'] or ''}".strip(): r for w, r in zip(sets, found, strict=True)})
-    peaks: Columns = {f"{name} [N]": partial(_peak, name) for name in lines[0] if name not in PLACE}
+    peaks: Columns = {f"{name} [N]": partial(_peak, name) for name in lines[0] if name not in (*PLACE, "first")}
     return "Peak contact forces:\n\n" + table(lines, {**LAYOUT, **peaks})
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 from benchmarks import family
 from benchmarks.family import Measured
 from benchmarks.family import Record as Row
+from benchmarks.geometry import identify
 from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.cases import BODY
 from benchmarks.reference_conditions.design import (
@@ -147,12 +148,13 @@ def _with_clearance(case: Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
 
 
 def layout_rows(members: int) -> Iterator[Row]:
-    """Ideal joints and clearance for layouts of the identified family; of ideal joints deviations from rigid."""
+    """Ideal joints and clearance for each of `design.layouts`; of ideal joints deviations from rigid."""
     place = workplace()
     for number, layout in enumerate(design.layouts()):
         runs = bring(design.of_layout(layout, members), place)
         ideal = next(run for case, run in runs.items() if case.condition == RIGID and not case.clearance)
-        which = {"layout": number} | {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height")}
+        which: Row = {"layout": number} | ({"first": True} if layout == identify.FIRST else {})
+        which |= {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height")}
         for case, run in runs.items():
             row = which | identity(case) | {"clearance": case.clearance}
             if case.clearance:

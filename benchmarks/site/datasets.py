@@ -42,9 +42,11 @@ the recipes run as tests.
   sqrt(kg) m for mass-normalised modes mean the same numbers.)
 - **Times.** The rows of a run are the regular outputs, and besides them breaks of drives, events and the deepest points
   of contacts.
-- **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that the
-  scene's parts stand for; `parameters`, `assumptions` and `sources` of the scene as JSON; `versions` of libraries;
-  `warnings`. No file holds the time or the machine of its making: equal inputs give equal bytes.
+- **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that
+  the scene's parts stand for; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
+  `assumptions`, where the scene's values come from, are attributes of post.nc and of what `flexclear.run` returns, so
+  that another sentence there runs nothing again. No file holds the time or the machine of its making: equal inputs
+  give equal bytes.
 - **Marked `*`:** variables that are there only when the scene has such a part.
 """
 

@@ -12,8 +12,18 @@ import numpy as np
 
 from flexclear.pipeline.core.axes import check_axes, check_axis
 
+#: share by which values differ at most that count as equally large
+_EQUAL = 1e-6
 #: square of the sine of the angle to -z below which a direction counts as that
 _OPPOSITE = 1e-18
+
+
+def first_largest(values: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Index of the largest of values >= 0 along an axis; of those that are equal up to rounding, the first.
+
+    Rounding differs between processors, and must not choose.
+    """
+    return np.argmax(values >= (1.0 - _EQUAL) * values.max(axis=axis, keepdims=True), axis=axis)
 
 
 def skew(v: np.ndarray) -> np.ndarray:

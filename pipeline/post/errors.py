@@ -1,4 +1,7 @@
-"""Differences between two runs, without interpolation: only at times that both have."""
+"""Differences between two runs, without interpolation: only at times that both have.
+
+But for what happens between these: a smooth motion can be interpolated with its accelerations.
+"""
 
 from __future__ import annotations
 
@@ -34,6 +37,21 @@ def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: floa
     if i.size == 0:
         raise ValueError("the two runs have no output time in common")
     return _compare(_motion(run, body), i, _motion(reference, body), j, run.time.values)
+
+
+def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: float = np.inf) -> tuple[float, float]:
+    """Largest difference of the velocity along z [m/s] at a run's own times up to `until` [s], events among them.
+
+    smooth: a motion without impacts, cubic in between by its accelerations.  Returns the time [s] as well.
+    """
+    from scipy.interpolate import CubicHermiteSpline
+
+    time = run.time.values
+    inside = time <= min(until, smooth.time.values[-1]) + SAME_TIME * time[-1]
+    mine, other = (one.sel(body=body, axis="z") for one in (run, smooth))
+    known = CubicHermiteSpline(other.time.values, other.velocity.values, other.acceleration.values)
+    apart = np.abs(mine.velocity.values - known(time))[inside]
+    return float(apart.max()), float(time[inside][apart.argmax()])
 
 
 def ensemble_deviations(ensemble: xr.Dataset, reference: xr.Dataset, body: str) -> list[Deviation]:

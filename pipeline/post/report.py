@@ -21,7 +21,7 @@ from flexclear.pipeline.post.plotting.table import Table, from_markdown
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "accuracy": (
         "accuracy.md",
-        ("What to choose", "sps4/variants/first_csj", "sps4/variants/first_far_csj_cb"),
+        ("What to choose", "sps4/csj", "sps4/far_csj_cb"),
         ("work_precision.png",),
     ),
     "stability": ("stability.md", ("", "One parameter at a time"), ("sweeps.png",)),

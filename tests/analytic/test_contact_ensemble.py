@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from functools import cache
 from typing import Any
 
@@ -15,6 +16,10 @@ from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores
+from flexclear.pipeline.dynamics.compile import stacks
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.run import crew, specialised, trajectory
+from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
@@ -23,8 +28,8 @@ END, APART, MEMBERS = 0.3, 1e-6, 4
 ALONG_X = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
 
 
-def scene() -> Scene:
-    asked = {"members": MEMBERS, "perturbation": "1 um"}
+def scene(members: int = MEMBERS) -> Scene:
+    asked = {"members": members, "perturbation": "1 um"}
     return load_scene(TREE / "scenes/checks/bounce.toml", override={"ensemble": asked, "time.end": END})
 
 
@@ -57,6 +62,64 @@ def test_members_tell_impacts_and_their_share_of_the_time() -> None:
 def test_members_are_the_same_to_the_last_bit_whoever_makes_them(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
     monkeypatch.setattr(cores, "cores", lambda: threads)
     assert dynamics.ensemble(scene(), {}, silent).identical(members())
+
+
+@pytest.mark.parametrize("lanes", [4, 8])
+def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once(
+    monkeypatch: pytest.MonkeyPatch, lanes: int
+) -> None:
+    """Also with fewer lanes than members, and with fewer members than lanes; that lanes are used is looked at."""
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+    monkeypatch.setattr(specialised, "LANES", (lanes,))
+    known, made = six(), list[int]()
+    proper = crew.Crew
+
+    def noted(kept: bytes, code: int, width: int) -> crew.Crew:
+        made.append(width)
+        return proper(kept, code, width)
+
+    monkeypatch.setattr(crew, "Crew", noted)
+    assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
+    assert made == ([lanes] if stacks.supported() and not INTERPRETED else [])
+
+
+@cache
+def six() -> xr.Dataset:
+    """Six members, each of which takes its own steps."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(specialised, "FEW", 7)
+        patch.setattr(cores, "cores", lambda: 1)
+        return dynamics.ensemble(scene(members=6), {}, silent)
+
+
+def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bit(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Four members at once, and one after the other: impacts, sticking, rejected steps, loops that are closed."""
+    asked = {"members": 4, "perturbation": "1 um"}
+    paper = load_scene(TREE / "scenes/sps4/csj.toml", override={"ensemble": asked, "time.end": "60 ms"})
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+    together = dynamics.ensemble(paper, {}, silent)
+    assert (together.impact_count.values > 5).all()
+    assert not np.array_equal(together.position[0], together.position[1])
+    monkeypatch.setattr(specialised, "FEW", 5)
+    assert dynamics.ensemble(paper, {}, silent).identical(together)
+
+
+def test_steps_in_a_crew_end_when_one_of_its_members_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others are told at their next pause; nobody waits for ever."""
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+    proper = trajectory._begin_closed
+
+    def fails(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
+        if threading.current_thread().name.endswith("_2"):
+            raise SolverError("the third")
+        proper(engine, y, events)
+
+    monkeypatch.setattr(trajectory, "_begin_closed", fails)
+    with pytest.raises(SolverError, match="the third"):
+        dynamics.ensemble(scene(), {}, silent)
+    assert not [one for one in threading.enumerate() if one.name == "steps side by side"]
 
 
 def test_of_members_side_by_side_the_first_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

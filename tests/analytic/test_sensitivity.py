@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.analytic.mechanism_runs import run
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.run.observation import frames
+from flexclear.pipeline.dynamics.run.run import engine_of, observed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import integrate
+from tests.analytic.mechanism_runs import TREE, run
 
 
 def test_rigid_clearance_converges_over_the_whole_stroke():
@@ -12,6 +18,17 @@ def test_rigid_clearance_converges_over_the_whole_stroke():
     csj = run("sps4/variants/first_csj")
     assert float(csj.horizon) == csj.time.values[-1]
     assert csj.twin_separation.values.max() < 1e-5 * np.abs(csj.velocity.values).max()
+
+
+def test_frames_by_which_twins_are_compared_are_those_of_full_rows_but_for_open_loops():
+    engine = engine_of(load_scene(TREE / "scenes/sps4/variants/first_csj.toml"), {}, silent)
+    trajectory = integrate(engine, consistent_start(engine), silent)
+    seen, alone = observed(engine, trajectory), frames(engine, trajectory.rows)
+    for what in ("links", "sites"):
+        for field in ("origin", "axes", "omega", "velocity"):
+            here, known = getattr(alone, what)[field], getattr(seen, what)[field]
+            # rtol is 1e-10, at which loops drift; rates count per second, so that they are open by more
+            assert np.abs(here - known).max() < 1e-7 * np.abs(known).max(), (what, field)
 
 
 def test_a_twin_of_a_motion_that_does_not_return_starts_where_the_run_does():

@@ -44,6 +44,21 @@ def peaks(found: Outline, forces: list[float]) -> tuple[float, float]:
     return float(axial[0, 0]), float(mises[0, 0])
 
 
+@pytest.mark.parametrize("nudge", [-1.0, 1.0])
+def test_rounding_does_not_choose_between_tension_and_compression(nudge: float) -> None:
+    """Two fibres at the same distance from the axis are stretched and pressed alike."""
+    fibres = np.zeros((1, 2, 3, 6))
+    fibres[0, :, 0, 4] = -1e6, 1e6 * (1.0 + nudge * np.finfo(float).eps)
+    data = xr.Dataset(
+        {
+            "fibre_stress": (("section", "fibre", "stress", "load"), fibres),
+            "section_round": (("section",), np.zeros(1, dtype=np.int8)),
+        }
+    )
+    axial, _ = peak_stresses(data, np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0])[None, None])
+    assert axial[0, 0] == pytest.approx(-2e6, rel=1e-14)
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.4, 1.234, 2.9])
 def test_bending_of_a_round_rod_peaks_at_M_r_over_I_in_any_plane(angle: float) -> None:
     """Exact, not to the spacing of fibres."""

@@ -53,7 +53,10 @@ def study(uncertainty: float = 1e-8, horizon: float | None = None, **extra: xr.D
     for k, (rtol, error) in enumerate(((1e-3, 1e-2), (1e-6, 1e-5), (1e-9, 1e-7))):
         points.append(Point(f"d{k}", "tolerance", {"adaptive_integrator": "dop853", "rtol": rtol}))
         runs[f"d{k}"] = run(error, evaluations=100 * (k + 1))
-    for step, made in ((1e-3, run(1e-4, evaluations=50)), (1e-2, xr.Dataset(attrs={"refused": "it blew up"}))):
+    for step, made in (
+        (1e-3, run(1e-4, evaluations=50)),
+        (1e-2, xr.Dataset(attrs={"refused": "it blew up; take another"})),
+    ):
         points.append(Point(f"r{step}", "step", {"fixed_integrator": "rk4", "step": step}))
         runs[f"r{step}"] = made
     return assemble(points, runs, [POSITION, TIMES]), points, runs
@@ -76,6 +79,7 @@ def test_refused_points_are_gaps_with_their_reason():
     found, *_ = study()
     assert np.isnan(found.error_by_step.sel(fixed_integrator="rk4", step=1e-2)).all()
     assert "it blew up" in found.attrs["refused"]
+    assert "take another" not in found.attrs["refused"]
 
 
 def test_errors_near_the_reference_cannot_be_told():
@@ -91,6 +95,24 @@ def test_errors_beyond_the_horizon_do_not_count():
     pick = {"adaptive_integrator": "dop853", "rtol": 1e-3, "quantity": "slider.position"}
     ratio = float(part.error_by_tolerance.sel(pick)) / float(all_of_it.error_by_tolerance.sel(pick))
     assert ratio == pytest.approx(np.sin(0.2 * np.pi))
+
+
+def test_the_horizon_of_the_confirmation_counts_too():
+    """An impact that only one of both has, beyond what the confirmation can predict, is no uncertainty."""
+    _, points, runs = study(horizon=0.7)
+    runs["other"] = run(1e-8, impacts=2)
+    assert np.isinf(assemble(points, runs, [TIMES]).reference_uncertainty).all()
+    runs["other"] = run(1e-8, impacts=2, horizon=0.5)
+    found = assemble(points, runs, [TIMES])
+    assert found.attrs["horizon"] == 0.5
+    assert float(found.reference_uncertainty[0]) < 1e-7
+
+
+def test_a_reference_that_is_not_confirmed_is_drawn_as_one():
+    _, points, runs = study()
+    runs["other"] = run(1e-8, impacts=2)
+    found = assemble(points, runs, [POSITION, TIMES])
+    assert set(work_precision.make("w", found, "t")) == {"w.png", "w.svg"}
 
 
 def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheapest():

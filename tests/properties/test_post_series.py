@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.pipeline.core.algebra import quaternion_product, rotation_between, rotation_vector_to_quaternion
 from flexclear.pipeline.core.quantities import common_times
 from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.errors import ensemble_deviations, max_deviation
+from flexclear.pipeline.post.errors import ensemble_deviations, max_deviation, velocity_at_events
 from flexclear.pipeline.post.horizon import horizon, spread
 from flexclear.pipeline.post.poincare import at_times
 from flexclear.pipeline.post.rotations import angle_about_y
@@ -58,6 +59,23 @@ def test_deviation_is_taken_at_common_times_only():
     np.testing.assert_allclose(a.time.values[i], b.time.values[j], rtol=0.0, atol=1e-13 * a.time.values[-1])
     # the wobble is a sine of 300 Hz sampled every 0.1 ms: its top is missed by at most 0.1 %
     assert max_deviation(b, a, "platform").displacement == pytest.approx(1e-4, rel=2e-3)
+
+
+def test_what_happens_between_outputs_is_seen_at_events():
+    """A smooth motion of 5 Hz at outputs, and one that leaves it by a jump between two of them and comes back."""
+
+    def moving(time: np.ndarray) -> xr.Dataset:
+        motion = {"velocity": np.sin(10.0 * np.pi * time), "acceleration": 10.0 * np.pi * np.cos(10.0 * np.pi * time)}
+        dims, axis = ("time", "body", "axis"), [0.0, 0.0, 1.0]
+        data = {name: (dims, values[:, None, None] * axis) for name, values in motion.items()}
+        return xr.Dataset(data, coords={"time": time, "body": ["platform"], "axis": ["x", "y", "z"]})
+
+    grid = 1e-3 * np.arange(201)
+    other = moving(np.sort(np.append(grid, 0.0734)))
+    struck = other.assign(velocity=other.velocity + 0.25 * ((other.time == 0.0734) & (other.axis == "z")))
+    # a cubic between outputs leaves (2 pi 5 h)^4 / 384 = 2.5e-9
+    assert velocity_at_events(struck, moving(grid), "platform") == pytest.approx((0.25, 0.0734), abs=1e-7)
+    assert velocity_at_events(struck, moving(grid), "platform", until=0.07)[0] < 1e-7
 
 
 def test_events_that_are_a_hair_apart_are_not_compared():
@@ -203,6 +221,17 @@ def test_extremes_are_those_of_all_rows():
         np.abs(run.acceleration.sel(body="platform", axis="z")).max()
     )
     assert float(post.peak_reaction.sel(joint="A1")) == float(post.reaction.sel(joint="A1").max())
+
+
+@pytest.mark.parametrize("nudge", [-1.0, 1.0])
+def test_rounding_does_not_choose_between_two_equal_peaks(nudge: float):
+    """A stroke that ends as it began has its largest acceleration twice."""
+    run = synthetic.run("sps4/csj", clearance=True)
+    acceleration = np.zeros_like(run.acceleration.values)
+    acceleration[3] = -70.0
+    acceleration[-4] = 70.0 * (1.0 + nudge * np.finfo(float).eps)
+    post = derive(run.assign(acceleration=(run.acceleration.dims, acceleration)))
+    assert (post.peak_acceleration_time == run.time.values[3]).all()
 
 
 def test_sections_are_never_interpolated():

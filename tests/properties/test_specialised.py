@@ -163,13 +163,17 @@ def test_laws_of_time_and_integrators_are_not_in_the_code() -> None:
     assert source(load_scene(TREE / "scenes/sps4/ideal.toml")) != source(scene)
 
 
-def test_equal_wirings_give_equal_code() -> None:
+@pytest.mark.parametrize("lanes", [1, 4])
+def test_equal_wirings_give_equal_code(lanes: int) -> None:
     """The tape is written in one order, whatever the places of objects in memory are."""
+
+    def where(builder: ir.IRBuilder, array: str) -> ir.AllocaInstr:
+        return builder.alloca(ir.DoubleType() if array in "wf" else INT)
 
     def told() -> str:
         model = tabulate(build(load_scene(TREE / "scenes/sps4/csj.toml"), {}))
         made, builder = program(rates_kernel(model), wiring(model.arrays, model.arrays.h)), function()
-        Emitter(builder, made, lambda array, place: builder.alloca(ir.DoubleType() if array in "wf" else INT)).emit()
+        Emitter(builder, made, lambda array, place, lane: where(builder, array), lanes, exact=lanes > 1).emit()
         return str(builder.module)
 
     assert told() == told()

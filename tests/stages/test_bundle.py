@@ -91,3 +91,19 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
         (tmp_path / "a.zip").write_bytes(content)
         with pytest.raises(InputError):
             bundle.repeat(tmp_path / "a.zip", [])
+
+
+def test_a_run_that_is_repeated_is_compared_to_the_last_bit(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    scene = Path(shutil.copy(root / "scenes" / "checks" / "pendulum.toml", tmp_path))
+    path = bundle.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
+    assert main(["doctor", "--repeat", str(path)]) == 0
+    assert "the run is the same to the last bit" in capsys.readouterr().out
+    with zipfile.ZipFile(path) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    facts = json.loads(content["facts.json"]) | {"settings": ["time.end='30 ms'"]}
+    path.write_bytes(bundle._packed({**content, "facts.json": json.dumps(facts).encode()}))
+    assert main(["doctor", "--repeat", str(path)]) == 0
+    assert "the run is not the same to the last bit" in capsys.readouterr().out

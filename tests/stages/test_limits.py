@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import time
 import zipfile
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from flexclear.pipeline.core.scene.demand import check_run, row
 from flexclear.pipeline.core.scene.limits import check_cells
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.structure.fe.exchange import files
-from flexclear.stages import s4_simulate
+from flexclear.stages import cost, s4_simulate, sections
 from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
 from tests.stages.conftest import JOINT, SCENE
@@ -128,3 +130,20 @@ def test_the_estimate_of_a_row_is_what_a_run_takes(root: Path):
         estimate = row(load_scene(root / "scenes" / f"{name}.toml"))
         # an estimate: what matters is its order of size
         assert 0.5 * measured < estimate < 2.0 * measured
+
+
+@pytest.mark.parametrize("command", [cost, sections])
+def test_a_page_that_the_disk_has_no_room_for_is_told_by_its_place(
+    command: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The page that was there stays whole."""
+
+    def full(path: Path, content: bytes) -> str:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(command, "publish", full)
+    (tmp_path / "page.md").write_text("old")
+    pages = {cost: lambda page: cost.write_page({}, page), sections: lambda page: sections.write_page({}, {}, {}, page)}
+    with pytest.raises(ResourceError, match=f"cannot write below {tmp_path}: the disk is full"):
+        pages[command](tmp_path / "page.md")
+    assert (tmp_path / "page.md").read_text() == "old"

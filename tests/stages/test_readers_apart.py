@@ -64,6 +64,14 @@ def test_what_a_file_does_to_its_reader_is_told(
     assert apart.read(bad_readers.doubled, file)["bytes"].tobytes() == b"content"
 
 
+def test_a_folder_that_cannot_be_listed_may_hold_files(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def closed(path: Path) -> object:
+        raise PermissionError(path)
+
+    monkeypatch.setattr(Path, "iterdir", closed)
+    assert apart.read(bad_readers.doubled, file)["bytes"].tobytes() == b"content"
+
+
 def test_a_reader_that_waits_is_given_up(file: Path) -> None:
     with pytest.raises(UnreadableError, match=r"more than 0\.5 s"):
         apart.read(bad_readers.sleeps, file, limits=Limits(300e6, 1.0, patience=0.5))

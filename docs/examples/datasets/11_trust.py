@@ -4,5 +4,5 @@ import json
 
 believed = run.sel(time=slice(None, float(run["horizon"])))  # beyond, single values mean nothing
 energy = float(abs(run["energy_error"]).max() / run["kinetic"].max())
-assumed = json.loads(run.attrs["assumptions"])  # place in the scene -> why
+assumed = json.loads(post.attrs["assumptions"])  # place in the scene -> why
 print(run.attrs["source"], run.attrs["references"], run.attrs.get("warnings", ""), sep="\n")

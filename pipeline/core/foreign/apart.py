@@ -55,11 +55,18 @@ class Limits:
     @staticmethod
     def of(path: Path) -> Limits:
         """Those of a file, by its size and that of its companions."""
-        size = sum(
-            other.stat().st_size for other in path.parent.iterdir() if other.stem == path.stem and other.is_file()
-        )
+        size = _size(path)
         seconds = SECONDS + PER_BYTE * size
         return Limits(max(FLOOR, min(LEAST + TIMES * size, allowed())), seconds, PATIENCE * seconds)
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file and of those of its name with other endings, as far as its folder may be looked at."""
+    try:
+        found = [other for other in path.parent.iterdir() if other.stem == path.stem and other.is_file()]
+    except OSError:
+        found = [path]
+    return sum(file.stat().st_size for file in found)
 
 
 def allowed() -> float:
@@ -135,22 +142,22 @@ def _answer(asked: dict[str, Any], limits: Limits) -> dict[str, Any]:
     stdin, stdout = child.process.stdin, child.process.stdout
     assert stdin is not None
     assert stdout is not None
-    answer: Any = None
+    answer: dict[str, Any] | None = None
+    reason = "what its reader answers is no message"
     try:
         wire.send(stdin, asked)
-        answer = wire.receive(stdout, limits.memory)
+        found = wire.receive(stdout, limits.memory)
+        answer = found if "failure" in found or {"value", "read"} <= found.keys() else None
     except (OSError, EOFError):
         reason = _end_of(child, late.is_set(), limits)
-    except (ValueError, TypeError, KeyError, AttributeError):
-        reason = f"what its reader answers is no message, or has more than {machine.size(limits.memory)}"
+    except (ValueError, TypeError, KeyError, AttributeError, MemoryError):
+        reason += f", or has more than {machine.size(limits.memory)}"
     finally:
         timer.cancel()
-        if not isinstance(answer, dict):  # also where Ctrl-C came: half of an answer may be on its way
+        if answer is None:  # also where Ctrl-C came: half of an answer may be on its way
             child.end()
             _child = None
-    if not isinstance(answer, dict):
-        return {"failure": "end", "words": reason}
-    return answer
+    return {"failure": "end", "words": reason} if answer is None else answer
 
 
 def _running() -> _Child:
@@ -159,6 +166,8 @@ def _running() -> _Child:
     if _child is None or _child.owner != os.getpid() or _child.process.poll() is not None:
         if _child is None:
             atexit.register(end)
+        else:
+            _child.end()
         thread = "main" if threading.current_thread() is threading.main_thread() else "other"
         _child = _Child(_started(json.dumps([str(folder) for folder in sys.path]), str(os.getpid()), thread))
     return _child

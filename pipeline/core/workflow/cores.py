@@ -9,7 +9,7 @@ from flexclear.pipeline.core.errors import StoppedError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.system import cores
 
-__all__ = ["cores", "free", "side_by_side", "tell"]
+__all__ = ["cores", "free", "side_by_side", "tell", "width"]
 
 Result = TypeVar("Result")
 #: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
@@ -32,11 +32,19 @@ def free() -> bool:
     return idle and cores() > 1
 
 
-def side_by_side(work: Callable[[int, Progress], Result], count: int, done: Callable[[int], None]) -> list[Result]:
+def width() -> int:
+    """How many threads of compiled code to run side by side."""
+    return cores() if free() else min(cores(), BESIDE)
+
+
+def side_by_side(
+    work: Callable[[int, Progress], Result], count: int, done: Callable[[int], None], threads: int = 0
+) -> list[Result]:
     """Results of work(0) .. work(count - 1), made in threads: for what is mostly compiled code, which lets others run.
 
     work: is given a progress to call now and then, which ends it when another one has failed or Ctrl-C was pressed.
-    done: told how many are finished.  Raises what the first one that failed raised.
+    done: told how many are finished.  threads: how many; `width` by default.  Raises what the first one that failed
+    raised.
     """
     from concurrent.futures import CancelledError, ThreadPoolExecutor
     from threading import Event
@@ -47,8 +55,7 @@ def side_by_side(work: Callable[[int, Progress], Result], count: int, done: Call
         if given_up.is_set():
             raise CancelledError
 
-    width = cores() if free() else min(cores(), BESIDE)
-    with ThreadPoolExecutor(min(width, count)) as pool:
+    with ThreadPoolExecutor(min(threads or width(), count)) as pool:
         waiting, results = [pool.submit(work, k, progress) for k in range(count)], list[Result]()
         try:
             for future in waiting:

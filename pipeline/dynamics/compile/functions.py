@@ -57,6 +57,7 @@ PROTOTYPES = {
     "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, *_TABLE_AT),
     "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
 }
+LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _INTEGER)
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
@@ -94,15 +95,29 @@ class Entry:
         outputs: np.ndarray,
         rows: np.ndarray,
         events: np.ndarray,
+        by: Callable[[int, list[int]], None] | None = None,
     ) -> None:
-        """Step to the end of the segment or of the budget."""
-        self._advance(_tables(h, f, w, n), 0.0, -1, outputs, rows, events)
+        """Step to the end of the segment or of the budget.
+
+        by: what is to call the compiled function, given its address and a word for each of its arguments.
+        """
+        self._advance(_tables(h, f, w, n), 0, -1, outputs, rows, events, by)
 
     def _advance(
-        self, tables: tuple, t: float, repeat: int, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray
+        self,
+        tables: tuple,
+        t: float,
+        repeat: int,
+        outputs: np.ndarray,
+        rows: np.ndarray,
+        events: np.ndarray,
+        by: Callable[[int, list[int]], None] | None = None,
     ) -> None:
-        record = (place(rows), *rows.shape, place(events), *events.shape)
-        self._functions["advance"](*tables, t, repeat, place(outputs), len(outputs), *record)
+        record = [place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
+        if by is None:
+            self._functions["advance"](*tables, t, repeat, *record)
+        else:
+            by(self.addresses["advance"], [*tables, 0, repeat, *record])  # steps have their time in w
 
     def observe(
         self,
@@ -137,11 +152,14 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
         return Entry(_addresses(folder, sources.sources(parts, scheme), tell, began))
 
 
-def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None]) -> int:
-    """Address of the right-hand side for one wiring; UnsuitedError when there is none."""
+def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes: int = 0) -> int:
+    """Address of the right-hand side for one wiring; UnsuitedError when there is none.
+
+    lanes: see `sources.specialised`; of several that of what lets as many steppers run (`compile.lanes`).
+    """
     folder, began = writable(kernel_root(), tell), time.monotonic()
     with disk_limits(folder):
-        found = _addresses(folder, {SPECIALISED: sources.specialised(parts, wiring)}, tell, began)
+        found = _addresses(folder, {SPECIALISED: sources.specialised(parts, wiring, lanes)}, tell, began)
     return found[SPECIALISED]
 
 

@@ -52,7 +52,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
     Raises InputError when a name is not listed in its family.
     """
     found = {part.module for part in named(scene)}
-    found |= _reached(specialised(most_parts(scene), ()))
+    found |= _reached(specialised(most_parts(scene), ())) | _reached(specialised(most_parts(scene), (), lanes=2))
     for scheme in schemes(scene):
         for source in sources(most_parts(scene), scheme).values():
             found |= _reached(source)
@@ -66,18 +66,27 @@ def _reached(source: str) -> frozenset[str]:
     return frozenset(name for name in names if source_file(TREE, name))  # others are in modules
 
 
-def specialised(parts: Parts, wiring: Wiring) -> str:
-    """Source of the right-hand side for one wiring."""
+def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
+    """Source of the right-hand side for one wiring.
+
+    lanes: 0 for runs; of members of ensembles how many are evaluated at once, with equal bits whatever their number.
+    """
     given, imports = _forces(parts)
     if parts.closures:
         given["closures"] = _closures(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
     _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
-    _import(imports, f"{DYNAMICS}.specialise.straight", "straight")
+    for name in (["exactly"] if lanes else []) + ["abreast" if lanes > 1 else "straight"]:
+        _import(imports, f"{DYNAMICS}.specialise.straight", name)
+    if lanes > 1:
+        _import(imports, f"{DYNAMICS}.compile.lanes", "make_lanes")
     harmonics = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate") if parts.harmonics else ""
+    laws = f"exactly(make_laws({harmonics}))" if lanes else f"make_laws({harmonics})"
     what = f"right-hand side of {', '.join(parts.joints)}, for one wiring"
+    function = LANES if lanes > 1 else SPECIALISED
     wired = "".join(f"    {row},\n" for row in wiring)
-    return _file(what, imports, "rates", maker, given, SPECIALISED.format(harmonics=harmonics, wiring=wired))
+    text = function.format(laws=laws, wiring=wired, lanes=lanes, exact=bool(lanes))
+    return _file(what, imports, "rates", maker, given, text)
 
 
 def _evaluate(parts: Parts) -> str:
@@ -113,6 +122,8 @@ def _retract(parts: Parts) -> str:
 def _observe(parts: Parts) -> str:
     given, imports = _forces(parts)
     given = {"evaluate": "calls.evaluate", "project": _projection(imports, parts), **given}
+    if parts.harmonics:
+        given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
     if parts.couplings:
         given["couplings"] = _closures(imports, parts)
     if parts.joint_frictions and parts.closures:
@@ -236,13 +247,23 @@ def evaluate(h, f, w, n, t, y, dy):
 # laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
 SPECIALISED = """WIRING = (
 {wiring})
-laws, along = make_laws({harmonics}), straight(rates, WIRING)
+laws, along = {laws}, straight(rates, WIRING, exact={exact})
 
 
 @calls.exported("evaluate")
 def specialised(h, f, w, n, t, y, dy):
     laws(h, f, w, n, t)
     along(h, f, w, n, y, dy)
+    return 0
+"""
+LANES = """WIRING = (
+{wiring})
+run = make_lanes({laws}, abreast(rates, WIRING, {lanes}), {lanes})
+
+
+@calls.exported("lanes")
+def lanes(table, places, resume):
+    run(table, places, resume)
     return 0
 """
 PROJECT = """@calls.exported("project")

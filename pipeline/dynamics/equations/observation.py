@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
+from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
 from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest
-from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing
+from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing, spread_state
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
 
 #: kinetic energy, potential energy of gravity, energy stored in bodies, springs and contacts [J]
 ENERGY = m.layout("kinetic potential elastic")
+#: tolerance by which the loops of rows stay as they are, and nothing but frames is written
+AS_RECORDED = -1.0
 
 
 @dataclass(frozen=True)
@@ -75,6 +78,25 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
     }
 
 
+class Frames(NamedTuple):
+    """Frames of links and sites in rows of the record; of LINK_FRAMES without accelerations, (rows, links or sites)."""
+
+    links: np.ndarray
+    sites: np.ndarray
+
+
+def frames_room(rows: int, size: Callable[[int], int]) -> np.ndarray:
+    """Room for frames alone, shape (rows, columns)."""
+    return np.empty((rows, m.FRAME.size * (size(m.N_LINKS) + size(m.N_SITES))))
+
+
+def frames_by_name(out: np.ndarray, size: Callable[[int], int]) -> Frames:
+    """Views of the frames that `observe` has written."""
+    end = m.FRAME.size * size(m.N_LINKS)
+    known = ["origin", "axes", "omega", "velocity"]
+    return Frames(m.named(m.LINK_FRAMES, out[:, :end])[known], m.named(m.SITE_FRAMES, out[:, end:])[known])
+
+
 def room(rows: int, size: Callable[[int], int]) -> np.ndarray:
     """Zeros that `observe` can write on, shape (rows, columns); size: of a place in the header."""
     return np.zeros((rows, sum((table.size if table else 1) * count for table, count in _columns(size).values())))
@@ -121,15 +143,18 @@ def make_observation(
     contacts: Callable | None = None,
     loads: Callable | None = None,
     stops: Callable | None = None,
+    harmonics: Callable | None = None,
     couplings: Any = None,
     friction: Callable | None = None,
 ) -> Callable:
     """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
 
+    With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
+
     evaluate, project: as the stepper calls them; couplings: the module of that name; friction: of ideal joints, in
     closures (`equations.joint_friction`); the other arguments are those of `make_right_hand_side`.
     """
-    kinematics = make_kinematics(joints, flexible)
+    kinematics, laws = make_kinematics(joints, flexible), make_laws(harmonics)
     forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
     couple = no_couplings if couplings is None else couplings.take_off_first_joints
@@ -154,8 +179,7 @@ def make_observation(
 
     @kernel
     def joint_wrenches(h, f, w, n, out, column):
-        """Wrench on every link through its inboard joint, at the accelerations in DU (Newton-Euler)."""
-        kinematics(h, f, w)
+        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler)."""
         forces(h, f, w, n)
         modal_inertia(h, f, w, n)
         after = closure_wrenches(h, w, out, column + 6 * h[m.N_LINKS])
@@ -192,6 +216,19 @@ def make_observation(
             n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
 
     @kernel
+    def place(h, f, w, n, t):
+        """Positions and speeds of the state in Y."""
+        laws(h, f, w, n, t)
+        spread_state(h, w, h[m.Y])
+        prescribe(h, w)
+
+    @kernel
+    def copy_frames(h, w, line, column):
+        """Copy the frames of links and sites."""
+        o = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], line, column)
+        return _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], line, o)
+
+    @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):
         mode, latched, state = m.record_columns(h[m.N_CONTACTS])
         for r in range(rows.shape[0]):
@@ -203,19 +240,25 @@ def make_observation(
                 w[h[m.Y] + k] = row[state + k]
             for k in range(h[m.N_LAWS]):
                 n[n[m.ACTIVE] + k] = pieces[r, k]
-            evaluate_closed(h, f, w, n, row[0], tolerance)
-            if n[m.EVALUATION] == m.OK:
-                keep_scales(h, w)
+            if tolerance == AS_RECORDED:
+                place(h, f, w, n, row[0])
+            else:
+                evaluate_closed(h, f, w, n, row[0], tolerance)
+                if n[m.EVALUATION] == m.OK:
+                    keep_scales(h, w)
+            # at the accelerations in DU; written once, since twice would be compiled twice
+            kinematics(h, f, w)
+            if tolerance == AS_RECORDED:
+                copy_frames(h, w, line, 0)
+                continue
             status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
             o = _copy(w, h[m.Y], h[m.NY], line, 0)
             o = _copy(w, h[m.X], h[m.NQ] + h[m.N_DRIVES], line, o)
             o = _copy(w, h[m.U], h[m.NV] + h[m.N_DRIVES], line, o)
             o = _copy(w, h[m.SLOPES] + h[m.NQ], h[m.NV], line, o)
             o = _copy(w, h[m.DU] + h[m.NV], h[m.N_DRIVES], line, o)
-            frames = o
-            o = joint_wrenches(h, f, w, n, line, o + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES]))
-            frames = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], line, frames)
-            _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], line, frames)
+            o = copy_frames(h, w, line, o)
+            o = joint_wrenches(h, f, w, n, line, o)
             o = _copy(w, h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS], line, o)
             o = _copy(w, h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS], line, o)
             o = _copy(w, h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS], line, o)

@@ -58,6 +58,18 @@ def no_known_forces(h, w):
 
 
 @kernel
+def spread_state(h, w, y):
+    """Positions, speeds and internal states from the state at place y; no accelerations yet."""
+    for k in range(h[m.NQ]):
+        w[h[m.X] + k] = w[y + k]
+    for k in range(h[m.NV]):
+        w[h[m.U] + k] = w[y + h[m.NQ] + k]
+        w[h[m.DU] + k] = 0.0
+    for k in range(h[m.N_INTERNAL]):
+        w[h[m.INTERNAL] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_INTERNAL] + k]
+
+
+@kernel
 def gather(h, w, i):
     """Force and momentum of link i's coordinates; then take its subtree to its parent."""
     o = m.WRENCH.row(h, i)
@@ -159,16 +171,6 @@ def make_rates(
     close = no_closures if closures is None else closures.close
     known_forces = no_known_forces if closures is None else closures.known_forces
     rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
-
-    @kernel
-    def spread_state(h, w, y):
-        for k in range(h[m.NQ]):
-            w[h[m.X] + k] = w[y + k]
-        for k in range(h[m.NV]):
-            w[h[m.U] + k] = w[y + h[m.NQ] + k]
-            w[h[m.DU] + k] = 0.0
-        for k in range(h[m.N_INTERNAL]):
-            w[h[m.INTERNAL] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_INTERNAL] + k]
 
     @kernel
     def gather_forces(h, f, w, n):

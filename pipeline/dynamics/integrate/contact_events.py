@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event
 from flexclear.pipeline.dynamics.integrate.stepper import RESTART
-from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_repeat
+from flexclear.pipeline.dynamics.integrate.within_step import NEAR, make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import at, dot, sub
 
@@ -186,17 +186,25 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
         With sign -1 the distance rises from zero and is negative at the end: wherever it is seen negative, its first
         rise and fall lie before, whatever it does after.
         """
-        zero = zero_gap(h, f, w, c)
+        zero, theta, last = zero_gap(h, f, w, c), low, 0
+        at_low = at_high = 0.0  # rates there, zero while they are not known
         for _ in range(TURN_ITERATIONS):
-            theta = 0.5 * (low + high)
+            before, share = theta, 0.5
+            if at_low < 0.0 < at_high:
+                share = at_low / (at_low - at_high)
+            theta = low + share * (high - low)
             value, rate = distance_at(h, f, w, n, step, theta, c)
-            if sign * value < -zero:
+            if sign * value < -zero or abs(theta - before) <= NEAR:
                 return theta
             if sign * rate > 0.0 or (sign < 0.0 and value < 0.0):
-                high = theta
+                high, at_high = theta, max(sign * rate, 0.0)
+                at_low *= 0.5 if last == 1 else 1.0  # the Illinois rule
+                last = 1
             else:
-                low = theta
-        return 0.5 * (low + high)
+                low, at_low = theta, sign * rate
+                at_high *= 0.5 if last == -1 else 1.0
+                last = -1
+        return theta
 
     @kernel
     def root(h, f, w, n, step, c, low, high):

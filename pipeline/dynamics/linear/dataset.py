@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.algebra import first_largest
 from flexclear.pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics import memory as m
@@ -53,7 +54,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
     size, parts = np.abs(value), list(energy)
     share = np.stack([energy[name] for name in parts], axis=1)
-    most = share.argmax(axis=1)
+    most = first_largest(share, axis=1)
     data: dict[str, Any] = {
         "frequency": ("vibration", np.abs(value.imag) / (2.0 * np.pi)),
         "undamped_frequency": ("vibration", size / (2.0 * np.pi)),
@@ -106,9 +107,7 @@ def _phase(translation: np.ndarray, rotation: np.ndarray, w: np.ndarray) -> np.n
     for k in range(w.shape[1]):
         shown = translation[k].ravel() if np.abs(translation[k]).max(initial=0.0) > 0.0 else rotation[k].ravel()
         every = shown if np.abs(shown).max(initial=0.0) > 0.0 else w[:, k]
-        # of components equal but for rounding always the first, so that the sign does not depend on the machine
-        size = np.abs(every)
-        largest = every[np.flatnonzero(size >= (1.0 - 1e-6) * size.max())[0]]
+        largest = every[first_largest(np.abs(every))]
         phases.append(np.conj(largest) / abs(largest))
     return np.array(phases, dtype=complex)
 

@@ -18,16 +18,17 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
-from flexclear.pipeline.core.workflow.cores import side_by_side
+from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions, quaternions
+from flexclear.pipeline.dynamics.run.crew import Crew
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.singular import select_rows
-from flexclear.pipeline.dynamics.run.specialised import specialise
+from flexclear.pipeline.dynamics.run.specialised import abreast
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
@@ -45,7 +46,6 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     select_rows(engine, start, engine.start)
-    specialise(engine, progress)
     jacobian = offset_jacobian(engine, start)
     offsets = ball_offsets(engine.model, wanted, wanted.members)
     starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
@@ -55,14 +55,26 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         with making:
             return another(other(name))
 
-    def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-        """On an engine of its own, so that it does not depend on who ran before."""
-        last, trajectory, switched = follow(another(engine), starts[k], alive, heir)
+    def alone(k: int, alive: Progress, crew: Crew | None = None) -> tuple[xr.Dataset, str]:
+        """A member on an engine of its own, so that it does not depend on who ran before."""
+        mine = another(engine)
+        mine.straight.crew = crew
+        last, trajectory, switched = follow(mine, starts[k], alive, heir)
         return _member(last, trajectory, names), switched
 
-    found = side_by_side(
-        member, wanted.members, lambda k: progress(k / wanted.members, f"member {k} of {wanted.members}")
-    )
+    def done(k: int) -> None:
+        progress(k / wanted.members, f"member {k} of {wanted.members}")
+
+    with abreast(engine, wanted.members, width(), progress) as crews:
+        if crews is None:
+            found = side_by_side(alone, wanted.members, done)
+        else:
+
+            def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
+                with crews.place() as crew:
+                    return alone(k, alive, crew)
+
+            found = side_by_side(member, wanted.members, done, crews.lanes)
     members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}

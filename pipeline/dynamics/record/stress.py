@@ -14,15 +14,18 @@ Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.algebra import first_largest, skew
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
@@ -94,13 +97,14 @@ def peak_stresses(bundle: xr.Dataset, forces: np.ndarray) -> tuple[np.ndarray, n
     """Axial stress that is largest in size, and largest von Mises stress [Pa], shape (time, section) each.
 
     forces: as `section_forces` returns them.  A round section is turned so that a fibre lies in the plane of bending.
+    Of axial stresses that are equally large that of the first fibre counts.
     """
     axial, mises = np.empty(forces.shape[:2]), np.empty(forces.shape[:2])
     maps, is_round = bundle["fibre_stress"].values, bundle["section_round"].values
     for s, fibres in enumerate(maps):
         loads = _in_plane_of_bending(forces[:, s]) if is_round[s] else forces[:, s]
         sigma, tau_y, tau_z = np.moveaxis(np.einsum("fcl,tl->tfc", fibres, loads, optimize=True), -1, 0)
-        worst = np.argmax(np.abs(sigma), axis=1)
+        worst = first_largest(np.abs(sigma), axis=1)
         axial[:, s] = np.take_along_axis(sigma, worst[:, None], axis=1)[:, 0]
         mises[:, s] = np.sqrt(sigma**2 + 3.0 * (tau_y**2 + tau_z**2)).max(axis=1)
     return axial, mises

@@ -23,6 +23,7 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.crew import Crew
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
@@ -34,6 +35,8 @@ class Straight:
     """Code for one wiring (`run.specialised`), shared by the engines of one work space.
 
     wanted: whether all integrations shall use it.  used: whether the present one does.
+    exact: whether it is to give the same bits for one state as for several at once.
+    crew: who takes the steps, for the closure rows that it is for; by default each engine takes its own.
     addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     rows: those for which the present integration uses it.  They are its own, since what other integrations of this
     engine have met must not change a bit of this one.
@@ -41,6 +44,8 @@ class Straight:
 
     wanted: bool = False
     used: bool = False
+    exact: bool = False
+    crew: Crew | None = None
     addresses: dict[bytes, int] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
@@ -114,8 +119,16 @@ class Engine:
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
         kept, known = self.kept.tobytes(), self.straight
-        found = known.addresses.get(kept) if known.used and kept in known.rows else None
+        found = None
+        if known.used and kept in known.rows:
+            found = known.crew.wait if known.crew and known.crew.kept == kept else known.addresses.get(kept)
         self.h[m.RATES] = found or self.h[m.EVALUATE]
+
+    def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
+        """Step to the end of the segment or of the budget, in this thread or by the crew."""
+        crew = self.straight.crew
+        by = crew.advance if crew is not None and self.h[m.RATES] == crew.wait else None
+        self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
 
     def view(self, place: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
@@ -208,7 +221,8 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 def another(engine: Engine) -> Engine:
     """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
-    made.straight.wanted, made.straight.addresses = engine.straight.wanted, engine.straight.addresses.copy()
+    made.straight.wanted, made.straight.exact = engine.straight.wanted, engine.straight.exact
+    made.straight.addresses = engine.straight.addresses.copy()
     return made
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Frames, Observed
 from flexclear.pipeline.dynamics.integrate.recording import record_share
 from flexclear.pipeline.dynamics.run.engine import Engine
 
@@ -41,10 +41,24 @@ def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np
     return observe_with(engine, rows, pieces, max(record_share(engine.rtol) * engine.rtol, ROUNDING))
 
 
+def frames(engine: Engine, rows: np.ndarray) -> Frames:
+    """The frames of links and sites in rows of the record, whose loops are as open as the run left them."""
+    size = engine.model.arrays.size
+    pieces = engine.pieces[engine.segments(rows[:, 0], after=False)]
+    return observation.frames_by_name(
+        _observe(engine, rows, pieces, observation.AS_RECORDED, observation.frames_room(len(rows), size)), size
+    )
+
+
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> np.ndarray:
     """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
+    return _observe(
+        engine, rows, pieces, share * engine.model.length, observation.room(len(rows), engine.model.arrays.size)
+    )
+
+
+def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> np.ndarray:
     arrays = engine.model.arrays
-    out = observation.room(len(rows), arrays.size)
     engine.entry.observe(
         engine.h,
         arrays.f,
@@ -52,7 +66,7 @@ def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: fl
         engine.n,
         np.ascontiguousarray(rows),
         np.ascontiguousarray(pieces).reshape(len(rows), arrays.size(m.N_LAWS)),
-        share * engine.model.length,
+        tolerance,
         out,
     )
     return out

@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.progress import Progress
@@ -33,6 +32,8 @@ from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
 
 
@@ -159,8 +160,8 @@ def follow(
         except StiffError as stiff:
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
-            wanted, engine, left = engine.straight.wanted, other(heir), stiff.handover
-            engine.straight.wanted = wanted
+            straight, engine, left = engine.straight, other(heir), stiff.handover
+            engine.straight.wanted, engine.straight.exact = straight.wanted, straight.exact
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.quantities import PARTED
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.observation import frames
 from flexclear.pipeline.dynamics.run.start import project
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
 
@@ -82,7 +82,7 @@ def _compared(engine: Engine, trajectory: Trajectory) -> np.ndarray:
 def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.ndarray:
     """Velocities of all links' frames at times that the trajectory has, shape (time, link, 3)."""
     rows = trajectory.rows[np.searchsorted(trajectory.time, time)]
-    return observe(engine, rows).links["velocity"]
+    return frames(engine, rows).links["velocity"]
 
 
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:

@@ -281,7 +281,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
     while True:
         if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
             n[m.BUDGET] = n[m.EVALUATIONS] + judge.every
-        engine.entry.advance(engine.h, engine.model.arrays.f, engine.w, n, tape.outputs, tape.rows, tape.events)
+        engine.advance(tape.outputs, tape.rows, tape.events)
         t = float(control[m.TIME])
         progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
         status = n[m.STATUS]

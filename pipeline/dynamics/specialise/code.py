@@ -1,4 +1,10 @@
-"""A tape as machine code: straight lines of arithmetic, with a jump where a branch depends on the state."""
+"""A tape as machine code: straight lines of arithmetic, with a jump where a branch depends on the state.
+
+For one state at a time, or for several in the lanes of the processor's vectors. Several states go both ways at a
+branch where some of them do, and each keeps what its own way gives. What they come to must not depend on how many there
+are, nor which: so every operation is then rounded as it stands, and of products and sums those are fused that the tape
+says, not those that the compiler likes.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +28,10 @@ INTRINSICS = {
     "pow": "llvm.pow",
     "copysign": "llvm.copysign",
 }
-LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2"}
+#: operations of a way that several states compute even where none of them goes it; for how many a call counts
+SHORT, CALL = 12, 40
+_NUMBER = ir.IntType(32)
+LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2", "pow": "pow"}
 
 
 @dataclass(frozen=True)
@@ -67,55 +76,128 @@ def _use(block: list[Any], found: Counter[Symbol]) -> None:
             found.update(a for a in item.arguments if isinstance(a, Symbol))
 
 
+def size(block: list[Any], found: Counter[Symbol]) -> int:
+    """How many operations a block has, each call for as many as it takes as long as."""
+    total = 0
+    for item in block:
+        if isinstance(item, Branch):
+            total += 1 + sum(size(inner, found) for inner in item.blocks)
+        elif found[item]:
+            total += CALL if item.operation in LIBRARY else 1
+    return total
+
+
+def fused(block: list[Any], found: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
+    """By sum: the product in it that nothing else uses, of the same block, and what is added to it."""
+    pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
+    for item in block:
+        if isinstance(item, Branch):
+            for inner in item.blocks:
+                pairs |= fused(inner, found)
+        elif item.operation == "mul" and found[item] == 1 and divisor(item, found) is None:
+            products.add(item)
+        elif found[item] and item.operation in ("add", "sub"):
+            a, b = item.arguments
+            if b in products:
+                pairs[item] = b, a
+            elif a in products:
+                pairs[item] = a, b
+    return pairs
+
+
+def divisor(product: Symbol, found: Counter[Symbol]) -> Symbol | None:
+    """The factor of a product that is the reciprocal of something by which nothing else is divided."""
+    for factor in product.arguments:
+        if isinstance(factor, Symbol) and factor.operation == "reciprocal" and found[factor] == 1:
+            return factor
+    return None
+
+
 class Emitter:
     """Writes a program into a function under construction.
 
-    where: the place of an array's element: where(array, place as a number or a value of the code) -> pointer.
+    where: the place of an array's element: where(array, place as a number or a value of the code, lane) -> pointer.
+    lanes: states at once; f is the same for all of them.  exact: every operation is rounded as it stands.
     """
 
-    def __init__(self, builder: ir.IRBuilder, program: Program, where: Any) -> None:
-        self.builder, self.program, self.where = builder, program, where
+    def __init__(self, builder: ir.IRBuilder, program: Program, where: Any, lanes: int = 1, *, exact: bool = False):
+        self.builder, self.program, self.where, self.lanes = builder, program, where, lanes
         self.uses = uses(program)
+        self.exact, self.flags = exact, () if exact else FLAGS
+        self.fused = fused(program.block, self.uses) if exact else {}
+        self.inside_sums = {product for product, _ in self.fused.values()}
+        self.types = {kind: one if lanes == 1 else ir.VectorType(one, lanes) for kind, one in TYPES.items()}
         self.values: dict[Symbol, Any] = {}
 
     def emit(self) -> None:
         """Write everything."""
         self._block(self.program.block)
         for array, place, value in self.program.stores:
-            kind = INTEGER if array in "hn" else FLOAT
-            self.builder.store(self._value(value, kind), self.where(array, self._place(place)))
+            found = self._value(value, INTEGER if array in "hn" else FLOAT)
+            for lane in range(self.lanes):
+                self.builder.store(self._of(found, lane), self.where(array, self._place(place, lane), lane))
 
     def _value(self, value: Any, kind: str) -> Any:
         if isinstance(value, Symbol):
             return self.values[value]
-        return ir.Constant(TYPES[kind], value)
+        return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
-    def _place(self, place: Any) -> Any:
-        return self.values[place] if isinstance(place, Symbol) else place
+    def _place(self, place: Any, lane: int) -> Any:
+        return self._of(self.values[place], lane) if isinstance(place, Symbol) else place
+
+    # Lanes -------------------------------------------------------------------------------------------------------
+
+    def _of(self, value: Any, lane: int) -> Any:
+        """What a value is in a lane."""
+        return value if self.lanes == 1 else self.builder.extract_element(value, _NUMBER(lane))
+
+    def _together(self, values: list[Any]) -> Any:
+        """One value of those of all lanes."""
+        if self.lanes == 1:
+            return values[0]
+        found = ir.Constant(ir.VectorType(values[0].type, self.lanes), ir.Undefined)
+        for lane, value in enumerate(values):
+            found = self.builder.insert_element(found, value, _NUMBER(lane))
+        return found
+
+    def _everywhere(self, value: Any) -> Any:
+        """The same in all lanes."""
+        if self.lanes == 1:
+            return value
+        nothing = ir.Constant(ir.VectorType(value.type, self.lanes), ir.Undefined)
+        first = ir.Constant(ir.VectorType(_NUMBER, self.lanes), [0] * self.lanes)
+        return self.builder.shuffle_vector(self.builder.insert_element(nothing, value, _NUMBER(0)), nothing, first)
+
+    # Blocks ------------------------------------------------------------------------------------------------------
 
     def _block(self, block: list[Any]) -> None:
         for item in block:
             if isinstance(item, Branch):
                 self._branch(item)
-            elif self.uses[item]:
+            elif self.uses[item] and item not in self.inside_sums:
                 self.values[item] = self._operation(item)
 
     def _branch(self, branch: Branch) -> None:
         joins = [join for join in branch.joins if self.uses[join[0]]]
         if not joins:
             return
-        builder, condition = self.builder, self.values[branch.condition]
-        if not any(
-            self.uses[item] for block in branch.blocks for item in block if isinstance(item, Symbol)
-        ) and not any(isinstance(item, Branch) for block in branch.blocks for item in block):
-            for joined, a, b in joins:
-                self.values[joined] = builder.select(
-                    condition, self._value(a, joined.kind), self._value(b, joined.kind)
-                )
-            return
+        if self.lanes > 1:
+            self._both_ways(branch, joins)
+        elif any(size(block, self.uses) for block in branch.blocks):
+            self._one_way(branch, joins)
+        else:
+            self._joined(branch, joins, *([self._value(join[way], join[0].kind) for join in joins] for way in (1, 2)))
+
+    def _joined(self, branch: Branch, joins: list[Any], first: list[Any], second: list[Any]) -> None:
+        condition = self.values[branch.condition]
+        for (joined, _, _), a, b in zip(joins, first, second, strict=True):
+            self.values[joined] = self.builder.select(condition, a, b)
+
+    def _one_way(self, branch: Branch, joins: list[Any]) -> None:
+        builder = self.builder
         starts = [builder.append_basic_block() for _ in range(2)]
         after = builder.append_basic_block()
-        builder.cbranch(condition, *starts)
+        builder.cbranch(self.values[branch.condition], *starts)
         ends = []
         for start, block in zip(starts, branch.blocks, strict=True):
             builder.position_at_end(start)
@@ -129,14 +211,49 @@ class Emitter:
                 phi.add_incoming(self._value(value, joined.kind), end)
             self.values[joined] = phi
 
+    def _both_ways(self, branch: Branch, joins: list[Any]) -> None:
+        """Each lane has what its own way gives; a way that no lane goes is skipped if it is long."""
+        ways = []
+        for way, block in enumerate(branch.blocks, start=1):
+            if size(block, self.uses) <= SHORT:
+                self._block(block)
+                ways.append([self._value(join[way], join[0].kind) for join in joins])
+            else:
+                ways.append(self._if_any(branch, way, joins))
+        self._joined(branch, joins, *ways)
+
+    def _if_any(self, branch: Branch, way: int, joins: list[Any]) -> list[Any]:
+        """What a way leaves in lanes that go it, where there are any."""
+        builder, word = self.builder, ir.IntType(self.lanes)
+        start, after, before = builder.append_basic_block(), builder.append_basic_block(), builder.block
+        none = word(0 if way == 1 else -1)
+        builder.cbranch(
+            builder.icmp_unsigned("!=", builder.bitcast(self.values[branch.condition], word), none), start, after
+        )
+        builder.position_at_end(start)
+        self._block(branch.blocks[way - 1])
+        left, end = [self._value(join[way], join[0].kind) for join in joins], builder.block
+        builder.branch(after)
+        builder.position_at_end(after)
+        found = []
+        for value in left:
+            phi = builder.phi(value.type)
+            phi.add_incoming(value, end)
+            phi.add_incoming(ir.Constant(value.type, None), before)
+            found.append(phi)
+        return found
+
+    # Operations --------------------------------------------------------------------------------------------------
+
     def _operation(self, s: Symbol) -> Any:
         builder, name = self.builder, s.operation
         if name == "load":
-            array, place = s.arguments
-            return builder.load(self.where(array, self._place(place)))
+            return self._load(*s.arguments)
         if name == "select":
             condition, a, b = s.arguments
             return builder.select(self.values[condition], self._value(a, s.kind), self._value(b, s.kind))
+        if s in self.fused:
+            return self._sum_with_product(s, *self.fused[s])
         kind = next(a.kind for a in s.arguments if isinstance(a, Symbol))
         values = [self._value(a, kind) for a in s.arguments]
         if name in COMPARISONS:
@@ -145,29 +262,60 @@ class Emitter:
                 return compare(name, *values)
             return builder.icmp_signed(name, *values)
         if name in ARITHMETIC:
-            return getattr(builder, ARITHMETIC[name])(*values, **({"flags": FLAGS} if kind == FLOAT else {}))
+            return getattr(builder, ARITHMETIC[name])(*values, **({"flags": self.flags} if kind == FLOAT else {}))
         if name == "neg":
-            return builder.fneg(*values, flags=FLAGS)
+            return builder.fneg(*values, flags=self.flags)
         if name == "reciprocal":
-            return builder.fdiv(ir.Constant(TYPES[FLOAT], 1.0), *values, flags=FLAGS)
+            return builder.fdiv(self._value(1.0, FLOAT), *values, flags=self.flags)
         if name == "mul":
             return self._product(s, values)
-        return self._call(name, values)
+        if name in INTRINSICS and name != "pow":
+            return self._instruction(INTRINSICS[name], values)
+        return self._together([self._call(name, [self._of(v, lane) for v in values]) for lane in range(self.lanes)])
+
+    def _load(self, array: str, place: Any) -> Any:
+        builder = self.builder
+        if array == "f" and not isinstance(place, Symbol):
+            return self._everywhere(builder.load(self.where(array, place, 0)))
+        places = [self.where(array, self._place(place, lane), lane) for lane in range(self.lanes)]
+        return self._together([builder.load(found) for found in places])
 
     def _product(self, s: Symbol, values: list[Any]) -> Any:
         """A quotient where nothing else is divided by the same."""
-        for inverse, other in (s.arguments, s.arguments[::-1]):
-            if isinstance(inverse, Symbol) and inverse.operation == "reciprocal" and self.uses[inverse] == 1:
-                below = self._value(inverse.arguments[0], FLOAT)
-                return self.builder.fdiv(self._value(other, FLOAT), below, flags=FLAGS)
-        return self.builder.fmul(*values, flags=FLAGS)
+        inverse = divisor(s, self.uses)
+        if inverse is None:
+            return self.builder.fmul(*values, flags=self.flags)
+        other = s.arguments[1] if s.arguments[0] is inverse else s.arguments[0]
+        below = self._value(inverse.arguments[0], FLOAT)
+        return self.builder.fdiv(self._value(other, FLOAT), below, flags=self.flags)
+
+    def _sum_with_product(self, s: Symbol, product: Symbol, other: Any) -> Any:
+        """A sum or difference of a product and something else, rounded once where the processor can."""
+        a, b = (self._value(factor, FLOAT) for factor in product.arguments)
+        rest = self._value(other, FLOAT)
+        if s.operation == "sub" and s.arguments[1] is product:
+            a = self.builder.fneg(a)
+        elif s.operation == "sub":
+            rest = self.builder.fneg(rest)
+        return self._instruction("llvm.fmuladd", [a, b, rest])
+
+    def _instruction(self, name: str, values: list[Any]) -> Any:
+        """An operation of the processor, on all lanes."""
+        kind, module = self.types[FLOAT], self.builder.module
+        full = f"{name}.f64" if self.lanes == 1 else f"{name}.v{self.lanes}f64"
+        function = module.globals.get(full) or ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), full)
+        return self.builder.call(function, values)
 
     def _call(self, name: str, values: list[Any]) -> Any:
+        """A function of the mathematics library, in one lane.
+
+        Exact code has no other in its place, such as one for vectors: the compiler is not to know what it is.
+        """
         module, kind = self.builder.module, TYPES[FLOAT]
-        if name in INTRINSICS:
-            function = module.declare_intrinsic(INTRINSICS[name], [kind], ir.FunctionType(kind, [kind] * len(values)))
-        else:
-            function = module.globals.get(LIBRARY[name])
-            if function is None:
-                function = ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), LIBRARY[name])
+        full = LIBRARY[name] if self.exact or name not in INTRINSICS else f"{INTRINSICS[name]}.f64"
+        function = module.globals.get(full)
+        if function is None:
+            function = ir.Function(module, ir.FunctionType(kind, [kind] * len(values)), full)
+            if self.exact:
+                function.attributes.add("nobuiltin")
         return self.builder.call(function, values)

@@ -7,13 +7,15 @@ far loops are open and how independent their rows are. n[ABRIDGED] says so to wh
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import CellType, FunctionType
 from typing import Any
 
 from llvmlite import ir
-from numba import types
+from numba import njit, types
 from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError
@@ -53,15 +55,17 @@ def _kept(h: list[int]) -> Callable[[int, int], bool]:
     return kept
 
 
-def straight(rates: Callable, wiring: wired.Wiring) -> Any:
-    """The function straight(h, f, w, n, y, dy) of compiled code that does what `rates` does for a wiring."""
+def straight(rates: Callable, wiring: wired.Wiring, *, exact: bool = False) -> Any:
+    """The function straight(h, f, w, n, y, dy) of compiled code that does what `rates` does for a wiring.
+
+    exact: it gives what each lane of `abreast` gives, to the last bit; sums in any order are faster by a sixth.
+    """
 
     @intrinsic
     def run(typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
             found = program(rates, wiring)
-            builder.store(values[4], builder.gep(values[3], [_INTEGER(m.STATE)]))
-            Emitter(builder, found, _places(builder, found, *values)).emit()
+            Emitter(builder, found, _places(builder, found, [values]), exact=exact).emit()
             return context.get_dummy_value()
 
         return types.void(h, f, w, n, y, dy), generate
@@ -69,20 +73,61 @@ def straight(rates: Callable, wiring: wired.Wiring) -> Any:
     return run
 
 
-def _places(builder: ir.IRBuilder, found: Program, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any) -> Callable:
-    """Where the code finds an element of an array: in a stretch whose begin it has looked up first."""
-    arrays, begins = {"f": f, "w": w, "n": n}, dict[Any, Any]()
-    places = [(array, place) for array, place, _ in found.stores] + loads(found)
-    for array, stretch in sorted({(array, wired.split(place)[0]) for array, place in places if isinstance(place, int)}):
-        begin = {wired.STATE: y, wired.RATES: dy, -1: _INTEGER(0)}.get(stretch)
-        if begin is None:
-            begin = builder.load(builder.gep(h, [_INTEGER(stretch)]))
-        begins[array, stretch] = builder.gep(arrays[array], [begin])
+def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> Any:
+    """The function abreast(places) of compiled code: the same for several states of mechanisms that share f.
 
-    def where(array: str, place: Any) -> Any:
+    places: addresses of all h, then of all f, w and n, then all places y and dy, shape (6 lanes,).
+    """
+
+    @intrinsic
+    def run(typingctx: Any, places: Any) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+            found = program(rates, wiring)
+            given = [_arguments(builder, values[0], lane, lanes) for lane in range(lanes)]
+            Emitter(builder, found, _places(builder, found, given), lanes, exact=True).emit()
+            return context.get_dummy_value()
+
+        return types.void(places), generate
+
+    return run
+
+
+def exactly(kernel: Any) -> Any:
+    """A kernel, and those in its closure, with every operation rounded as it stands: equal bits wherever it is used."""
+    function = kernel.py_func
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    exact = tuple(CellType(exactly(cell) if isinstance(cell, Kernel) else cell) for cell in cells)
+    scope, name = function.__globals__, function.__name__
+    return njit(error_model="numpy", _nrt=False)(FunctionType(function.__code__, scope, name, None, exact))
+
+
+def _arguments(builder: ir.IRBuilder, places: Any, lane: int, lanes: int) -> list[Any]:
+    """h, f, w, n, y and dy of a lane."""
+    words = [builder.load(builder.gep(places, [_INTEGER(k * lanes + lane)])) for k in range(6)]
+    kinds = [_INTEGER, ir.DoubleType(), ir.DoubleType(), _INTEGER]
+    return [builder.inttoptr(word, kind.as_pointer()) for word, kind in zip(words, kinds, strict=False)] + words[4:]
+
+
+def _places(builder: ir.IRBuilder, found: Program, given: list[Any]) -> Callable:
+    """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
+
+    given: h, f, w, n, y and dy of each lane.
+    """
+    begins = dict[Any, Any]()
+    places = [(array, place) for array, place, _ in found.stores] + loads(found)
+    stretches = sorted({(array, wired.split(place)[0]) for array, place in places if isinstance(place, int)})
+    for lane, (h, f, w, n, y, dy) in enumerate(given):
+        builder.store(y, builder.gep(n, [_INTEGER(m.STATE)]))
+        for array, stretch in stretches:
+            begin = {wired.STATE: y, wired.RATES: dy, -1: _INTEGER(0)}.get(stretch)
+            if begin is None:
+                begin = builder.load(builder.gep(h, [_INTEGER(stretch)]))
+            begins[array, stretch, lane] = builder.gep({"f": f, "w": w, "n": n}[array], [begin])
+
+    def where(array: str, place: Any, lane: int) -> Any:
         if not isinstance(place, int):
-            return builder.gep(arrays[array], [place])
+            return builder.gep(given[lane]["hfwn".index(array)], [place])
         stretch, inside = wired.split(place)
-        return builder.gep(begins[array, stretch], [_INTEGER(inside)])
+        return builder.gep(begins[array, stretch, lane], [_INTEGER(inside)])
 
     return where

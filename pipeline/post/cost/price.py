@@ -118,7 +118,10 @@ def _notes(study: xr.Dataset) -> list[str]:
             "the figure shows that bound."
         )
     if study.attrs["horizon"] != "none":
-        notes.append(f"Pointwise errors count up to the horizon of the reference, t = {study.attrs['horizon']:.4g} s.")
+        notes.append(
+            f"Pointwise errors count up to the horizon of the reference and its confirmation, "
+            f"t = {study.attrs['horizon']:.4g} s."
+        )
     if study.attrs["refused"]:
         notes.append(f"Refused: {study.attrs['refused']}.")
     return notes

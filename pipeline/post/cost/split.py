@@ -10,7 +10,7 @@ import xarray as xr
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
-from flexclear.pipeline.post.cost.study import Point, horizon_of, relative
+from flexclear.pipeline.post.cost.study import Point, believed, relative
 
 #: half the width of a normal distribution's 95 % interval, in standard deviations
 NORMAL_95 = 1.96
@@ -31,7 +31,7 @@ def causes_of(
     there = [p for p in points if "refused" not in runs[p.key].attrs]
     asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it stands"), None)
     reference = next(runs[p.key] for p in there if p.group == "reference")
-    until = horizon_of(reference)
+    until = believed(there, runs)
     size = quantities.scale(reference, quantity)
 
     def between(a: xr.Dataset | None, b: xr.Dataset | None) -> float:

@@ -1,6 +1,6 @@
 """From the runs of a study to one dataset: error and cost over the factors, and how good the reference is.
 
-Errors are pointwise up to the horizon of the reference; beyond it only statistics mean anything
+Errors are pointwise up to the horizon of the reference and its confirmation; beyond it only statistics mean anything
 (`pipeline.post.cost.statistics`). They are relative to the size of each quantity (`quantities.scale`).
 """
 
@@ -68,7 +68,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
             f"nothing to compare with: the reference ({_described(points, 'reference')}) is refused: "
             f"{reference.attrs['refused']}"
         )
-    until = horizon_of(reference)
+    until = believed(points, runs)
     scales = {q: quantities.scale(reference, q) for q in chosen}
     data: dict[str, Any] = {"scale": (("quantity",), np.array([scales[q] for q in chosen]))}
     coordinates: dict[str, Any] = {
@@ -77,7 +77,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     }
 
     def errors(run: xr.Dataset) -> np.ndarray:
-        return np.array(list(relative_errors(run, reference, chosen).values()))
+        return np.array(list(relative_errors(run, reference, chosen, until).values()))
 
     confirmations = [runs[p.key] for p in points if p.group == "confirmation"]
     confirmed = [errors(run) for run in confirmations if "refused" not in run.attrs]
@@ -92,9 +92,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         "confirmation": _described(points, "confirmation"),
         "horizon": until if np.isfinite(until) else "none",
         "end": float(reference["time"].values[-1]),
-        "refused": "; ".join(
-            f"{p.key}: {runs[p.key].attrs['refused']}" for p in points if "refused" in runs[p.key].attrs
-        ),
+        "refused": "; ".join(f"{p.key}: {_reason(runs[p.key])}" for p in points if "refused" in runs[p.key].attrs),
         "Conventions": "CF-1.11",
     }
     result = xr.Dataset(data, coords=coordinates, attrs=attributes)
@@ -108,6 +106,11 @@ def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
     found: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
     return found
+
+
+def _reason(refused: xr.Dataset) -> str:
+    """Why a run was refused; what else is to be doubted of it, and what helps, is for those who want that run."""
+    return str(refused.attrs["refused"]).partition(";")[0]
 
 
 def _span(
@@ -155,17 +158,22 @@ def recording(study: xr.Dataset) -> float:
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 
-def relative_errors(run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity]) -> dict[str, float]:
-    """Largest error up to the horizon as a share of the quantity's size, by name."""
-    until = horizon_of(reference)
+def relative_errors(
+    run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float
+) -> dict[str, float]:
+    """Largest error up to a time [s] as a share of the quantity's size, by name."""
     return {
         q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
     }
 
 
-def horizon_of(run: xr.Dataset) -> float:
-    """Time up to which pointwise errors mean something [s]; infinite for runs that say nothing of it."""
-    return float(run["horizon"]) if "horizon" in run else np.inf
+def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
+    """Time up to which pointwise errors mean something [s]: the lesser horizon of the reference and its confirmation.
+
+    Infinite for runs that say nothing of it.
+    """
+    both = [runs[p.key] for p in points if p.group in ("reference", "confirmation")]
+    return min((float(run["horizon"]) for run in both if "horizon" in run), default=np.inf)
 
 
 def relative(error: float, scale: float) -> float:

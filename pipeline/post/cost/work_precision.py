@@ -127,7 +127,11 @@ def _panel(
             ax.annotate(m.name, (m.seconds, m.error[name]), xytext=(4, 4), textcoords="offset points", fontsize=6.8)
     ax.set(xscale="log", yscale="log", title=name)
     plain(ax.xaxis)
-    if bound > 0.0:
+    if np.isinf(bound):
+        told = "cannot be told: reference and\nconfirmation have other impacts"
+        ax.set(yscale="linear", yticks=[])  # there is nothing to scale
+        ax.text(0.5, 0.5, told, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
+    elif bound > 0.0:
         ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
         ax.set_ylim(bottom=0.3 * bound)
     ax.set_xlabel("CPU time of the integration (s)")
@@ -162,6 +166,6 @@ def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: 
 
 def _subtitle(study: xr.Dataset) -> str:
     horizon = study.attrs["horizon"]
-    span = "over the whole run" if horizon == "none" else f"up to the horizon of the reference, t = {horizon:.4g} s"
+    span = "over the whole run" if horizon == "none" else f"up to the horizon, t = {horizon:.4g} s"
     told = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
     return f"errors {span}, relative to each quantity's size; {told}"

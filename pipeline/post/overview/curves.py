@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.algebra import first_largest, rotation_between
 from flexclear.pipeline.core.scene.wanted import Quantity
 
 #: factor and unit of smaller and larger values, largest first
@@ -45,7 +45,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     found = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
     there = [values for values in found if values is not None]
     if quantity.kind in BY_COMPONENT and there:
-        k = int(np.argmax(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
+        k = int(first_largest(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
         title = f"{quantity.owner}: {quantity.kind.replace('_', ' ')} along {'xyz'[k]}"
         title = title.replace("angular velocity along", "angular velocity about")
     else:

@@ -77,7 +77,7 @@ def ratios(deviation: Deviation, printed: MaximumError) -> dict[str, float]:
 #: what the +- of `single` means, for the notes of a table
 MEANING = (
     "± of a single run: how much the value changes at a hundred times tighter tolerance, the error of its time "
-    "integration; the model's own errors (assumed geometry, mode set) are not in it."
+    "integration; the model's own errors (assumed geometry, mode set) and what lies between two outputs are not in it."
 )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.algebra import first_largest
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.modes.select import clusters
 
@@ -35,20 +36,18 @@ def family(model: Model, vectors: np.ndarray) -> list[str]:
     families = model.families
     share = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
     totals = np.stack([share[families.member == k].sum(axis=0) for k in range(len(families.names))])
-    # a solid's torsion has equal shares along y and z; rounding must not choose
-    largest = totals >= (1.0 - 1e-6) * totals.max(axis=0)
-    return [families.names[k] for k in np.argmax(largest, axis=0)]
+    # a solid's torsion has equal shares along y and z
+    return [families.names[k] for k in first_largest(totals, axis=0)]
 
 
 def signed(model: Model, vectors: np.ndarray, families: list[str]) -> np.ndarray:
     """Each vector with its largest displacement positive (rotation, where it twists).
 
-    Of components that are equally large up to rounding, as the two ends of an antisymmetric shape, the first counts.
+    Of components that are equally large, as those at the two ends of an antisymmetric shape, the first counts.
     """
     result = vectors.copy()
     main = dict(zip(model.families.names, model.families.main, strict=True))
     for j, name in enumerate(families):
         component = model.families.local[main[name]] @ vectors[:, j]
-        large = np.flatnonzero(np.abs(component) >= (1.0 - 1e-6) * np.abs(component).max())
-        result[:, j] *= np.sign(component[large[0]])
+        result[:, j] *= np.sign(component[first_largest(np.abs(component))])
     return result

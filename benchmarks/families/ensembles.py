@@ -1,0 +1,149 @@
+"""What the members of an ensemble cost beside one run: alone and several at once, on one and two workers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, nullcontext
+from functools import partial
+from typing import Any
+
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.mechanisms import Mechanism, mechanism
+from benchmarks.page import Columns, short, table
+from benchmarks.timing import Times, slope
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.schema import Ensemble
+from flexclear.pipeline.core.workflow import cores
+from flexclear.pipeline.dynamics.run import specialised
+
+#: scenes, with as many members as the paper's ensembles have
+SCENES, MEMBERS = ("csj", "far_csj_cb"), 16
+#: numbers of members of a short run of the fullest scene, which a single thread makes
+GROWING, UNTIL = (1, 2, 4, 8, 16, 32), 0.02
+ROUNDS = 3
+
+
+def cases() -> list[Case]:
+    """Scenes, then numbers of members."""
+    return [Case(name) for name in SCENES] + [Case(f"{n} members", n) for n in GROWING]
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each; numbers of members take turns."""
+    for case in cases:
+        if case.of is None:
+            yield case, [_beside_a_run(mechanism(case.name))]
+    growing = [case for case in cases if case.of is not None]
+    if growing:
+        yield from _growing(growing)
+
+
+def _beside_a_run(here: Mechanism) -> Record:
+    """Times of a run without its twin, and of all members."""
+    full = _with_members(here, MEMBERS)
+    tasks = {
+        "run": partial(_timed, partial(dynamics.simulate, here.scene, here.bundles, silent)),
+        "alone": partial(_timed, full, workers=1, together=False),
+        "together": partial(_timed, full, workers=1),
+        "alone, 2 workers": partial(_timed, full, workers=2, together=False),
+        "together, 2 workers": partial(_timed, full, workers=2),
+    }
+    found = _in_turn(tasks)
+    return {"members": MEMBERS} | {name: {"wall": w.told("s"), "cpu": c.told("s")} for name, (w, c) in found.items()}
+
+
+def _growing(cases: Sequence[Case]) -> Measured:
+    here = mechanism(SCENES[-1])
+    short_one = here.with_scene("short", edited(here.scene, {"time.end": UNTIL}))
+    tasks = {case.name: partial(_timed, _with_members(short_one, case.of), workers=1) for case in cases}
+    for case, (_, cpu) in zip(cases, _in_turn(tasks).values(), strict=True):
+        yield case, [{"members": case.of, **cpu.told("s")}]
+
+
+def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
+    asked = (here.scene.ensemble or Ensemble()).model_copy(update={"members": members})
+    scene = here.scene.model_copy(update={"ensemble": asked})
+    return lambda: dynamics.ensemble(scene, here.bundles, silent)
+
+
+def _timed(work: Callable[[], Any], workers: int = 0, *, together: bool = True) -> tuple[float, float]:
+    """Wall and processor time [s]."""
+    with _workers(workers) if workers else nullcontext(), nullcontext() if together else _alone():
+        begun, spent = time.perf_counter(), time.process_time()
+        work()
+        return time.perf_counter() - begun, time.process_time() - spent
+
+
+@contextmanager
+def _workers(number: int) -> Iterator[None]:
+    proper, cores.cores = cores.cores, lambda: number
+    try:
+        yield
+    finally:
+        cores.cores = proper
+
+
+@contextmanager
+def _alone() -> Iterator[None]:
+    proper, specialised.FEW = specialised.FEW, MEMBERS + 1
+    try:
+        yield
+    finally:
+        specialised.FEW = proper
+
+
+def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:
+    """Each task once per round, one after the other; a first round, which compiles, does not count."""
+    found: dict[str, list[tuple[float, float]]] = {name: [] for name in tasks}
+    for number in range(ROUNDS + 1):
+        for name, task in tasks.items():
+            times = task()
+            if number:
+                found[name].append(times)
+    walls = {name: Times(tuple(wall for wall, _ in times)) for name, times in found.items()}
+    return {name: (walls[name], Times(tuple(cpu for _, cpu in times))) for name, times in found.items()}
+
+
+def show(records: list[Record]) -> str:
+    """Both tables, with the exponent of the growth."""
+
+    def wall(name: str) -> Callable[[Record], str]:
+        return lambda r: short(r[name]["wall"]["s"])
+
+    def cpu(name: str) -> Callable[[Record], str]:
+        return lambda r: short(r[name]["cpu"]["s"])
+
+    scenes: Columns = {
+        "scene": lambda r: r["case"],
+        "one run, wall [s]": wall("run"),
+        f"{MEMBERS} members one by one, wall on 2 workers [s]": wall("alone, 2 workers"),
+        "several at once, wall on 2 workers [s]": wall("together, 2 workers"),
+        "as many runs": lambda r: short(r["together, 2 workers"]["wall"]["s"] / r["run"]["wall"]["s"]),
+        "one by one, processor [s]": cpu("alone"),
+        "at once, processor [s]": cpu("together"),
+        "factor": lambda r: f"{r['alone']['cpu']['s'] / r['together']['cpu']['s']:.2f}",
+    }
+    growing: Columns = {
+        "members": lambda r: str(r["members"]),
+        "processor [s]": lambda r: short(r["s"]),
+        "per member [s]": lambda r: short(r["s"] / r["members"]),
+    }
+    grown = [r for r in records if "s" in r]
+    parts = [table([r for r in records if "run" in r], scenes), table(grown, growing)]
+    if len(grown) > 1:
+        exponent = slope([r["members"] for r in grown], [r["s"] for r in grown])
+        parts.append(f"Time grows as the number of members to the power {exponent:.2f}.")
+    return "\n\n".join(parts)
+
+
+FAMILY = Family(
+    what="members of ensembles beside one run, several at once, and growth with their number",
+    takes="2 min",
+    page="benchmarks.md",
+    cases=cases,
+    measure=measure,
+    show=show,
+)
