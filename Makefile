@@ -5,6 +5,7 @@
 
 VENV := .venv
 READY := $(VENV)/.ready
+TOOLS := $(VENV)/.tools
 RUN := $(VENV)/bin/python
 # the first Python on the path that is new enough; `make PYTHON=/path/to/python3.12` names another
 CANDIDATES := python3 python3.13 python3.12 python3.11 python3.14 python
@@ -17,18 +18,18 @@ all: $(READY) ## Reproduce every figure and table of the paper: results/report/i
 help: ## This list
 	@sed -nE 's/^([a-z-]+):.*## (.*)/  make \1\t\2/p' $(firstword $(MAKEFILE_LIST)) | expand -t 20
 
-setup: $(READY) ## Create .venv with the pinned versions (done by itself when needed)
+setup: $(TOOLS) ## Create .venv with the pinned versions (done by itself when needed)
 
-check: $(READY) ## Format, lint, types and import rules
+check: $(TOOLS) ## Format, lint, types and import rules
 	$(VENV)/bin/ruff format --check .
 	$(VENV)/bin/ruff check .
 	$(VENV)/bin/mypy
 	$(VENV)/bin/lint-imports
 
-test: $(READY) ## Tests, except those marked slow
+test: $(TOOLS) ## Tests, except those marked slow
 	$(RUN) -m pytest -q -n auto --dist loadfile
 
-test-slow: $(READY) ## The tests marked slow
+test-slow: $(TOOLS) ## The tests marked slow
 	$(RUN) -m pytest -q -n auto --dist loadfile -m slow
 
 # other Pythons that this machine may have; each gets an environment of its own and runs what `doctor` computes
@@ -48,7 +49,7 @@ interpreters: $(READY) ## A short run under every other Python there is
 	done; test "$$ran" != " " || echo "skipped: there is no other Python here"
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
-	$(RUN) -m benchmarks evaluation peers runs growth exudyn
+	$(RUN) -m benchmarks evaluation peers runs cold growth exudyn
 
 chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (an hour; keeps every scene that is finished)
 	@$(RUN) -m flexclear sections sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb) --page docs/chaos.md
@@ -66,12 +67,19 @@ clean: ## Remove results and caches; .venv stays
 	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
 	find pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
-# Made once, and again when the versions that are asked for change.
+# Made once, and again when the versions that are asked for change. Bytecode is made of what is imported, when it is.
+INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt
+
 $(READY): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "flexclear needs Python >= 3.11: none of '$(CANDIDATES)' is; install one or say make PYTHON=/path/to/python3"; exit 1; }
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "flexclear needs Python >= 3.11, $(PYTHON) is older"; exit 1; }
 	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { echo "$(PYTHON) cannot make virtual environments: install its venv package (Debian, Ubuntu: apt-get install python3-venv)"; exit 1; }
 	@echo "setting up $(VENV) with $(PYTHON); takes some minutes the first time"
 	@test -x $(RUN) || "$(PYTHON)" -m venv $(VENV)
-	@$(RUN) -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,render]'
+	@$(INSTALL) -e '.[render]'
+	@touch $@
+
+# what checks and tests take besides
+$(TOOLS): $(READY)
+	@$(INSTALL) -e '.[dev,render]'
 	@touch $@

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.errors import InputError
@@ -148,7 +148,9 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     there = {name for names in owners.values() for name in names}
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
-    solver = {"integrator": told["integrator"], "rtol": told["rtol"]}
+    solver: dict[str, Any] = {key: told[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in told}
+    if "evaluations" in scene.solver.model_fields_set:
+        solver["evaluations"] = scene.solver.evaluations  # a limit that the scene sets itself
     result = edited(
         fewer,
         {

@@ -27,12 +27,13 @@ FILES = ("file", "stiffness", "mass", "unknowns")
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The recipe's content; its name and folder do not matter. Raises InputError when it cannot be read.
 
-    edits: values that take the place of the recipe's; of `elements` a factor.
+    edits: values that take the place of the recipe's; of `elements` a factor, which recipes without them go without.
     """
     table = read_toml(recipe)
     changes = dict(edits or {})
-    if "elements" in changes:
-        changes["elements"] = changes["elements"] * table["elements"]
+    factor = changes.pop("elements", None)
+    if factor is not None and isinstance(table.get("elements"), int):
+        changes["elements"] = factor * table["elements"]
     for path in _files(table, recipe.parent):
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import s3_rigid, s4_simulate
 from flexclear.stages.graph import Graph
@@ -18,10 +20,15 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: inputs that are bundles of fewer modes
+#: inputs that are bundles of fewer modes: this, the level, the body
 FEWER = "fewer/"
-#: reference conditions with static modes between interfaces, six for each but one
-WITH_STATIC = "craig-bampton"
+#: inputs that are bundles from twice as many elements
+FINER, TWICE = "finer/", 2
+#: reference condition with static modes between interfaces, six for each but one, and those without any
+WITH_STATIC, DIRECTIONS = "craig-bampton", 6
+NORMAL = ("free-free", "fixed-fixed", "cantilever")
+#: modes of rods come in pairs; so many at least have a half that is worth a look
+PAIR, LEAST_HALVED = 2, 4
 
 
 def task(scene: Scene) -> Task:
@@ -32,16 +39,19 @@ def task(scene: Scene) -> Task:
     )
     whole = Graph(edited(scene, {"accuracy": None}), shown=False)
     inputs = whole.bodies() | Graph(rigid, shown=False).bodies()
-    counts = static_counts(scene)
-    if counts:
+    for k, counts in enumerate(levels(scene)):
         less = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
-        inputs |= {f"{FEWER}{body}": less.bundle[body] for body in counts}
+        inputs |= {f"{FEWER}{k}/{body}": less.bundle[body] for body in counts}
+    counts = elements(scene)
+    if counts:
+        finer = Graph(edited(scene, {"accuracy": None}), shown=False, recipe={"elements": TWICE})
+        inputs |= {f"{FINER}{body}": finer.bundle[body] for body in counts}
     simulate = s4_simulate.params(scene)
     return Task(
         stage="plan",
         scene=scene.name,
         run="flexclear.stages.s8_plan:run",
-        params={"simulate": simulate, "title": scene.title},
+        params={"simulate": simulate, "title": scene.title, "elements": counts},
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
         modules=s4_simulate.modules(scene),
@@ -50,18 +60,39 @@ def task(scene: Scene) -> Task:
     )
 
 
-def static_counts(scene: Scene) -> dict[str, int]:
-    """Bodies that have more than static modes: how many they would keep with these alone."""
-    found = {}
+def elements(scene: Scene) -> dict[str, int]:
+    """Numbers of finite elements of flexible bodies whose recipe says one, and which may have twice as many."""
+    found = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
+    most = scene.limits.cells // TWICE
+    return {body: n for body, n in found.items() if isinstance(n, int) and n <= most}
+
+
+def levels(scene: Scene) -> tuple[dict[str, int], ...]:
+    """Numbers of modes that bodies with more may do with, by body, the fewest first.
+
+    Of a basis with static modes these alone, and half of the others, in pairs, as rods bend in two planes; of normal
+    modes alone half of them.
+    """
+    fewest, half = dict[str, int](), dict[str, int]()
     for name, body in scene.flexible().items():
-        modes = body.modes
-        if modes.reference != WITH_STATIC or modes.interfaces is None or not isinstance(modes.count, int):
-            continue
-        static = 6 * (len(modes.interfaces) - 1)
-        # a ratio of damping for each mode fits one number of modes only
-        if 0 < static < modes.count and (body.damping is None or isinstance(body.damping, float)):
-            found[name] = static
-    return found
+        count, static = body.modes.count, _static(body)
+        if isinstance(body.damping, RatioPerMode):
+            continue  # a ratio for each mode fits one number of modes only
+        if static and not (isinstance(count, int) and count <= static):
+            fewest[name] = static
+        if isinstance(count, int) and static is not None and count - static >= LEAST_HALVED:
+            half[name] = static + PAIR * round((count - static) / (2 * PAIR))
+    return tuple(level for level in ((fewest, fewest | half) if half else (fewest,)) if level)
+
+
+def _static(body: FlexibleBody) -> int | None:
+    """How many static modes its basis has; None where that is not known beforehand."""
+    if body.modes.reference in NORMAL:
+        return 0
+    if body.modes.reference != WITH_STATIC:
+        return None
+    ends = body.modes.interfaces or read_toml(Path(body.mesh)).get("interfaces", ())
+    return DIRECTIONS * (len(ends) - 1) if len(ends) > 1 else None
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -82,7 +113,7 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
     from flexclear.pipeline.dynamics.plan.search import plan
 
     rigid = {name: data for name, data in inputs.items() if name.startswith(s3_rigid.PREFIX)}
-    fewer = {name.removeprefix(FEWER): data for name, data in inputs.items() if name.startswith(FEWER)}
+    fewer = less(inputs)
 
     def filled(scene: Scene) -> Scene:
         """With the rigid bodies that recipes describe."""
@@ -91,7 +122,19 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
     own = {name: data for name, data in rigid.items() if _meshed(params["simulate"], name)}
     scene = s4_simulate.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
-    return plan(scene, s4_simulate.bundles(inputs), fewer, filled, progress)
+    meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
+    return plan(scene, s4_simulate.bundles(inputs), fewer, meshes, filled, progress)
+
+
+def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
+    """Bundles of fewer modes, by level, the fewest first, and body; those that have no fewer are left out."""
+    found: dict[int, dict[str, xr.Dataset]] = {}
+    for name, data in inputs.items():
+        if name.startswith(FEWER):
+            level, _, body = name.removeprefix(FEWER).partition("/")
+            if data.sizes["mode"] < inputs[f"bundle/{body}"].sizes["mode"]:
+                found.setdefault(int(level), {})[body] = data
+    return [found[level] for level in sorted(found)]
 
 
 def _meshed(simulate: Mapping[str, Any], name: str) -> bool:

@@ -114,7 +114,11 @@ def _silent(share: float | None, text: str) -> None:
 
 def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
     """Inputs with the bundles of fewer modes where the plan takes them."""
-    return inputs | {f"bundle/{body}": inputs[f"fewer/{body}"] for body in modes}
+    from flexclear.stages import s8_plan
+
+    by_count = [level for level in s8_plan.less(inputs) if modes and all(body in level for body in modes)]
+    chosen = next((n for n in by_count if all(n[body].sizes["mode"] == count for body, count in modes.items())), {})
+    return inputs | {f"bundle/{body}": chosen[body] for body in modes}
 
 
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any]) -> tuple[Any, float]:
@@ -160,7 +164,7 @@ def show(records: list[Record]) -> dict[str, str]:
         "all dropped": lambda r: str(r["bare"]),
         "clearance kept": lambda r: str(r["loose"]),
         "flexibility kept": lambda r: str(r["soft"]),
-        "of these static": lambda r: str(r["static"]),
+        "of these fewer modes": lambda r: str(r["fewer"]),
         "median planning [s]": lambda r: short(r["planning"]),
     }
     rows = [_together(name, [r for r in done if r["mechanism"] == name]) for name in _names(done)]
@@ -211,7 +215,7 @@ def _together(name: str, mine: list[Record]) -> Record:
         "bare": sum(".clearance" not in k and ".modes" not in k for k in kept),
         "loose": sum(".clearance" in k for k in kept),
         "soft": sum(".modes" in k for k in kept),
-        "static": sum(bool(r["modes"]) for r in mine),
+        "fewer": sum(bool(r["modes"]) for r in mine),
         "planning": float(np.median([r["plan_s"] for r in mine])),
     }
 

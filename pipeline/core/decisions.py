@@ -31,12 +31,29 @@ class Decision:
 
 
 @dataclass(frozen=True)
+class Mesh:
+    """The finite elements of a body. given: how many it has.  called_for: how many what is wanted calls for.
+
+    frequency, compliance: largest errors of its mesh, as shares, of its kept frequencies and of its frames' compliance.
+    error: estimated error that the mesh makes in each quantity, at most [SI].
+    """
+
+    given: int
+    called_for: int
+    frequency: float
+    compliance: float
+    error: Mapping[str, float]
+
+
+@dataclass(frozen=True)
 class Plan:
     """All decisions. wanted: by quantity [SI].  integrator, rtol: of the planned run.
 
     modes: elastic coordinates of kept flexible bodies that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  apart: places of parts that nothing couples to what is asked for.
+    meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
+    is not the usual one.
     """
 
     decisions: tuple[Decision, ...]
@@ -48,6 +65,8 @@ class Plan:
     evaluations: int
     runs: int
     apart: tuple[str, ...] = ()
+    meshes: Mapping[str, Mesh] = field(default_factory=dict)
+    ledger_tolerance: float | None = None
 
     @property
     def gone(self) -> tuple[Effect, ...]:

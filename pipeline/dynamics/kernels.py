@@ -38,27 +38,16 @@ def lowering() -> dict[str, Any]:
 class Kernel:
     """A function that compiled code calls; what Numba knows of it comes to be when it is first asked for."""
 
-    def __init__(self, py_func: Any) -> None:
-        self.py_func = py_func
+    def __init__(self, py_func: Any, make: Callable[[Any], Any]) -> None:
+        self.py_func, self._make = py_func, make
         self.__name__, self.__doc__, self.__module__ = py_func.__name__, py_func.__doc__, py_func.__module__
 
-    # No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and
-    # C took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
     @cached_property
     def dispatcher(self) -> Any:
         """What compiles it, by the types of its arguments."""
-        from numba import njit
+        return self._make(self.py_func)
 
-        return njit(
-            error_model="numpy",
-            fastmath={"contract", "reassoc", "nsz"},
-            _nrt=False,
-            no_cfunc_wrapper=True,
-            no_cpython_wrapper=True,
-            **lowering(),
-        )(self.py_func)
-
-    @property
+    @cached_property
     def _numba_type_(self) -> Any:
         """What Numba takes it for where other kernels name it."""
         return self.dispatcher._numba_type_
@@ -66,4 +55,45 @@ class Kernel:
 
 def kernel(function: Callable) -> Any:
     """The function, to be called by compiled code."""
-    return function if INTERPRETED else Kernel(function)
+    return function if INTERPRETED else Kernel(function, _compiled)
+
+
+# No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and
+# C took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
+def _compiled(function: Callable) -> Any:
+    from numba import njit
+
+    return njit(
+        error_model="numpy",
+        fastmath={"contract", "reassoc", "nsz"},
+        _nrt=False,
+        no_cfunc_wrapper=True,
+        no_cpython_wrapper=True,
+        **lowering(),
+    )(function)
+
+
+def row_reader(place: int, size: int) -> Any:
+    """row(h, i): h[place] + size i."""
+
+    def row(h, i):
+        return h[place] + size * i
+
+    return row if INTERPRETED else Kernel(row, lambda function: _lookup(function, place, size, None))
+
+
+def field_reader(place: int, size: int, field: int) -> Any:
+    """read(h, i): h[h[place] + size i + field]."""
+
+    def read(h, i):
+        return h[h[place] + size * i + field]
+
+    return read if INTERPRETED else Kernel(read, lambda function: _lookup(function, place, size, field))
+
+
+def _lookup(function: Callable, place: int, size: int, field: int | None) -> Any:
+    if not lowering():
+        return _compiled(function)
+    from flexclear.pipeline.dynamics.lookup import Lookup
+
+    return Lookup(function.__name__, place, size, field)

@@ -7,10 +7,13 @@ It needs parts of Numba that nobody promises to keep, and is taken with releases
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
+from numba import types
+from numba.core import typed_passes as typed
+from numba.core import untyped_passes as untyped
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import NativeLowering
 
@@ -19,6 +22,9 @@ class Part(JITCodeLibrary):
     """Unoptimised code of a kernel, and which libraries hold what it calls."""
 
     _whole: Any = None
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        """Nothing: the function that reaches it is optimised as a whole."""
 
     def finalize(self) -> None:
         """Link, optimise and assemble nothing."""
@@ -85,15 +91,85 @@ class PartLowering(NativeLowering):
         return bool(super().run_pass(state))
 
 
+#: Numba's steps that kernels have a use for, in Numba's order. What is left out makes functions of comprehensions and
+#: closures, fuses expressions of arrays, lifts loops and lists what could run in parallel: kernels have none of these,
+#: and each step takes its time on each of some hundred kernels.
+STEPS = (
+    untyped.TranslateByteCode,
+    untyped.FixupArgs,
+    untyped.IRProcessing,
+    untyped.RewriteSemanticConstants,
+    untyped.DeadBranchPrune,
+    untyped.GenericRewrites,
+    untyped.ReconstructSSA,
+    untyped.DeadBranchPrune,
+    typed.NopythonTypeInference,
+    typed.PreLowerStripPhis,
+    typed.NoPythonSupportedFeatureValidation,
+    typed.IRLegalization,
+    typed.AnnotateTypes,
+    PartLowering,
+    typed.NoPythonBackend,
+)
+
+
+def _pipeline() -> PassManager:
+    found = PassManager("kernel")
+    for step in STEPS:
+        found.add_pass(step, step._name)
+    found.finalize()
+    return found
+
+
+PIPELINE = _pipeline()
+
+
+#: types of what kernels compute with
+PLAIN = (types.Number, types.Boolean, types.Literal, types.UniTuple, types.CPointer)
+
+
+class Target:
+    """Numba's context of code, as it was when the function that reaches the kernels began to be compiled.
+
+    Looking through all registries for news before each kernel took a twentieth of the time.
+    """
+
+    def __init__(self, context: Any) -> None:
+        self._context = context
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._context, name)
+
+    def refresh(self) -> None:
+        """Nothing."""
+
+
+class Typing(Target):
+    """Numba's context of types, which remembers what operators and functions make of numbers.
+
+    Numba tries all that is ever called `+`, arrays first, at each `+` anew.
+    """
+
+    found: ClassVar[dict[tuple[Any, Any], Any]] = {}
+
+    def resolve_function_type(self, function: Any, arguments: Any, names: Any) -> Any:
+        """Signature of a call; kernels are compiled for integers, not anew for each integer that is written out."""
+        if isinstance(function, types.Dispatcher):
+            return self._context.resolve_function_type(function, tuple(map(types.unliteral, arguments)), names)
+        plain = not names and all(isinstance(kind, PLAIN) for kind in arguments)
+        if not plain or not isinstance(function, types.Function):
+            return self._context.resolve_function_type(function, arguments, names)
+        if (function, arguments) not in self.found:
+            self.found[function, arguments] = self._context.resolve_function_type(function, arguments, names)
+        return self.found[function, arguments]
+
+
 class KernelCompiler(CompilerBase):
-    """Numba's pipeline, with `PartLowering`."""
+    """Numba's pipeline, less the steps that kernels have no use for, with `PartLowering`."""
+
+    def __init__(self, typing: Any, target: Any, *others: Any) -> None:
+        super().__init__(Typing(typing), Target(target), *others)
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one; there is no object mode to fall back to."""
-        found = PassManager("kernel")
-        found.passes += DefaultPassBuilder.define_untyped_pipeline(self.state).passes
-        found.passes += DefaultPassBuilder.define_typed_pipeline(self.state).passes
-        for step, description in DefaultPassBuilder.define_nopython_lowering_pipeline(self.state).passes:
-            found.add_pass(PartLowering if step is NativeLowering else step, description)
-        found.finalize()
-        return [found]
+        return [PIPELINE]

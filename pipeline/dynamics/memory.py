@@ -41,7 +41,7 @@ from flexclear.pipeline.core.artifacts.event_kinds import COMPRESSION as COMPRES
 from flexclear.pipeline.core.artifacts.event_kinds import OPENING as OPENING
 from flexclear.pipeline.core.artifacts.event_kinds import SLIPPING as SLIPPING
 from flexclear.pipeline.core.artifacts.event_kinds import STICKING as STICKING
-from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
 
 _place = count()
 #: tables in h, f and w, in their order there
@@ -53,22 +53,6 @@ _ROWS: dict[type, np.dtype[Any]] = {}
 def _places(number: int) -> list[int]:
     """The next places of the header of h."""
     return [next(_place) for _ in range(number)]
-
-
-def _row_reader(place: int, size: int) -> Callable[[Any, Any], Any]:
-    @kernel
-    def row(h, i):
-        return h[place] + size * i
-
-    return row
-
-
-def _field_reader(place: int, size: int, field: int) -> Callable[[Any, Any], Any]:
-    @kernel
-    def read(h, i):
-        return h[h[place] + size * i + field]
-
-    return read
 
 
 def _fields(declared: str) -> dict[str, tuple[int, ...]]:
@@ -98,7 +82,7 @@ def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) ->
     size = begins.pop("size")
     make: Any = namedtuple
     kind = make("Table", ["place", "size", "row", *fields])
-    table = kind(place, size, _row_reader(place, size), *(access(place, size, begin) for begin in begins.values()))
+    table = kind(place, size, row_reader(place, size), *(access(place, size, begin) for begin in begins.values()))
     TABLES[array].append(table)
     number = np.int64 if array == "h" else np.float64
     _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
@@ -107,7 +91,7 @@ def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) ->
 
 def wiring(declared: str) -> Any:
     """A table in h: its `place` in the header, `size` and `row(h, i)` of its rows, and for each field field(h, i)."""
-    return _table("h", declared, _field_reader)
+    return _table("h", declared, field_reader)
 
 
 def numbers(declared: str) -> Any:

@@ -21,6 +21,10 @@ from flexclear.pipeline.post.plotting.table import Table
 Names = frozenset[str]
 #: stands for a variant that nobody asked for
 UNKNOWN = Point({}, {}, {}, 0, "not run")
+#: ranges below this have ticks between the powers of ten
+FEW = 30.0
+#: how the chart calls its bars
+LEGEND = {"dropped": "taken away", "added": "put in alone"}
 #: variables of the dataset, and what they say
 MEANINGS = {
     "dropped": "what the quantity loses when the effect, or both, are taken from the full scene",
@@ -169,6 +173,8 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
 
     Uses `dropped` and, where there is one, `added`, of single effects.
     """
+    from matplotlib.ticker import NullFormatter
+
     from flexclear.pipeline.post.plotting import style
 
     names = [str(effect) for effect in found["effect"].values]
@@ -187,16 +193,22 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
                 values = np.diagonal(found[kind].values[:, :, k]) if found[kind].ndim == 3 else found[kind].values[:, k]
                 place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
-                panel.barh(place, shown, 0.34, label=kind, color=("#0072B2", "#E69F00")[n])
+                panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 for y, value in zip(place, values, strict=True):
-                    text = "" if np.isfinite(value) and value > 0.0 else "none" if value == 0.0 else "not comparable"
+                    text = "none" if value == 0.0 else "not looked into" if np.isnan(value) else "not comparable"
+                    text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
             if wanted and np.isfinite(wanted.get(chosen[k], np.nan)):
                 panel.axvline(wanted[chosen[k]], color="#D55E00", lw=1.3, label="wanted accuracy")
+            low, high = panel.get_xlim()
+            if high < FEW * low:
+                style.plain(panel.xaxis)
+            else:
+                panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)
             panel.set_title(f"{chosen[k]} [{found['unit'].values[k]}]")
-        axes.flat[0].invert_yaxis()
+        axes.flat[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
         style.heading(figure, title)
         style.shared_legend(figure, axes.flat[0], 3)
         return style.files(name, figure)

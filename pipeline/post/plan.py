@@ -25,11 +25,13 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
         for k, name in enumerate(names):
             estimate[i, k] = decision.estimate.get(name, np.nan)
             doubt[i, k] = decision.uncertainty.get(name, 0.0 if name in decision.estimate else np.nan)
+    meshes = list(plan.meshes.values())
     planned = {
         "gone": [effect.name for effect in plan.gone],
         "modes": dict(plan.modes),
         "integrator": plan.integrator,
         "rtol": plan.rtol,
+        **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "apart": list(plan.apart),
     }
     found = xr.Dataset(
@@ -41,8 +43,17 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
             "reason": (("effect",), np.array([d.reason for d in plan.decisions], dtype=object)),
             "wanted": (("quantity",), np.array([plan.wanted[name] for name in names])),
             "integration": (("quantity",), np.array([plan.integration.get(name, np.nan) for name in names])),
+            "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64)),
+            "elements_called_for": (("body",), np.array([m.called_for for m in meshes], dtype=np.int64)),
+            "mesh_frequency_error": (("body",), np.array([m.frequency for m in meshes], dtype=float)),
+            "mesh_compliance_error": (("body",), np.array([m.compliance for m in meshes], dtype=float)),
+            "mesh_error": (
+                ("body", "quantity"),
+                np.array([[m.error[name] for name in names] for m in meshes], dtype=float).reshape(-1, len(names)),
+            ),
         },
         coords={
+            "body": np.array(list(plan.meshes), dtype=object),
             "effect": np.array([d.effect.name for d in plan.decisions], dtype=object),
             "words": ("effect", np.array([d.effect.words for d in plan.decisions], dtype=object)),
             "quantity": np.array(names, dtype=object),
@@ -63,7 +74,12 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
         "evidence": "what the decision rests on",
         "reason": "the decision in words",
         "wanted": "accuracy that the scene asks for",
-        "integration": "estimated error of the planned run's integration",
+        "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
+        "elements": "finite elements of the body",
+        "elements_called_for": "finite elements that the wanted accuracy calls for",
+        "mesh_frequency_error": "largest error of a kept frequency due to the mesh, as a share",
+        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a share",
+        "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
     }
     for name, text in meanings.items():
         found[name].attrs = {"long_name": text}
@@ -101,7 +117,8 @@ def table(found: xr.Dataset) -> Table:
     rows.append(("wanted", "", *wanted, "", ""))
     told = json.loads(found.attrs["planned"])
     notes = [words(found)]
-    notes += [f"{name} keeps {count} modes: its static ones do the same." for name, count in told["modes"].items()]
+    notes += [f"{name} keeps {count} of its modes, which do the same as all." for name, count in told["modes"].items()]
+    notes += [_of_mesh(found.sel(body=body), units) for body in found["body"].values]
     if told["apart"]:
         notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
     notes.append(
@@ -114,6 +131,27 @@ def table(found: xr.Dataset) -> Table:
         tuple(rows),
         tuple(notes),
     )
+
+
+def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
+    """Whether a body's finite elements are enough, in a sentence or two."""
+    given, called = int(part["elements"]), int(part["elements_called_for"])
+    errors = [
+        f"{name} by at most {written(float(value), 0.0, unit)}"
+        for name, value, unit in zip(part["quantity"].values, part["mesh_error"].values, units, strict=True)
+        if np.isfinite(value)
+    ]
+    frequency, compliance = (100.0 * float(part[f"mesh_{of}_error"]) for of in ("frequency", "compliance"))
+    head = (
+        f"{part['body'].item()} has {given} finite elements, which err by {frequency:.2g} % in a frequency and "
+        f"{compliance:.2g} % in compliance"
+    )
+    if not errors:
+        return f"{head}; what that does to what is asked for cannot be told."
+    told = f"{head}, and so change {listed(errors)}"
+    if called > given:
+        return f"{told}: the accuracy wanted calls for {called}."
+    return f"{told}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
 
 
 def words(found: xr.Dataset) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from numba import njit
 from numba.core.codegen import CPUCodeLibrary
 
-from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
 from flexclear.pipeline.dynamics.lowering import Part
 
 
@@ -86,3 +87,38 @@ def test_a_kernel_that_one_caller_names_in_vain_is_there_for_another() -> None:
         return high(x)
 
     assert called(1.0) == 6.0
+
+
+def test_tables_are_looked_up_without_a_function_of_their_own() -> None:
+    """As the functions of Python do it that debugging runs; h is an array here, and a pointer in what is compiled."""
+    h = np.arange(40) % 11
+    rows, fields = row_reader(3, 2), field_reader(3, 2, 1)
+
+    @kernel
+    def both(h, i):
+        return rows(h, i), fields(h, i)
+
+    @njit
+    def called(h, i):
+        return both(h, i)
+
+    assert all(called(h, i) == (rows.py_func(h, i), fields.py_func(h, i)) for i in range(5))
+    assert called(h, 2) == (3 + 2 * 2, h[3 + 2 * 2 + 1])
+    assert not hasattr(fields.dispatcher, "overloads")
+
+
+def test_a_kernel_is_compiled_once_for_integers_that_are_written_out() -> None:
+    @kernel
+    def double(k):
+        return 2 * k
+
+    @kernel
+    def sums(k):
+        return double(1) + double(2) + double(k)
+
+    @njit
+    def called(k):
+        return sums(k)
+
+    assert called(3) == 12
+    assert len(double.dispatcher.overloads) == 1

@@ -13,7 +13,7 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.influence import chance, influence
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.influences import closed
 from flexclear.pipeline.post.influences import variants as needed
@@ -34,6 +34,14 @@ def test_effects_are_the_parts_that_can_be_taken_away(crank: Path):
         "joint.pin.friction": "joint.pin.clearance",
         "load.gravity": "",
     }
+
+
+def test_friction_of_ideal_joints_is_an_effect_of_its_own(crank: Path):
+    law = {"law": "modified-coulomb", "static": 0.15, "dynamic": 0.1, "v_static": 0.02, "v_dynamic": 0.1}
+    scene = edited(load_scene(crank), {"joint.main.friction": {**law, "radius": 0.01}})
+    found = {effect.name: effect for effect in variants.effects(scene)}
+    assert found["joint.main.friction"].within == ""
+    assert variants.without(scene, [found["joint.main.friction"]]).joint["main"].friction is None
 
 
 def test_any_variant_is_a_file_that_extends_its_scene_by_parts_replaced_and_removed(crank: Path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,11 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.dynamics.linear.play import RANK, Bounds, bounds, lever_of
+from flexclear.pipeline.dynamics.linear.response import Response, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.plan.elements import mesh
+from flexclear.pipeline.dynamics.plan.search import summed
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 from flexclear.stages import plan, run, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
@@ -38,8 +42,13 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def _bounds(scene: Scene, chosen: list[Quantity]) -> Bounds:
     """Of a scene, from the run of its ideal twin."""
+    return bounds(scene, _ideal(scene)[0], chosen)
+
+
+def _response(scene: Scene, chosen: list[Quantity]) -> Response:
+    """Of a scene's flexible bodies, from the run of its ideal twin."""
     ideal, inputs = _ideal(scene)
-    return bounds(scene, ideal, s4_simulate.bundles(inputs), chosen)
+    return response(ideal, s4_simulate.bundles(inputs), chosen)
 
 
 def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
@@ -60,15 +69,75 @@ def _standing_leg(tmp_path: Path) -> Scene:
     return edited(scene, {"drive.stroke": {"joint": "slide", "law": law}, "time.end": 1e-3, "output.interval": 1e-4})
 
 
-def test_the_response_of_a_rod_under_load_is_that_of_a_bar(tmp_path: Path):
-    """A bar of weight w under a load F shortens by (F + w/2) L/(E A); the platform goes down by that."""
-    found = _bounds(_standing_leg(tmp_path), [Quantity("platform", "position")])
+def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(tmp_path: Path):
+    """A bar of weight w under a load F shortens by (F + w/2) L/(E A); let go, the platform swings to twice that, and
+    the force that its ball carries to twice its weight."""
+    found = _response(_standing_leg(tmp_path), [Quantity("platform", "position"), Quantity("ball", "force")])
     area = np.pi * RADIUS**2
     weight = DENSITY * area * LENGTH * GRAVITY
     expected = (PLATFORM * GRAVITY + 0.5 * weight) * LENGTH / (MODULUS * area)
     # the static modes make the end compliance exact, and seven more most of the body's weight acting along it: of that
     # half weight, a fortieth of the load, the modes with the ends held have eight tenths in the axial direction
-    assert found.bending["rod"]["platform.position"] == pytest.approx(expected, rel=5e-3)
+    assert found.influence["platform.position"] == pytest.approx(2.0 * expected, rel=5e-3)
+    # the part of the platform's weight that swings, and a twentieth of it more for the mass of the rod
+    assert found.influence["ball.force"] == pytest.approx(PLATFORM * GRAVITY, rel=0.05)
+
+
+def test_vibrations_about_a_ramp_and_a_step_have_their_closed_form_amplitudes():
+    """From rest, an oscillator under a force a t vibrates by a/omega^3, under a sudden force F by F/omega^2."""
+    time, omega = np.linspace(0.0, 0.3, 31), np.array([40.0, 900.0])
+    ramp = vibration(np.outer(time, [3.0, 3.0]), omega, time)
+    step = vibration(np.full((31, 2), 5.0), omega, time)
+    # exact for forces that are straight between the rows: rounding of 31 products
+    np.testing.assert_allclose(ramp, np.broadcast_to(3.0 / omega**3, ramp.shape), rtol=1e-11)
+    np.testing.assert_allclose(step, np.broadcast_to(5.0 / omega**2, step.shape), rtol=1e-11)
+
+
+def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path: Path):
+    """Of a rod of few elements, beside its reduction on many: the estimated error of a frequency is the true one, and a
+    mesh of as many as called for is as right as was asked for."""
+    leg = load_scene(write("leg", tmp_path)[0])
+
+    def reduced(factor: int) -> xr.Dataset:
+        task = Graph(coarse, shown=False, recipe={"elements": factor}).bundle["rod"]
+        place = run.workplace()
+        return place.store.load(place.bring([task], 1).records[id(task)])
+
+    recipe = tmp_path / "coarse.toml"
+    text = (tmp_path / "rod.toml").read_text()
+    recipe.write_text(re.sub(r"(?m)^elements = .*$", "elements = 2", text))
+    modes = {"reference": "craig-bampton", "count": 8, "interfaces": ["bottom", "top"]}
+    body = leg.body["rod"].model_dump(mode="json", exclude_none=True, exclude={"modes", "mesh", "damping"})
+    coarse = edited(leg, {"body.rod": {**body, "mesh": str(recipe), "modes": modes}})
+    one, two, many = (reduced(factor) for factor in (1, 2, 8))
+    # bending does 1 mm, of which the mesh may err by a tenth of 10 um; in a second the lowest vibration loses its phase
+    found = mesh(2, one, two, {"x": 1e-3}, {"x": 1e-5}, 1.0)
+    exact = many["frequency"].values
+    true = np.abs(one["frequency"].values - exact) / exact
+    # the power by which errors fall is that of fine meshes, and this one is coarse
+    assert found.frequency == pytest.approx(true.max(), rel=0.25)
+    assert found.called_for > found.given
+    factor = -(-found.called_for // 2)
+    left = mesh(2 * factor, reduced(factor), reduced(2 * factor), {"x": 1e-3}, {"x": 1e-5}, 1.0)
+    assert left.error["x"] < 2e-6  # 1e-6 is aimed at, by the power law from a coarse mesh
+    assert mesh(2, one, one, {"x": 1e-3}, {"x": 1e-5}, 1.0).called_for == 1
+
+
+def test_fewer_modes_to_choose_from_are_the_static_ones_and_half_of_the_others(tmp_path: Path):
+    leg = load_scene(write("leg", tmp_path)[0])
+    assert leg.body["rod"].modes.count == 13
+    # six static modes, seven others, of which two pairs are nearest to half
+    assert s8_plan.levels(leg) == ({"rod": 6}, {"rod": 10})
+    free = edited(leg, {"body.rod.modes": {"reference": "free-free", "count": 8}})
+    assert s8_plan.levels(free) == ({"rod": 4},)
+    ratios = edited(leg, {"body.rod.damping": {"ratios": [0.01] * 13}})
+    assert s8_plan.levels(ratios) == ()
+
+
+def test_a_quantity_that_no_bound_holds_for_is_not_bounded_by_those_of_others():
+    """A pose and a force asked for at once: the bound is of the pose alone."""
+    bounds_of_joints = [{"a.position": 1.0}, {"a.position": 2.0}]
+    assert summed(bounds_of_joints, {"a.position": 1.0, "b.force": 1.0}) == {"a.position": 3.0, "b.force": np.inf}
 
 
 def test_the_bound_of_a_loose_crank_pin_is_that_of_the_slider_crank(tmp_path: Path):
@@ -83,9 +152,9 @@ def test_the_bound_of_a_loose_crank_pin_is_that_of_the_slider_crank(tmp_path: Pa
 
 def test_where_joints_leave_a_freedom_there_is_no_bound(tmp_path: Path):
     scene = edited(_standing_leg(tmp_path), {"drive": {}, "load": {}})
-    found = _bounds(scene, [Quantity("platform", "position")])
-    assert found.clearance["ball"]["platform.position"] == np.inf
-    assert found.bending["rod"]["platform.position"] == np.inf
+    chosen = [Quantity("platform", "position")]
+    assert _bounds(scene, chosen).clearance["ball"]["platform.position"] == np.inf
+    assert _response(scene, chosen).influence["platform.position"] == np.inf
 
 
 def _tight(scene: Scene) -> Scene:

@@ -31,9 +31,9 @@ def test_figures_share_the_tasks_of_a_scene():
     assert scenes.artifact("sps4/csj:run") is scenes.artifact("sps4/csj:post").inputs["run"]
 
 
-def test_time_is_measured_alone_and_over_all_scenes_of_a_folder():
+def test_time_is_measured_beside_other_tasks_and_over_all_scenes_of_a_folder():
     timing = Scenes().timing("sps4")
-    assert timing.exclusive
+    assert not timing.exclusive
     assert {"sps4/ideal", "sps4/far_csj_cb"} <= timing.params.keys()
     assert "sps4/far_csj_cb:bundle/rod1" in timing.inputs
 

@@ -63,6 +63,7 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
             found.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
             found.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
+    found += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:
             found.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))

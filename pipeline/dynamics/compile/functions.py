@@ -44,8 +44,9 @@ WORDS = {
 SPECIALISED = "specialised"
 #: what others call, and where the header keeps its address
 ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
-#: what this process compiles first and the second one last: the others have kernels in common, compiled once each
-OURS = "advance"
+#: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the last
+#: two have most kernels in common, which each process compiles once
+ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
 #: where the code of kernels stands, and what they number by
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
@@ -166,11 +167,11 @@ def _addresses(folder: Path, texts: dict[str, str], tell: Callable[[str], None],
     """Where the function of each source is, by its name, fetched from the folder or compiled into it."""
     files = {name: _file(folder, name, source) for name, source in texts.items()}
     names = {path: name for name, path in files.items() if path.stem not in loaded}
-    ours_first = sorted(names, key=lambda path: names[path] != OURS)
-    ours_last = [path for path in ours_first[1:] + ours_first[:1] if not compiled(path)]
-    with second_process(ours_last):
-        bring(ours_first, lambda path: _announce(tell, WORDS[names[path]], began))
-    if ours_last:
+    wanted = sorted(names, key=lambda path: ORDER.index(names[path]))
+    missing = [path for path in wanted if not compiled(path)]
+    with second_process(missing[::-1]):
+        bring(wanted, lambda path: _announce(tell, WORDS[names[path]], began))
+    if missing:
         prune(folder)
     return {name: loaded[path.stem].address for name, path in files.items()}
 

@@ -133,7 +133,8 @@ def independence(h, w):
     """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
     least = 1.0
     for r in range(h[m.N_KEPT_ROWS]):
-        pivot = 1.0 / w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r] ** 2
+        inverse = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r]
+        pivot = 1.0 / (inverse * inverse)
         o = h[m.ROW_SCALE] + r
         least = min(least, pivot / max(w[o], w[o + h[m.N_CLOSURE_ROWS]]))
     return least

@@ -54,7 +54,7 @@ def multiply(h, e, w, a, n):
         first, row = h[e + 2 * i], base(h, e, a, i)
         for j in range(i, first - 1, -1):
             other = base(h, e, a, j)
-            total = 1.0 / w[row + i] ** 2 if j == i else w[row + j] / w[other + j]
+            total = 1.0 / (w[row + i] * w[row + i]) if j == i else w[row + j] / w[other + j]
             for k in range(max(first, h[e + 2 * j]), j):
                 total += w[row + k] * w[other + k]
             w[row + j] = total

@@ -114,8 +114,9 @@ def error(h, f, w, n, step):
             a += E5[j] * w[k + j * size + c]
             b += E3[j] * w[k + j * size + c]
         s = 1.0 / error_scale(h, w, c)
-        five += (a * s) ** 2
-        three += (b * s) ** 2
+        a, b = a * s, b * s
+        five += a * a
+        three += b * b
     if five == 0.0 and three == 0.0:
         return 0.0
     return abs(step) * five / np.sqrt((five + 0.01 * three) * size)

@@ -22,7 +22,7 @@ def set_error_scales(h, f, w, y):
         w[scales + g] = 0.0
     for c in range(h[m.NY]):
         g = scales + m.GROUPS.group(h, c)
-        w[g] += 0.5 * (w[y + c] ** 2 + w[o + c] ** 2)
+        w[g] += 0.5 * (w[y + c] * w[y + c] + w[o + c] * w[o + c])
     for g in range(h[m.N_GROUPS]):
         w[scales + g] = w[h[m.CONTROL] + m.RTOL] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[scales + g]))
 
@@ -38,7 +38,8 @@ def scaled_norm(h, w, a):
     """Root mean square, in units of the scales, of what w holds for each variable from place a on."""
     total = 0.0
     for c in range(h[m.NY]):
-        total += (w[a + c] / error_scale(h, w, c)) ** 2
+        share = w[a + c] / error_scale(h, w, c)
+        total += share * share
     return np.sqrt(total / h[m.NY])
 
 

@@ -93,7 +93,7 @@ def stand(h, w, t):
 @kernel
 def zero_ahead(sigma, fall, before, span):
     """How far ahead the parabola with this value and falling slope, and with the value before, reaches zero."""
-    bend = 2.0 * (before - sigma - fall * span) / span**2
+    bend = 2.0 * (before - sigma - fall * span) / (span * span)
     if bend >= 0.0:
         return sigma / fall
     return (np.sqrt(fall * fall - 2.0 * bend * sigma) - fall) / -bend

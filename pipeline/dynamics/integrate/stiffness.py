@@ -26,8 +26,8 @@ def difference(h, w, first, count, a, b):
     """Norm of the difference of two states or slopes at places a and b of w, variables `first` on, by tolerance."""
     total = 0.0
     for k in range(first, first + count):
-        change = w[a + k] - w[b + k]
-        total += (change / error_scale(h, w, k)) ** 2
+        change = (w[a + k] - w[b + k]) / error_scale(h, w, k)
+        total += change * change
     return np.sqrt(total)
 
 

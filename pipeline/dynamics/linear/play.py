@@ -1,4 +1,4 @@
-r"""What play in joints and bending of bodies do to the pose of a mechanism, to first order about its ideal motion.
+r"""What play in joints does to the pose of a mechanism, to first order about its ideal motion.
 
 Joints and drives hold the links: a small opening e of what they demand moves them by x with
 
@@ -8,9 +8,9 @@ where G holds the rates of all joints' residuals. Of what is asked for, s x, onl
 :math:`\lambda^T = s G^{+}` is needed, which is one solve for all openings of all joints: the reactions of the joints to
 a unit load there. Clearance lets two places part by up to its radius (and the depth to
 which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there
-to the body that is asked for. A body that bends under the forces of its joints opens the joints at its ends by what its
-ends move, which is known. Both hold where joints and drives leave the body asked for no freedom; elsewhere masses
-decide, and there is no bound (infinite).
+to the body that is asked for. That holds where joints and drives leave the body asked for no freedom; elsewhere masses
+decide, and there is no bound (infinite). A body that bends opens the joints by what its ends move (`openings`); what
+follows is in `response`.
 
 Source: the closure equations of `pipeline.dynamics.model.closing`, differentiated.
 """
@@ -52,63 +52,48 @@ OF_POSE = ("position", "orientation")
 
 @dataclass(frozen=True)
 class Bounds:
-    """Largest influences over the motion, in SI: by joint with clearance and by flexible body, of each quantity.
+    """Largest influences of clearances over the motion, in SI, by joint, of each quantity.
 
-    clearance: bounds.  bending: of the quasi-static response, without vibration.  load: largest force of each joint
-    with clearance in the ideal motion [N].
+    load: largest force of each joint with clearance in the ideal motion [N].
     """
 
     clearance: Mapping[str, Mapping[str, float]]
-    bending: Mapping[str, Mapping[str, float]]
     load: Mapping[str, float]
 
 
-def bounds(full: Scene, run: Run, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> Bounds:
-    """Bounds for the effects of a scene from the run of its ideal twin.
+def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
+    """Bounds for the clearances of a scene from the run of its ideal twin.
 
-    bundles: reduced flexible bodies of the full scene.  Of `chosen` those that the pose decides are bounded.
+    Of `chosen` those that the pose decides are bounded.
     """
     model, seen = run.model, run.observed
-    motions = Motions(model, seen)
     loose = [name for name in full.contacts() if name in model.scene.joint]
     asked = [q for q in chosen if q.kind in OF_POSE and q.owner in model.mechanism.link_of]
-    loads = joint_wrenches(
-        motions, [name for name, joint in model.scene.joint.items() if _touches(joint, full)] + loose
-    )
+    loads = joint_wrenches(Motions(model, seen), loose)
     load = {name: float(np.linalg.norm(loads[name][1], axis=1).max()) for name in loose}
     rows = np.unique(np.linspace(0, len(seen.state) - 1, LOOKS).astype(int))
     clearance = {name: {q.name: 0.0 for q in asked} for name in loose}
-    bending = {name: {q.name: 0.0 for q in asked} for name in bundles}
     joints = constraints(model.mechanism)
-    whole = not model.scene.gear and len(joints) == _joined(model)
+    whole = is_whole(model)
     for row in rows if asked else ():
         poses = [Placement(frame["origin"], frame["axes"]) for frame in seen.links[row]]
         lever = lever_of(model, joints, poses)
         for q in asked:
-            shown = _shown(model, poses, q)
-            adjoint = lever.adjoint(shown)
+            adjoint = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
             if not whole or adjoint.free > FREE:
-                for found in (*clearance.values(), *bending.values()):
+                for found in clearance.values():
                     found[q.name] = np.inf
                 continue
             for name in loose:
                 reach = lever.clearance(name, adjoint.rows) * _play(full.contacts()[name], load[name])
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
-            for name, bundle in bundles.items():
-                moved = _bent(model, motions, row, poses, lever, name, bundle, loads, adjoint, q)
-                bending[name][q.name] = max(bending[name][q.name], moved)
-    return Bounds(clearance, bending, load)
+    return Bounds(clearance, load)
 
 
-def _touches(joint: object, full: Scene) -> bool:
-    """Whether a joint holds a body that is flexible in the full scene."""
-    return any(frame.partition(".")[0] in full.flexible() for frame in joint.between)  # type: ignore[attr-defined]
-
-
-def _joined(model: Model) -> int:
-    """Joints between links, of which all must be known."""
+def is_whole(model: Model) -> bool:
+    """Whether all joints between links are known here: gears, for instance, are not."""
     tree = sum(link.branch.edge is not None and not link.massless for link in model.mechanism.links)
-    return tree + len(model.mechanism.closures)
+    return not model.scene.gear and len(constraints(model.mechanism)) == tree + len(model.mechanism.closures)
 
 
 def _play(joint: Clearance, force: float) -> float:
@@ -179,72 +164,89 @@ def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
     return np.vstack([found, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else found
 
 
-def _shown(model: Model, poses: Sequence[Placement], q: Quantity) -> np.ndarray:
+def shown(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
     """Motion of a body, (3, 6 (links - 1)): of its centre of mass [m], or its turn [rad]."""
-    i = model.mechanism.link_of[q.owner]
+    i = model.mechanism.link_of[body]
     found = np.zeros((3, 6 * (len(poses) - 1)))
     if i == 0:
         return found
     turn, shift = slice(6 * i - 6, 6 * i - 3), slice(6 * i - 3, 6 * i)
-    if q.kind == "orientation":
+    if turning:
         found[:, turn] = np.eye(3)
         return found
-    link, body = model.mechanism.links[i], model.scene.body[q.owner]
-    centre = poses[i].of(Placement(link.inertia.com if link.inertia is not None else np.zeros(3))).p
-    com = np.array(body.com) if isinstance(body, RigidBody) else np.zeros(3)
-    arm = poses[i].of(link.places[q.owner].of(Placement(com))).p - centre
+    link = model.mechanism.links[i]
+    middle = poses[i].of(Placement(link.inertia.com if link.inertia is not None else np.zeros(3))).p
+    arm = centre(model, poses, body) - middle
     found[:, shift] = model.mechanism.length * np.eye(3)
     found[:, turn] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
     return found
 
 
-def _bent(
+def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
+    """Where a body's centre of mass is."""
+    i, part = model.mechanism.link_of[body], model.scene.body[body]
+    com = np.array(part.com) if isinstance(part, RigidBody) else np.zeros(3)
+    return np.asarray(poses[i].of(model.mechanism.links[i].places[body].of(Placement(com))).p)
+
+
+def modal_forces(
     model: Model,
     motions: Motions,
-    row: int,
-    poses: Sequence[Placement],
-    lever: Lever,
     name: str,
     bundle: xr.Dataset,
     loads: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    adjoint: Adjoint,
-    q: Quantity,
-) -> float:
-    """How far what is shown moves when a body bends under the forces of its joints and its own inertia."""
+    rows: slice,
+) -> np.ndarray:
+    """Forces of its joints, its inertia and gravity along the elastic coordinates of a body, shape (rows, mode) [N]."""
     i = model.mechanism.link_of[name]
-    place = poses[i].of(model.mechanism.links[i].places[name])
+    R_WB = motions.links[i].R[rows] @ model.mechanism.links[i].places[name].R
     shapes, turns = bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values
     frames = [str(frame) for frame in bundle["frame"].values]
-    forces = -bundle["modal_first_moment"].values.T @ (place.R.T @ _acceleration(motions, i, row))
-    ports = _ports(model.scene, name)
-    for joint, (frame, sign) in ports.items():
+    accelerations = np.einsum("tji,tj->ti", R_WB, motions.links[i].a[rows] - model.gravity)
+    forces = -accelerations @ bundle["modal_first_moment"].values
+    for joint, (frame, sign) in _ports(model.scene, name).items():
         k = frames.index(frame)
-        moment, force = (sign * (place.R.T @ part[row]) for part in loads[joint])
-        forces = forces + shapes[k].T @ force + turns[k].T @ moment
-    q_modal = np.linalg.solve(bundle["modal_stiffness"].values, forces)
-    opening = np.zeros(adjoint.rows.shape[1])
-    carried = _carried(model.scene, name)
-    own = np.zeros(3)
-    for body, frame in carried.items():
+        moment, force = (sign * np.einsum("tji,tj->ti", R_WB, part[rows]) for part in loads[joint])
+        forces = forces + force @ shapes[k] + moment @ turns[k]
+    return np.asarray(forces)
+
+
+@dataclass(frozen=True)
+class Carried:
+    """What a deforming body moves with itself. at: a point of it, world axes.  turn, shift: of its axes and of that
+    point per elastic coordinate, shape (3, mode)."""
+
+    at: np.ndarray
+    turn: np.ndarray
+    shift: np.ndarray
+
+    def shift_of(self, point: np.ndarray) -> np.ndarray:
+        """Of another point that is fixed to it, world axes."""
+        return np.asarray(self.shift + np.cross(self.turn, point - self.at, axisa=0, axisb=0).T)
+
+
+def openings(
+    model: Model, poses: Sequence[Placement], lever: Lever, name: str, bundle: xr.Dataset
+) -> tuple[np.ndarray, dict[str, Carried]]:
+    """How the elastic coordinates of a body open the joints, shape (rows, mode), and move what is fixed to it."""
+    i = model.mechanism.link_of[name]
+    place = poses[i].of(model.mechanism.links[i].places[name])
+    frames = [str(frame) for frame in bundle["frame"].values]
+    found, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
+    for body, frame in _carried(model.scene, name).items():
         k = frames.index(frame)
-        u, theta = place.R @ shapes[k] @ q_modal, place.R @ turns[k] @ q_modal
+        u = place.R @ bundle["frame_translation_shape"].values[k]
+        theta = place.R @ bundle["frame_rotation_shape"].values[k]
         at = place.of(Placement(bundle["frame_position"].values[k])).p
-        twist = np.concatenate([theta, u - np.cross(theta, at)])
-        if body == q.owner:
-            own = theta if q.kind == "orientation" else u
+        carried[body] = Carried(at, theta, u)
+        twist = np.vstack([theta, u - np.cross(theta, at, axisa=0, axisb=0).T])
         for joint_name, (constraint, rows) in lever.joints.items():
             wrench = lever.axes[joint_name]
             unit = np.where(np.any(wrench[:, 3:] != 0.0, axis=1), 1.0 / lever.length, 1.0)
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
                 if _held_by(end, body, name, frame):
-                    opening[rows] += sign * unit * (wrench @ twist)
-    return float(np.linalg.norm(adjoint.rows @ opening + own))
-
-
-def _acceleration(motions: Motions, link: int, row: int) -> np.ndarray:
-    """Of a link's frame, less gravity [m/s^2], world axes."""
-    found: np.ndarray = motions.links[link].a[row] - motions.model.gravity
-    return found
+                    found[rows] += sign * unit[:, None] * (wrench @ twist)
+    return found, carried
 
 
 def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:

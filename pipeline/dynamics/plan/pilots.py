@@ -59,18 +59,20 @@ class Extent:
 class Pilots:
     """Variants of a scene that have been run.
 
-    bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such.  filled: fills in what
-    recipes tell of rigid bodies.  points: by what was run.  refused_loose: whether the loose tolerance was refused.
+    bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such, levels with the fewest
+    first.  filled: fills in what recipes tell of rigid bodies.  points: by what was run.  evaluations: of all.
+    work: these times the variables of each.  refused_loose: whether the loose tolerance was refused.
     """
 
     scene: Scene
     bundles: Mapping[str, xr.Dataset]
-    fewer: Mapping[str, xr.Dataset]
+    fewer: Sequence[Mapping[str, xr.Dataset]]
     filled: Callable[[Scene], Scene]
     chosen: Sequence[Quantity]
     progress: Progress
     points: dict[Key, Point] = field(default_factory=dict)
     evaluations: int = 0
+    work: float = 0.0
     refused_loose: bool = False
     _extent: Extent | None = None
 
@@ -114,31 +116,46 @@ class Pilots:
         self,
         gone: Collection[Effect],
         *,
-        fewer: bool = False,
+        level: int | None = None,
         share: float = 1.0,
         members: int = MEMBERS,
         **solver: object,
     ) -> Point:
         """What is watched of a variant over a share of its time; a refusal of the solver is in the point.
 
-        fewer: with fewer modes of those bodies that have a choice.  members: starts, where there are contacts.
+        level: with so few modes of those bodies that have a choice; None: with all.  members: starts, where there are
+            contacts.
         """
         scene = self.variant(gone, **solver)
         mine = {name: bundle for name, bundle in self.bundles.items() if name in scene.flexible()}
-        if fewer:
-            mine |= {name: bundle for name, bundle in self.fewer.items() if name in mine}
-            scene = with_modes(scene, {name: mine[name].sizes["mode"] for name in self.fewer if name in mine})
+        if level is not None:
+            mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
+            scene = with_modes(scene, self.modes(level, mine))
         if share < 1.0:
             scene = edited(scene, {"time.end": scene.time.start + share * (scene.time.end - scene.time.start)})
         names = frozenset(effect.name for effect in gone)
-        key = (names, json.dumps([scene.solver.model_dump(mode="json"), fewer, share, members]))
+        key = (names, json.dumps([scene.solver.model_dump(mode="json"), level, share, members]))
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
             found = Runner(mine, kept(scene.owners(), self.chosen), starts).run(members_apart(scene))
             self.points[key] = found
             self.evaluations += found.evaluations
+            self.work += found.evaluations * self._variables(mine)
         return self.points[key]
+
+    def modes(self, level: int, bodies: Collection[str]) -> dict[str, int]:
+        """Numbers of modes of a level, of those bodies that have a choice."""
+        return {name: int(bundle.sizes["mode"]) for name, bundle in self.fewer[level].items() if name in bodies}
+
+    def saved(self, level: int) -> float:
+        """Variables of the full scene for each one that is left with so few modes."""
+        return self.extent.variables / self._variables({**self.bundles, **self.fewer[level]})
+
+    def _variables(self, bundles: Mapping[str, xr.Dataset]) -> int:
+        """Of the full scene with these flexible bodies."""
+        left_out = sum(b.sizes["mode"] for b in self.bundles.values()) - sum(b.sizes["mode"] for b in bundles.values())
+        return max(self.extent.variables - 2 * int(left_out), 1)
 
     def must_run(self, gone: Collection[Effect], share: float, members: int = MEMBERS) -> Point:
         """What is watched of a variant that the decisions need, at a tight tolerance where the loose one is refused.

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flexclear.pipeline.core.scene.variants import Effect
+from flexclear.pipeline.dynamics.plan.budget import Chosen
 from flexclear.pipeline.dynamics.plan.pilots import RTOL, SMOOTH, SMOOTH_RTOL, Pilots
 
 #: share of what is wanted that the integration may err by
@@ -17,24 +18,17 @@ STIFF_TRIED = (1e-3, 1e-4)
 DEFAULT, TIGHT = "dop853", 1e-8
 
 
-def chosen_solver(
-    pilots: Pilots, gone: Sequence[Effect], wanted: Mapping[str, float], *, fewer: bool
-) -> tuple[str, float, dict[str, float]]:
-    """Integrator, tolerance, and estimated errors by quantity [SI] of the scene without what is gone.
+def smooth(pilots: Pilots, gone: Sequence[Effect], wanted: Mapping[str, float], level: int | None) -> Chosen:
+    """Integrator and tolerance of the scene without what is gone, where that has no contacts.
 
-    fewer: whether its flexible bodies have fewer modes.
+    level: of modes of its flexible bodies; None: all.
     """
-    scene = pilots.variant(gone)
-    contacts, flexible = bool(scene.contacts() or scene.stop), bool(scene.flexible())
-    if contacts and flexible:
-        # that of the pilots with which it was decided; a search would take as long as the run
-        return DEFAULT, pilots.loose(scene), {name: np.nan for name in wanted}
-    if flexible:
-        found = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, fewer=fewer)
-        if found[1] > SMOOTH_RTOL or _within(found[2], wanted):
-            return found
-        return DEFAULT, TIGHT, {name: np.nan for name in wanted}
-    return _loosest(pilots, gone, wanted, DEFAULT, TRIED, pilots.loose(scene) if contacts else RTOL)
+    if not pilots.variant(gone).flexible():
+        return _loosest(pilots, gone, wanted, DEFAULT, TRIED, RTOL, level)
+    found = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
+    if found.rtol > SMOOTH_RTOL or _within(found.error, wanted):
+        return found
+    return Chosen(DEFAULT, TIGHT, {name: np.nan for name in wanted}, level)
 
 
 def _within(error: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
@@ -48,20 +42,19 @@ def _loosest(
     integrator: str,
     tried: Sequence[float],
     reference: float,
-    *,
-    fewer: bool = False,
-) -> tuple[str, float, dict[str, float]]:
+    level: int | None,
+) -> Chosen:
     """The loosest of the tolerances that is good enough beside the reference, which stands for itself."""
-    there = pilots.point(gone, fewer=fewer, integrator=integrator, rtol=reference)
+    there = pilots.point(gone, level=level, integrator=integrator, rtol=reference)
     error = dict.fromkeys(wanted, np.nan)
     tried = [rtol for rtol in tried if rtol > reference]
     for rtol in tried:
-        apart = pilots.between(pilots.point(gone, fewer=fewer, integrator=integrator, rtol=rtol), there)
+        apart = pilots.between(pilots.point(gone, level=level, integrator=integrator, rtol=rtol), there)
         error = {name: i.difference for name, i in apart.items()}
         if _within(error, wanted):
-            return integrator, rtol, error
+            return Chosen(integrator, rtol, error, level)
     if not tried:
-        return integrator, reference, error
+        return Chosen(integrator, reference, error, level)
     # errors fall at least as the tolerance to the power 1/2
     fall = float(np.sqrt(reference / tried[-1]))
-    return integrator, reference, {name: fall * value for name, value in error.items()}
+    return Chosen(integrator, reference, {name: fall * value for name, value in error.items()}, level)

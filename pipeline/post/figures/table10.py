@@ -98,7 +98,8 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
     notes = [
         "Times are processor time of the integration alone; recording (evaluating the rows of the output, and the "
         "dataset) costs the same whatever the way, stands in a column of its own and is in no ratio. Medians of warm "
-        "repeats in one process, ± half their range; a ratio's ± is half of what the ranges of both times leave it.",
+        "repeats in one process, beside other work of the machine, ± half their range; a ratio's "
+        "± is half of what the ranges of both times leave it.",
         f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
         f"{told['equal_error']:g} at most over the first {100 * told['share']:.0f} % of the stroke, where all models "
         "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import scipy.sparse as sp
@@ -66,6 +67,48 @@ class Factor:
         return result.reshape(right.shape)
 
 
+@dataclass(frozen=True)
+class Front:
+    """Dense matrix of one block: own unknowns [start, start + k) in elimination order, and the rows below them.
+
+    Stored by columns, for LAPACK to work in place. Of diagonal and rest only the lower triangle is filled.
+    """
+
+    start: int
+    below: np.ndarray
+    diagonal: np.ndarray  #: shape (k, k)
+    under: np.ndarray  #: shape (len(below), k)
+    rest: np.ndarray  #: what is handed to the parent, shape (len(below), len(below))
+
+    def add(self, at: np.ndarray, theirs: np.ndarray) -> None:
+        """Add the lower triangle of a child's matrix; at: where its rows are here, ascending."""
+        k = len(self.diagonal)
+        own = int(np.searchsorted(at, k))
+        here, there = _runs(at[:own]), _runs(at[own:] - k)
+        _add_lower(self.diagonal, here, theirs[:own, :own])
+        for row, rows in there:
+            for column, columns in here:
+                self.under[row, column] += theirs[own:, :own][rows, columns]
+        _add_lower(self.rest, there, theirs[own:, own:])
+
+
+Runs = list[tuple[slice, slice]]
+
+
+def _runs(at: np.ndarray) -> Runs:
+    """Consecutive places, and which entries of `at` they are: to add slices is much quicker than to add by index."""
+    if not len(at):
+        return []
+    ends = np.concatenate([[0], np.flatnonzero(np.diff(at) != 1) + 1, [len(at)]]).tolist()
+    return [(slice(int(at[a]), int(at[b - 1]) + 1), slice(a, b)) for a, b in pairwise(ends)]
+
+
+def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
+    for k, (column, columns) in enumerate(runs):
+        for row, rows in runs[k:]:
+            matrix[row, column] += theirs[rows, columns]
+
+
 def cholesky(matrix: sp.csr_array, place: np.ndarray, tell: Tell = lambda share: None) -> Factor:
     """Factor of a symmetric positive definite matrix, shape (n, n).
 
@@ -74,15 +117,22 @@ def cholesky(matrix: sp.csr_array, place: np.ndarray, tell: Tell = lambda share:
     """
     tree = dissect(matrix, place)
     blocks = []
-    for front, k, start, below in _fronts(matrix, tree, tell):
-        diagonal, info = lapack.dpotrf(front[:k, :k], lower=1, clean=1)
+    for front in _fronts(matrix, tree, tell):
+        diagonal, info = lapack.dpotrf(front.diagonal, lower=1, clean=1, overwrite_a=1)
         if info != 0:
             raise SolverError(f"modes: a matrix of {len(tree.order)} rows is not positive definite")
-        under = blas.dtrsm(1.0, diagonal, front[k:, :k], side=1, lower=1, trans_a=1)
-        if len(below):
-            front[k:, k:] = blas.dsyrk(-1.0, under, beta=1.0, c=front[k:, k:], lower=1)
-        blocks.append(Block(start, start + k, below, diagonal, under))
+        under = _under(diagonal, front)
+        blocks.append(Block(front.start, front.start + len(diagonal), front.below, diagonal, under))
     return Factor(tree.order, tuple(blocks))
+
+
+def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
+    """The factor's rows below the diagonal block's factor, taken from what is left, in place."""
+    if not len(front.below):
+        return front.under
+    under = blas.dtrsm(1.0, diagonal, front.under, side=1, lower=1, trans_a=1, overwrite_b=1)
+    blas.dsyrk(-1.0, under, beta=1.0, c=front.rest, lower=1, overwrite_c=1)
+    return under
 
 
 def negative_pivots(matrix: sp.csr_array, place: np.ndarray, last: int = 0, tell: Tell = lambda share: None) -> int:
@@ -91,33 +141,25 @@ def negative_pivots(matrix: sp.csr_array, place: np.ndarray, last: int = 0, tell
     last: this many last rows are eliminated last, since they have no diagonal entry of their own.
     """
     tree = dissect(matrix, place, last)
-    count = 0
-    for front, k, _, below in _fronts(matrix, tree, tell):
-        count += _eliminate(front, k, len(below))
-    return count
+    return sum(_eliminate(front) for front in _fronts(matrix, tree, tell))
 
 
-def _eliminate(front: np.ndarray, k: int, rest: int) -> int:
-    """Eliminate the first k unknowns in place and count their negative pivots."""
-    diagonal, info = lapack.dpotrf(front[:k, :k], lower=1)
+def _eliminate(front: Front) -> int:
+    """Eliminate the own unknowns in place and count their negative pivots."""
+    diagonal, info = lapack.dpotrf(front.diagonal, lower=1)
     if info == 0:
-        if rest:
-            under = blas.dtrsm(1.0, diagonal, front[k:, :k], side=1, lower=1, trans_a=1)
-            front[k:, k:] = blas.dsyrk(-1.0, under, beta=1.0, c=front[k:, k:], lower=1)
+        _under(diagonal, front)
         return 0
-    factor, pivots, _ = lapack.dsytrf(front[:k, :k], lower=1)
-    if rest:
-        solved, _ = lapack.dsytrs(factor, pivots, front[k:, :k].T, lower=1)
-        front[k:, k:] -= front[k:, :k] @ solved
+    factor, pivots, _ = lapack.dsytrf(front.diagonal, lower=1)
+    if len(front.below):
+        solved, _ = lapack.dsytrs(factor, pivots, front.under.T, lower=1)
+        front.rest[:] -= front.under @ solved
     # a two by two pivot has one eigenvalue of each sign (Bunch & Kaufman 1977)
     return int(np.count_nonzero(np.diag(factor)[pivots > 0] < 0.0)) + int(np.count_nonzero(pivots < 0)) // 2
 
 
-def _fronts(matrix: sp.csr_array, tree: Tree, tell: Tell) -> Iterator[tuple[np.ndarray, int, int, np.ndarray]]:
-    """Each dense block in turn: matrix, own unknowns, first position, rows below; the caller eliminates in place.
-
-    Only the lower triangle is filled.
-    """
+def _fronts(matrix: sp.csr_array, tree: Tree, tell: Tell) -> Iterator[Front]:
+    """Each dense block in turn; the caller eliminates in place."""
     n = len(tree.order)
     lower = sp.csc_array(sp.tril(sp.csr_array(matrix[tree.order][:, tree.order]), format="csc"))
     local = np.empty(n, dtype=np.int64)
@@ -127,21 +169,21 @@ def _fronts(matrix: sp.csr_array, tree: Tree, tell: Tell) -> Iterator[tuple[np.n
     for index in range(count):
         start, stop = int(tree.start[index]), int(tree.start[index + 1])
         first, last = lower.indptr[start], lower.indptr[stop]
-        rows = lower.indices[first:last]
+        rows, values = lower.indices[first:last], lower.data[first:last]
         inherited = [below for below, _ in left[index]]
         reached = np.unique(np.concatenate([rows, *inherited]))
         below = reached[reached >= stop]
-        k, m = stop - start, stop - start + len(below)
-        local[start:stop], local[below] = np.arange(k), np.arange(k, m)
-        front = np.zeros((m, m), order="F")
-        columns = np.repeat(np.arange(k), np.diff(lower.indptr[start : stop + 1]))
-        front[local[rows], columns] = lower.data[first:last]
+        k, r = stop - start, len(below)
+        local[start:stop], local[below] = np.arange(k), np.arange(k, k + r)
+        front = Front(start, below, *(np.zeros(shape, order="F") for shape in ((k, k), (r, k), (r, r))))
+        columns, own = np.repeat(np.arange(k), np.diff(lower.indptr[start : stop + 1])), rows < stop
+        front.diagonal[rows[own] - start, columns[own]] = values[own]
+        front.under[local[rows[~own]] - k, columns[~own]] = values[~own]
         for theirs, rest in left[index]:
-            at = local[theirs]
-            front[np.ix_(at, at)] += rest
+            front.add(local[theirs], rest)
         left[index] = []
         if k:
-            yield front, k, start, below
-        if len(below):
-            left[tree.parent[index]].append((below, np.array(front[k:, k:], order="F")))
+            yield front
+        if r:
+            left[tree.parent[index]].append((below, front.rest))
         tell(float(work[index] / work[-1]))

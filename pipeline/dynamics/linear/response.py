@@ -1,0 +1,244 @@
+r"""What bending of bodies does to first order along the ideal motion: to places, rates and the forces of joints.
+
+Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint (`play`):
+
+.. math:: G x + B q = 0, \qquad M\,(\ddot x, \ddot q) + K q = f(t), \qquad M = \sum_b J_b^T M_b J_b
+
+with the forces f that joints, inertia and gravity bring on deformations in the ideal motion, and the links' mass moved
+along. Its vibrations are the assembled mechanism's; from rest each coordinate of them is the quasi-static one and a
+vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
+undamped). Rates are the vibrations' own; forces of joints hold the accelerations, by the adjoint solution of the joint.
+
+The pose is held where it is, so that several of the motion are looked at. What is told is the sum of all amplitudes,
+which is at least what the vibrations do.
+
+Source: Craig and Kurdila, *Fundamentals of Structural Dynamics*, ch. 5 and 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+import xarray as xr
+
+from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.dynamics.linear import play
+from flexclear.pipeline.dynamics.model.constraints import constraints
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.run.run import Run
+
+#: poses at which the vibrations are looked at
+LOOKS = 8
+#: kinds of quantities by what of the elastic coordinates makes them
+PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
+TURNS = ("orientation", "angular_velocity")
+#: singular values below this share of the largest are none; squared frequencies below this share are of free motions
+FOLLOWED, LIMP = 1e-9, 1e-12
+
+
+@dataclass(frozen=True)
+class Response:
+    """Of all flexible bodies together. first: lowest frequency of the assembled mechanism [Hz].
+
+    amplification: largest share of its quasi-static value that a vibration's coordinate reaches.
+    influence: of each quantity, at most [SI]; infinite where it is not known.
+    """
+
+    first: float
+    amplification: float
+    influence: Mapping[str, float]
+
+
+def response(
+    run: Run,
+    bundles: Mapping[str, xr.Dataset],
+    chosen: Sequence[Quantity],
+) -> Response:
+    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid twin.
+
+    bundles: the reduced bodies.
+    """
+    model, time = run.model, run.trajectory.time
+    motions = Motions(model, run.observed)
+    unknown = Response(np.nan, np.nan, {q.name: np.inf for q in chosen})
+    if not bundles or not play.is_whole(model):
+        return unknown
+    once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both its sides
+    time, every = time[once], slice(0, len(time))
+    held = [
+        n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
+    ]
+    loads = joint_wrenches(motions, held)
+    forces = np.hstack([play.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()])
+    joints, found = constraints(model.mechanism), list[Response]()
+    for row in np.unique(np.linspace(0, len(once) - 1, LOOKS).astype(int)):
+        poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
+        assembled = _assembled(model, play.lever_of(model, joints, poses), poses, bundles)
+        if assembled is None:
+            return unknown
+        found.append(_at(assembled, forces, time, chosen))
+    worst = {q.name: max(r.influence[q.name] for r in found) for q in chosen}
+    return Response(min(r.first for r in found), max(r.amplification for r in found), worst)
+
+
+@dataclass(frozen=True)
+class _Assembled:
+    """The elastic mechanism in a pose, its small motions in motions of the links and elastic coordinates, (x, q).
+
+    omega: frequencies, ascending [rad/s].  modes: (x, q) of each, M-orthonormal, shape (6 (links - 1) + n, modes).
+    free: motions without stiffness, likewise.  own: what bodies move beside their link, per q.  momenta: of all bodies,
+    as wrenches on the links, per (x, q).
+    """
+
+    model: Model
+    poses: Sequence[Placement]
+    lever: play.Lever
+    omega: np.ndarray
+    modes: np.ndarray
+    free: np.ndarray
+    own: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    momenta: np.ndarray
+
+    def moved(self, body: str, *, turning: bool) -> np.ndarray:
+        """Motion of a body per (x, q), shape (3, 6 (links - 1) + n)."""
+        shown = play.shown(self.model, self.poses, body, turning=turning)
+        return np.hstack([shown, self.own[body][0 if turning else 1]])
+
+
+def _assembled(
+    model: Model, lever: play.Lever, poses: Sequence[Placement], bundles: Mapping[str, xr.Dataset]
+) -> _Assembled | None:
+    """The elastic mechanism in a pose; None where no motion is left."""
+    first = np.concatenate([[0], np.cumsum([int(b.sizes["mode"]) for b in bundles.values()])])
+    opened = np.zeros((lever.gradient.shape[0], first[-1]))
+    own = {name: (np.zeros((3, first[-1])), np.zeros((3, first[-1]))) for name in model.scene.body}
+    for k, (name, bundle) in enumerate(bundles.items()):
+        mine = slice(first[k], first[k + 1])
+        opened[:, mine], carried = play.openings(model, poses, lever, name, bundle)
+        for body in own.keys() & carried.keys() - {name}:
+            own[body][0][:, mine] = carried[body].turn
+            own[body][1][:, mine] = carried[body].shift_of(play.centre(model, poses, body))
+    Z = scipy.linalg.null_space(np.hstack([lever.gradient.toarray(), opened]), rcond=FOLLOWED)
+    M, momenta = _mass(model, poses, bundles, first, own)
+    K = scipy.linalg.block_diag(*(b["modal_stiffness"].values for b in bundles.values()))
+    inner = Z[-first[-1] :]
+    try:
+        squares, shapes = scipy.linalg.eigh(inner.T @ K @ inner, Z.T @ M @ Z)
+    except np.linalg.LinAlgError:
+        return None
+    firm = squares > LIMP * squares.max(initial=0.0)
+    if not firm.any():
+        return None
+    modes = Z @ shapes
+    return _Assembled(model, poses, lever, np.sqrt(squares[firm]), modes[:, firm], modes[:, ~firm], own, momenta)
+
+
+def _mass(
+    model: Model,
+    poses: Sequence[Placement],
+    bundles: Mapping[str, xr.Dataset],
+    first: np.ndarray,
+    own: Mapping[str, tuple[np.ndarray, np.ndarray]],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mass of links and elastic coordinates, (x, q) by (x, q), and momenta of all as wrenches on the links."""
+    m = 6 * (len(poses) - 1)
+    M, momenta = np.zeros((m + first[-1], m + first[-1])), np.zeros((m, m + first[-1]))
+    for name, body in model.scene.body.items():
+        if not isinstance(body, RigidBody):
+            continue
+        place = poses[model.mechanism.link_of[name]].of(
+            model.mechanism.links[model.mechanism.link_of[name]].places[name]
+        )
+        inertia = place.R @ np.array(body.inertia) @ place.R.T
+        rigid = [play.shown(model, poses, name, turning=turning) for turning in (True, False)]
+        turn, shift = (np.hstack(parts) for parts in zip(rigid, own[name], strict=True))
+        spin, push = inertia @ turn, body.mass * shift
+        M += turn.T @ spin + shift.T @ push
+        if name in bundles:
+            k = list(bundles).index(name)
+            mine = slice(m + first[k], m + first[k + 1])
+            push_q, spin_q = _momenta(bundles[name], place, play.centre(model, poses, name))
+            across = turn.T @ spin_q + shift.T @ push_q
+            M[:, mine] += across
+            M[mine, :] += across.T
+            M[mine, mine] += bundles[name]["modal_mass"].values
+            spin[:, mine] += spin_q
+            push[:, mine] += push_q
+        momenta += rigid[0].T @ spin + rigid[1].T @ push
+    return 0.5 * (M + M.T), momenta
+
+
+def _momenta(bundle: xr.Dataset, place: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Linear momentum of a body's deformation, and its moment about a point, per rate of q, world axes, (3, mode)."""
+    push = place.R @ bundle["modal_first_moment"].values
+    P = bundle["position_mode_moment"].values
+    about_frame = place.R @ np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
+    return push, about_frame + np.cross(place.p - centre, push, axisa=0, axisb=0).T
+
+
+def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Sequence[Quantity]) -> Response:
+    """The response with the vibrations of one pose."""
+    omega = assembled.omega
+    f = forces @ assembled.modes[-forces.shape[1] :]
+    still = f / omega**2
+    amplitude = vibration(f, omega, time)
+    rate = np.gradient(still, time, axis=0) if len(time) > 1 else np.zeros(still.shape)
+    influence = {}
+    for q in chosen:
+        if q.kind in (*PLACES, *RATES) and q.owner in assembled.model.mechanism.link_of:
+            moved = assembled.moved(q.owner, turning=q.kind in TURNS)
+            if np.abs(moved @ assembled.free).max(initial=0.0) > FOLLOWED * np.abs(moved @ assembled.modes).max():
+                influence[q.name] = np.inf  # masses decide what it does along a freedom of its own
+                continue
+            shown = moved @ assembled.modes
+            size = np.linalg.norm(shown, axis=0)
+            if q.kind in PLACES:
+                told = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
+            else:
+                told = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
+            influence[q.name] = float(told.max())
+        elif q.kind in FORCES and q.owner in assembled.lever.joints:
+            size = np.linalg.norm(_reaction(assembled, q.owner), axis=0)
+            influence[q.name] = float((amplitude @ (size * omega**2)).max())
+        else:
+            influence[q.name] = np.inf
+    largest = np.abs(still).max(axis=0)
+    felt = largest > 0.0
+    reached = (np.abs(still) + amplitude).max(axis=0)[felt] / largest[felt]
+    return Response(float(omega[0] / (2.0 * np.pi)), float(reached[0] if len(reached) else 1.0), influence)
+
+
+def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
+    r"""Amplitudes of the vibrations about the quasi-static motion, from rest, shape (rows, vibrations).
+
+    f: forces per modal mass, (rows, vibrations), straight between the rows.  With the deviation
+    :math:`d = \eta - f/\omega^2` it vibrates freely between the rows, and its rate jumps where the slope of f does.
+    """
+    still = f / omega**2
+    steps = np.diff(time)
+    slope = np.diff(still, axis=0) / steps[:, None]
+    z = -still[0] + 1j * slope[0] / omega  # d + i times minus its rate over omega, in the turning frame
+    found = np.empty(still.shape)
+    found[0] = np.abs(z)
+    for k, step in enumerate(steps):
+        z = z * np.exp(1j * omega * step)
+        if k + 1 < len(slope):
+            z = z + 1j * (slope[k + 1] - slope[k]) / omega
+        found[k + 1] = np.abs(z)
+    return found
+
+
+def _reaction(assembled: _Assembled, joint: str) -> np.ndarray:
+    """Force of a joint per acceleration of each vibration, (3, vibrations): what holds the momenta that it moves."""
+    lever = assembled.lever
+    multipliers = lever.gradient @ lever.normal.solve(assembled.momenta @ assembled.modes)
+    rows, axes = lever.joints[joint][1], lever.axes[joint]
+    unit = np.where(np.any(axes[:, 3:] != 0.0, axis=1), 1.0 / lever.length, 1.0)
+    return np.asarray((unit[:, None] * axes[:, 3:]).T @ multipliers[rows])

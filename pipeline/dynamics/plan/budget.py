@@ -1,0 +1,112 @@
+"""The budget of a plan: the error that is wanted, what dropped effects have spent of it, and what was decided."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexclear.pipeline.core.decisions import PILOT, Decision
+from flexclear.pipeline.core.influence import Influence
+from flexclear.pipeline.core.scene.variants import Effect
+from flexclear.pipeline.dynamics.linear.play import OF_POSE
+from flexclear.pipeline.dynamics.plan.pilots import Pilots
+
+#: share of what is wanted that dropped effects may use up together; the rest is for what is not estimated
+BUDGET = 0.75
+#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a share of that
+OF_IMPACTS = 0.5
+#: what an influence measured with pilots' tolerance may be wrong by, as a share of it
+OF_PILOT = 0.15
+#: what the rest of the time may add to what a run over a part of it shows, as a share
+WHOLE = 1.0
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
+
+    ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
+    """
+
+    integrator: str
+    rtol: float
+    error: Mapping[str, float]
+    level: int | None = None
+    ledger_tolerance: float | None = None
+
+
+@dataclass
+class Search:
+    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
+
+    pilots: Pilots
+    wanted: dict[str, float]
+    used: dict[str, float] = field(default_factory=dict)
+    decisions: dict[str, Decision] = field(default_factory=dict)
+
+    @property
+    def gone(self) -> list[Effect]:
+        """What has been dropped."""
+        return [d.effect for d in self.decisions.values() if not d.kept]
+
+    def fits(self, most: Mapping[str, float], budget: float = BUDGET) -> bool:
+        """Whether influences of at most this much fit into what is left of the budget, for all quantities."""
+        return all(
+            self.used.get(name, 0.0) + most.get(name, np.inf) / self.wanted[name] <= budget for name in self.wanted
+        )
+
+    def spend(self, most: Mapping[str, float]) -> None:
+        """Take influences out of the budget."""
+        for name in self.wanted:
+            self.used[name] = self.used.get(name, 0.0) + most[name] / self.wanted[name]
+
+    def decide(
+        self,
+        effect: Effect,
+        kept: bool,
+        evidence: str,
+        reason: str,
+        estimate: Mapping[str, float] | None = None,
+        uncertainty: Mapping[str, float] | None = None,
+    ) -> None:
+        """Write down what becomes of an effect."""
+        self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
+
+    def judge(
+        self,
+        effect: Effect,
+        small: bool,
+        why: str,
+        most: Mapping[str, float],
+        apart: Mapping[str, Influence],
+        besides: str = "",
+    ) -> None:
+        """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there.
+
+        besides: said before the reason why it is kept.
+        """
+        difference = {name: influence.difference for name, influence in apart.items()}
+        uncertainty = {name: influence.uncertainty for name, influence in apart.items()}
+        self.decide(
+            effect, not small, PILOT, why if small else besides + too_much(most, self.wanted), difference, uncertainty
+        )
+
+
+def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
+    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a share `more`."""
+    kinds = {q.name: q.kind for q in search.pilots.chosen}
+    found = {}
+    for name, i in apart.items():
+        share = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
+        found[name] = Influence(i.difference, i.uncertainty + share * i.difference)
+    return found
+
+
+def too_much(most: Mapping[str, float], wanted: Mapping[str, float]) -> str:
+    """Why an effect is kept: what it may change most, in words."""
+    name = max(wanted, key=lambda n: most[n] / wanted[n])
+    if not np.isfinite(most[name]):
+        return f"without it {name} cannot be told, or has other events"
+    return f"without it {name} may be off by {most[name] / wanted[name]:.2g} times what is wanted"
