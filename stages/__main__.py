@@ -6,6 +6,7 @@ Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machin
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import sys
 from importlib import import_module
@@ -15,6 +16,8 @@ from flexclear.pipeline.core.system import plain_output
 from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
+#: new objects before Python looks for garbage: a short command makes hardly any, and spent a tenth of its time looking
+GARBAGE = 50_000
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
     "new": "a commented scene of one's own to start from",
@@ -41,6 +44,9 @@ COMMANDS = {
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; mistakes of the user are told without a traceback."""
     plain_output()
+    gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
+    # pydantic would look through all that is installed for plugins of its own
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         with workers.kept():

@@ -63,13 +63,15 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for text in lacks:
         progress(None, text)
     with stopping.until(scene.limits.time, scene.limits.time_words):
-        found = dynamics.simulate(scene, reduced, progress)
+        found = dynamics.simulated(scene, reduced, progress)
     told = "\n".join(filter(None, [str(found.attrs.get("warnings", "")), *lacks]))
     return {"nc": found.assign_attrs(warnings=told) if told else found}
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
     """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
+    if not reduced:
+        return []
     from flexclear.pipeline.core.artifacts import deficits
 
     found = []

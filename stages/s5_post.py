@@ -6,18 +6,20 @@ import json
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    import xarray as xr
+from flexclear.pipeline.core.workflow.task import given_arrays
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
 
-def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+@given_arrays
+def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
     """The post dataset (schema POST), with what the scene says of where its values come from."""
-    from flexclear.pipeline.post import derive
+    from flexclear.pipeline.post import derived
 
-    return {"nc": derive(inputs["run"], inputs.get("ensemble")).assign_attrs(params["told"])}
+    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["told"])}
 
 
 def params(scene: Scene) -> dict[str, Any]:

@@ -4,6 +4,7 @@ KIND = "benchmark"
 NAMES = {
     "evaluation": "evaluation:FAMILY",
     "runs": "runs:FAMILY",
+    "commands": "commands:FAMILY",
     "cold": "cold:FAMILY",
     "growth": "growth:FAMILY",
     "ensembles": "ensembles:FAMILY",

@@ -45,7 +45,7 @@ def _integration(here: Mechanism) -> tuple[Callable[[], float], int]:
 
 
 def _stage(here: Mechanism) -> Callable[[], float]:
-    return lambda: once(lambda: dynamics.simulate(here.scene, here.bundles, silent))
+    return lambda: once(lambda: dynamics.simulated(here.scene, here.bundles, silent))
 
 
 def show(records: list[Record]) -> str:

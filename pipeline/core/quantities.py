@@ -9,12 +9,13 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.pipeline.core.scene.output import Output
     from flexclear.pipeline.core.scene.schema import TimeSpan
 
@@ -146,6 +147,8 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
         found |= {name: run[name] for name in ("contact_impulse",) if name in run}
     if "horizon" in run:
         found["horizon"] = run["horizon"]
+    import xarray as xr  # here, since a run needs none of it
+
     return xr.Dataset(found)
 
 

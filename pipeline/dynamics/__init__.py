@@ -8,15 +8,28 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
     from flexclear.pipeline.dynamics.run.pace import Judge
 
-__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate"]
+__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+    """What `simulated` gives, as a dataset; so is what there is of a run that is asked to stop."""
+    from flexclear.pipeline.core.errors import StoppedError
+
+    try:
+        return simulated(scene, bundles, progress).to_xarray()
+    except StoppedError as stopped:
+        if stopped.partial is not None:
+            stopped.partial = stopped.partial.to_xarray()
+        raise
+
+
+def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> LabelledArrays:
     """One run of a scene (schema RUN).
 
     bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
@@ -25,32 +38,36 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
     there is of it, marked as incomplete, when it is asked to stop.
     """
+    from flexclear.pipeline.core.artifacts.labelled import of
     from flexclear.pipeline.core.artifacts.schema import incomplete
     from flexclear.pipeline.core.errors import StoppedError
-    from flexclear.pipeline.dynamics.record.dataset import dataset, warnings
+    from flexclear.pipeline.dynamics.record.dataset import recorded, warnings
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
-    def once(edited: Scene, judges: Mapping[str, tuple[Judge, str]] | None = None) -> xr.Dataset:
+    def once(edited: Scene, judges: Mapping[str, tuple[Judge, str]] | None = None) -> LabelledArrays:
         try:
             done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:
             there = stopped.partial
             # another one's motion, such as where the run begins, is nothing of this run
-            stopped.partial = incomplete(dataset(there), str(stopped)) if isinstance(there, Run) else None
+            stopped.partial = incomplete(recorded(there), str(stopped)) if isinstance(there, Run) else None
             raise
         for sentence in warnings(done):
             progress(None, f"warning: {sentence}")
-        return dataset(done)
+        return recorded(done)
 
     if scene.accuracy is None or not scene.accuracy.quantities:
         return once(scene)
     from flexclear.pipeline.dynamics.run.accuracy import deliver
 
+    def compared(edited: Scene, judges: Mapping[str, tuple[Judge, str]] | None = None) -> xr.Dataset:
+        return once(edited, judges).to_xarray()
+
     if not scene.by_need():
-        return deliver(scene, once, progress)
+        return of(deliver(scene, compared, progress))
     from flexclear.pipeline.dynamics.run.suited import suit
 
-    return deliver(scene, once, progress, suit(scene, bundles))
+    return of(deliver(scene, compared, progress, suit(scene, bundles)))
 
 
 def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:

@@ -23,9 +23,6 @@ class Part(JITCodeLibrary):
 
     _whole: Any = None
 
-    def _optimize_functions(self, ll_module: Any) -> None:
-        """Nothing: the function that reaches it is optimised as a whole."""
-
     def finalize(self) -> None:
         """Link, optimise and assemble nothing."""
         self._raise_if_finalized()

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["derive"]
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+
+__all__ = ["derive", "derived"]
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
@@ -16,5 +18,12 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     Imported when it is called: a command that only asks what is fresh needs no xarray.
     """
     from flexclear.pipeline.post.series import derive as series
+
+    return series(run, ensemble)
+
+
+def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
+    """The same of arrays, without xarray."""
+    from flexclear.pipeline.post.series import derived as series
 
     return series(run, ensemble)

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.quantities import PARTED
 from flexclear.pipeline.post.rotations import angle_about_y
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
 
 #: shares of the members below the quantiles that are kept: of so few, the middle and the bulk
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -33,24 +39,24 @@ def horizon(time: np.ndarray, velocity: np.ndarray, share: float = PARTED) -> fl
     return float(time[beyond[0]] if beyond.size else time[-1])
 
 
-def ensemble_statistics(ensemble: xr.Dataset) -> Variables:
+def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Variables:
     """Mean, standard deviation (``ddof = 1``) and QUANTILES over the members, on the ensemble's own times.
 
     Quantiles are interpolated between members (numpy's default); of an angle, a vector's components, a contact.
     """
-    position, per_contact = ensemble.position.values, ("contact",)
+    position, per_contact = ensemble["position"].values, ("contact",)
     members = {
-        "rotation_y": (("ensemble_time", "ensemble_body"), angle_about_y(ensemble.quaternion.values)),
+        "rotation_y": (("ensemble_time", "ensemble_body"), angle_about_y(ensemble["quaternion"].values)),
         "displacement": (("ensemble_time", "ensemble_body", "axis"), position - position[:, :1]),
-        "velocity": (("ensemble_time", "ensemble_body", "axis"), ensemble.velocity.values),
-        "acceleration": (("ensemble_time", "ensemble_body", "axis"), ensemble.acceleration.values),
-        "normal_force": (("ensemble_time", "contact"), ensemble.contact_normal_force.values),
-        "impact_count": (per_contact, ensemble.impact_count.values.astype(float)),
-        "peak_force": (per_contact, ensemble.peak_force.values),
-        "contact_time_share": (per_contact, ensemble.contact_time_share.values),
-        "peak_acceleration": (("ensemble_body", "axis"), ensemble.peak_acceleration.values),
+        "velocity": (("ensemble_time", "ensemble_body", "axis"), ensemble["velocity"].values),
+        "acceleration": (("ensemble_time", "ensemble_body", "axis"), ensemble["acceleration"].values),
+        "normal_force": (("ensemble_time", "contact"), ensemble["contact_normal_force"].values),
+        "impact_count": (per_contact, ensemble["impact_count"].values.astype(float)),
+        "peak_force": (per_contact, ensemble["peak_force"].values),
+        "contact_time_share": (per_contact, ensemble["contact_time_share"].values),
+        "peak_acceleration": (("ensemble_body", "axis"), ensemble["peak_acceleration"].values),
     }
-    result: Variables = {"spread": (("ensemble_time",), spread(ensemble.velocity.values))}
+    result: Variables = {"spread": (("ensemble_time",), spread(ensemble["velocity"].values))}
     for name, (dims, values) in members.items():
         result[f"{name}_mean"] = (dims, values.mean(axis=0))
         result[f"{name}_std"] = (dims, values.std(axis=0, ddof=1))

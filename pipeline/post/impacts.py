@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.quantities import IMPACT
 
+if TYPE_CHECKING:
+    import xarray as xr
 
-def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+
+
+def impacts(run: xr.Dataset | LabelledArrays) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Variables ``impact_*`` of the post artifact; empty for a run without contacts.
 
     Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
@@ -17,24 +23,24 @@ def impacts(run: xr.Dataset) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """
     if "event_time" not in run or "contact" not in run.sizes:
         return {}
-    contact, names = run.event_contact.values, [str(name) for name in run.contact.values]
-    speed = run.event_approach_speed.values
+    contact, names = run["event_contact"].values, [str(name) for name in run["contact"].values]
+    speed = run["event_approach_speed"].values
     closings, openings = of_kind(run, "closing"), of_kind(run, "opening")
     strong = np.flatnonzero(closings & (speed > IMPACT))
     opens = np.array([_next_opening(int(i), contact, openings) for i in strong], dtype=int)
-    ended, begun = opens >= 0, run.event_time.values[strong]
+    ended, begun = opens >= 0, run["event_time"].values[strong]
     return {
         "impact_time": (("impact",), begun),
         "impact_contact": (("impact",), contact[strong]),
         "impact_approach_speed": (("impact",), speed[strong]),
         "impact_separation_speed": (("impact",), np.where(ended, speed[opens], np.nan)),
-        "impact_peak_force": (("impact",), run.event_peak_force.values[strong]),
-        "impact_duration": (("impact",), np.where(ended, run.event_time.values[opens] - begun, np.nan)),
+        "impact_peak_force": (("impact",), run["event_peak_force"].values[strong]),
+        "impact_duration": (("impact",), np.where(ended, run["event_time"].values[opens] - begun, np.nan)),
         "impact_count": (
             ("contact",),
             np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
         ),
-        **_books(run, contact[strong], begun, np.where(ended, run.event_time.values[opens], np.nan)),
+        **_books(run, contact[strong], begun, np.where(ended, run["event_time"].values[opens], np.nan)),
     }
 
 
@@ -47,23 +53,23 @@ BOOKS = {
 
 
 def _books(
-    run: xr.Dataset, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
+    run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
-    time, found = run.time.values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
+    time, found = run["time"].values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
     for name, book in BOOKS.items():
         if book in run:
             values, shares = run[book].values, np.full(len(contact), np.nan)
-            names = list(run.contact.values)
+            names = list(run["contact"].values)
             for i, c in enumerate(names.index(name) for name in contact):
                 shares[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
             found[name] = (("impact",), shares)
     return found
 
 
-def of_kind(run: xr.Dataset, name: str) -> np.ndarray:
+def of_kind(run: xr.Dataset | LabelledArrays, name: str) -> np.ndarray:
     """True for the events of a kind, e.g. those that close a gap, shape (event,)."""
-    return np.asarray(run.event_kind.values == name, dtype=bool)
+    return np.asarray(run["event_kind"].values == name, dtype=bool)
 
 
 def _next_opening(i: int, contact: np.ndarray, openings: np.ndarray) -> int:

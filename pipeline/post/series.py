@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.algebra import first_largest, rotation_between
-from flexclear.pipeline.core.artifacts.schema import conform, require_complete
+from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
+from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
 from flexclear.pipeline.core.quantities import IMPACT, PARTED
 from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
 from flexclear.pipeline.post.impacts import impacts, of_kind
@@ -16,8 +17,16 @@ from flexclear.pipeline.post.rotations import angle_about_y
 from flexclear.pipeline.post.schema import POST
 from flexclear.pipeline.post.wear import wear
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
+    """What `derived` gives, of datasets."""
+    return derived(of(run), None if ensemble is None else of(ensemble)).to_xarray()
+
+
+def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
     """The post artifact of one run (schema POST): rotations, displacements, reactions, impacts, horizon.
 
     run: artifact of schema RUN.  ensemble: artifact of schema ENSEMBLE; without one there are no ensemble
@@ -29,13 +38,15 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     data: Variables = {**motion(run), **contacts(run), **impacts(run), **wear(run, parameters(run).get("joint", {}))}
     data["reaction"] = (("time", "joint"), reactions(run))
     data |= extremes(run, data["reaction"][1])
-    end = float(run["horizon"] if "horizon" in run else run.time.values[-1])
+    end = float(run["horizon"].values if "horizon" in run else run["time"].values[-1])
     used = {dim for dims, _ in data.values() for dim in dims}
-    coords: dict[str, object] = {str(name): run[name].variable for name in run.coords if {*run[name].dims} <= used}
+    coords: dict[str, object] = {
+        name: array for name, array in run.variables.items() if name in run.coords and {*array.dims} <= used
+    }
     if ensemble is not None:
         data |= ensemble_statistics(ensemble)
-        data["ensemble_horizon"] = ((), np.array(horizon(ensemble.time.values, ensemble.velocity.values)))
-        coords |= {"ensemble_time": ensemble.time.values, "ensemble_body": ensemble.body.values}
+        data["ensemble_horizon"] = ((), np.array(horizon(ensemble["time"].values, ensemble["velocity"].values)))
+        coords |= {"ensemble_time": ensemble["time"].values, "ensemble_body": ensemble["body"].values}
         coords["quantile"] = np.array(QUANTILES)
     data["horizon"] = ((), np.array(end))
     attributes = {
@@ -44,12 +55,12 @@ def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
     }
     attributes["references"] = str(run.attrs.get("references", ""))
     title = f"What follows from: {run.attrs['title']}"
-    return conform(xr.Dataset(data, coords=coords), POST, title=title, **attributes)
+    return conformed(labelled(data, coords), POST, title=title, **attributes)
 
 
-def motion(run: xr.Dataset) -> Variables:
+def motion(run: xr.Dataset | LabelledArrays) -> Variables:
     """Angle about y, total rotation and displacement of every body."""
-    q, position = run.quaternion.values, run.position.values
+    q, position = run["quaternion"].values, run["position"].values
     return {
         "rotation_y": (("time", "body"), angle_about_y(q)),
         "rotation": (("time", "body"), rotation_between(q[:1], q)),
@@ -57,49 +68,49 @@ def motion(run: xr.Dataset) -> Variables:
     }
 
 
-def reactions(run: xr.Dataset) -> np.ndarray:
+def reactions(run: xr.Dataset | LabelledArrays) -> np.ndarray:
     """Magnitude of what each joint transmits [N], shape (time, joint).
 
     For a joint with clearance that is the contact force.
     """
-    force: np.ndarray = np.linalg.norm(run.joint_force.values, axis=-1)
-    joints = list(run.joint.values)
+    force: np.ndarray = np.linalg.norm(run["joint_force"].values, axis=-1)
+    joints = list(run["joint"].values)
     if "contact_force" in run:
-        for k, name in enumerate(run.contact.values):
+        for k, name in enumerate(run["contact"].values):
             if name in joints:  # the others are ends of stops
-                force[:, joints.index(name)] = np.linalg.norm(run.contact_force.values[:, k], axis=-1)
+                force[:, joints.index(name)] = np.linalg.norm(run["contact_force"].values[:, k], axis=-1)
     return force
 
 
-def extremes(run: xr.Dataset, reaction: np.ndarray) -> Variables:
+def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variables:
     """Largest magnitudes and their times, of all rows: regular outputs, events, deepest points of contacts.
 
     reaction: of every joint [N], shape (time, joint).
     """
     series = {
         "reaction": (("joint",), reaction),
-        "acceleration": (("body", "axis"), np.abs(run.acceleration.values)),
+        "acceleration": (("body", "axis"), np.abs(run["acceleration"].values)),
     }
     if "drive_force" in run:
-        series["drive_force"] = (("drive",), np.abs(run.drive_force.values))
+        series["drive_force"] = (("drive",), np.abs(run["drive_force"].values))
     if "contact_penetration" in run:
-        series["penetration"] = (("contact",), run.contact_penetration.values)
-        series["force"] = (("contact",), run.contact_normal_force.values)
+        series["penetration"] = (("contact",), run["contact_penetration"].values)
+        series["force"] = (("contact",), run["contact_normal_force"].values)
     found: Variables = {}
     for name, (dims, values) in series.items():
         found[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
-        found[f"peak_{name}_time"] = (dims, run.time.values[first_largest(values, axis=0)])
+        found[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
     if "event_peak_force" in run:
         found["peak_force"] = (("contact",), _peak_force(run))
     return found
 
 
-def contacts(run: xr.Dataset) -> Variables:
+def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
     """Eccentricity, clearance and share of time in contact, per contact."""
     if "contact_offset" not in run:
         return {}
-    distance = np.linalg.norm(run.contact_offset.values, axis=-1)
-    gap = run.contact_gap.values
+    distance = np.linalg.norm(run["contact_offset"].values, axis=-1)
+    gap = run["contact_gap"].values
     return {
         "eccentricity": (("time", "contact"), distance),
         # gap = clearance - eccentricity at every time; the median is free of rounding at single times
@@ -108,26 +119,26 @@ def contacts(run: xr.Dataset) -> Variables:
     }
 
 
-def _time_share(run: xr.Dataset) -> np.ndarray:
+def _time_share(run: xr.Dataset | LabelledArrays) -> np.ndarray:
     """Share of the run that each contact is closed, from its located begins and ends."""
-    time, share, names = run.time.values, np.zeros(run.sizes["contact"]), list(run.contact.values)
+    time, share, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
     closings = of_kind(run, "closing")
-    begun, lasted = run.event_time.values[closings], run.event_duration.values[closings]
+    begun, lasted = run["event_time"].values[closings], run["event_duration"].values[closings]
     lasted = np.where(np.isfinite(lasted), lasted, time[-1] - begun)
-    for name, seconds in zip(run.event_contact.values[closings], lasted, strict=True):
+    for name, seconds in zip(run["event_contact"].values[closings], lasted, strict=True):
         share[names.index(name)] += seconds
     return share / (time[-1] - time[0])
 
 
-def _peak_force(run: xr.Dataset) -> np.ndarray:
+def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:
     """Largest normal force: of the outputs and of the peaks that the solver tracked between them."""
-    peak: np.ndarray = run.contact_normal_force.values.max(axis=0)
-    for k, name in enumerate(run.contact.values):
-        tracked = run.event_peak_force.values[run.event_contact.values == name]
+    peak: np.ndarray = run["contact_normal_force"].values.max(axis=0)
+    for k, name in enumerate(run["contact"].values):
+        tracked = run["event_peak_force"].values[run["event_contact"].values == name]
         peak[k] = max(peak[k], np.max(tracked[np.isfinite(tracked)], initial=0.0))
     return peak
 
 
-def parameters(run: xr.Dataset) -> dict:
+def parameters(run: xr.Dataset | LabelledArrays) -> dict:
     """The scene's parameters as the run's attributes tell them; empty when they do not."""
     return json.loads(run.attrs.get("parameters", "{}"))

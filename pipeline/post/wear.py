@@ -7,10 +7,14 @@ along the shorter arc.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: steps of the way between two rows, each of which goes to one sector; bands of a sphere, of equal area
@@ -18,7 +22,7 @@ PIECES, BANDS = 16, 18
 SURFACES = ("outer", "inner")
 
 
-def wear(run: xr.Dataset, joints: dict[str, Any]) -> Variables:
+def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Variables:
     """Variables ``wear_*`` of the post artifact; empty where nothing wears.
 
     joints: what the scene says of its joints.  Depths are those that a surface alone would have; both share the volume.
@@ -32,7 +36,8 @@ def wear(run: xr.Dataset, joints: dict[str, Any]) -> Variables:
     shape = (len(names), bands, sectors)
     maps = {f"wear_{what}_{side}": np.zeros(shape) for what in ("depth", "impulse") for side in SURFACES}
     path, sliding = run["wear_load_path"].values, run["wear_sliding_distance"].values
-    impulse = run["contact_impulse"].sel(contact=names).values
+    contacts = run["contact"].values.tolist()
+    impulse = run["contact_impulse"].values[:, [contacts.index(name) for name in names]]
     volume = np.zeros(len(names))
     for k, (name, law) in enumerate(zip(names, laws, strict=True)):
         per_path, own = law["coefficient"] / law["hardness"], int(law["sectors"])

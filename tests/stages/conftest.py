@@ -1,6 +1,6 @@
 """A copy of the project with small engines in place of the real ones, to watch the workflow at work.
 
-The copy's `simulate` and `derive` write little datasets, and log each call to a file. `simulate` does not end while
+The copy's `simulated` and `derived` make little datasets, and log each call to a file. `simulated` does not end while
 there is a file of the name HELD_BY.
 """
 
@@ -35,7 +35,7 @@ def log(text):
     with open(os.environ["CALLS"], "a") as file:
         file.write(text + "\\n")
 
-def simulate(scene, bundles, progress):
+def simulated(scene, bundles, progress):
     log(f"simulate {scene.name}")
     progress(0.5, "half way")
     if "fails" in scene.name:
@@ -60,9 +60,9 @@ def ensemble(scene, bundles, progress):
 POST = """
 from flexclear.pipeline.dynamics import log
 
-def derive(run, ensemble):
+def derived(run, ensemble):
     log(f"post {run.attrs['scene']}")
-    return run.mean("time")
+    return run.to_xarray().mean("time")
 """
 
 SCENE = """

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
-import xarray as xr
 
+from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays
 from flexclear.pipeline.core.variable import Schema, Variable
 
 AXES = ("x", "y", "z")
@@ -122,28 +122,28 @@ def motion(turning: bool) -> str:
     return ROTATION if turning else TRANSLATION
 
 
-def with_names(dataset: xr.Dataset) -> xr.Dataset:
+def with_names(data: LabelledArrays) -> LabelledArrays:
     """The same with the coordinates that follow from its dimensions alone."""
-    found: dict[str, object] = {}
-    for name in (str(dim) for dim in dataset.dims):
+    found: dict[str, LabelledArray] = {}
+    for name, length in data.sizes.items():
         if name in NAMED:
-            found[name] = list(NAMED[name])
-        elif name in NUMBERED and name not in dataset.coords:
-            found[name] = np.arange(dataset.sizes[name], dtype=np.int32) + NUMBERED[name]
+            found[name] = LabelledArray((name,), np.array(NAMED[name]))
+        elif name in NUMBERED and name not in data.coords:
+            found[name] = LabelledArray((name,), np.arange(length, dtype=np.int32) + NUMBERED[name])
         if name in MOTIONS:
-            found[f"{name}_motion"] = (name, list(MOTIONS[name]))
-    return dataset.assign_coords(found)
+            found[f"{name}_motion"] = LabelledArray((name,), np.array(MOTIONS[name]))
+    return data.assign_coords(found)
 
 
-def turning(dataset: xr.Dataset, dims: tuple[Hashable, ...]) -> tuple[str, np.ndarray]:
+def turning(data: LabelledArrays, dims: tuple[str, ...]) -> tuple[str, np.ndarray]:
     """The dimension among `dims` whose entries slide or turn, and which of them turn; of none, an empty name.
 
     Events and impacts are of the kind of their contacts.
     """
-    for dim in (str(dim) for dim in dims):
-        if f"{dim}_motion" in dataset.coords:
-            return dim, np.asarray(dataset[f"{dim}_motion"].values == ROTATION)
-        if f"{dim}_contact" in dataset.coords and "contact_motion" in dataset.coords:
-            turns = set(dataset["contact"].values[dataset["contact_motion"].values == ROTATION].tolist())
-            return dim, np.array([name in turns for name in dataset[f"{dim}_contact"].values.tolist()], dtype=bool)
+    for dim in dims:
+        if f"{dim}_motion" in data.coords:
+            return dim, np.asarray(data[f"{dim}_motion"].values == ROTATION)
+        if f"{dim}_contact" in data.coords and "contact_motion" in data.coords:
+            turns = set(data["contact"].values[data["contact_motion"].values == ROTATION].tolist())
+            return dim, np.array([name in turns for name in data[f"{dim}_contact"].values.tolist()], dtype=bool)
     return "", np.zeros(0, dtype=bool)

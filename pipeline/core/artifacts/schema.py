@@ -7,17 +7,21 @@ reads one may rely on this page.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from flexclear.pipeline.core.artifacts.coordinates import AXES, COORDINATES, QUATERNION, turning, with_names
 from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, of
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.variable import Schema, Variable
 from flexclear.pipeline.core.version import DISTRIBUTION, version
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 __all__ = [
     "AXES",
@@ -35,11 +39,13 @@ __all__ = [
     "Schema",
     "Variable",
     "conform",
+    "conformed",
     "incomplete",
     "require_complete",
 ]
 
 CONVENTIONS = "CF-1.11"
+AnyRun = TypeVar("AnyRun", "xr.Dataset", LabelledArrays)
 _V = Variable
 
 #: stage 4: one run
@@ -319,57 +325,65 @@ _MAY_BE_OPEN = ("event_", "impact_")
 
 
 def conform(dataset: xr.Dataset, schema: Schema, *, title: str, **attributes: str | int | float) -> xr.Dataset:
-    """`dataset` with units, long names and coordinates of `schema`; ValueError where it differs.
+    """What `conformed` gives, of a dataset."""
+    return conformed(of(dataset), schema, title=title, **attributes).to_xarray()
+
+
+def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes: str | int | float) -> LabelledArrays:
+    """`data` with units, long names and coordinates of `schema`; ValueError where it differs.
 
     Every mandatory variable must be there with its dimensions; nothing undeclared may be. The attribute `units` is that
     of all entries; where some slide and others turn, the coordinate `<variable>_units` has the one of each instead.
     title: of the dataset, in words.
     """
-    missing = [n for n, v in schema.items() if not v.optional and n not in dataset.variables]
-    unknown = [str(n) for n in dataset.data_vars if n not in schema]
-    unknown += [str(n) for n in dataset.coords if n not in schema and n not in COORDINATES and not _is_unit(str(n))]
+    missing = [n for n, v in schema.items() if not v.optional and n not in data]
+    unknown = [n for n in data if n not in schema]
+    unknown += sorted(n for n in data.coords if n not in schema and n not in COORDINATES and not _is_unit(n))
     if missing or unknown:
         raise ValueError(f"artifact lacks {missing} and has undeclared {unknown}")
-    result = with_names(dataset)
-    for name in [str(n) for n in result.variables if not _is_unit(str(n))]:
-        variable, values = schema.get(name) or COORDINATES[name], result.variables[name]
-        if values.dims != variable.dims:
-            raise ValueError(f"{name} has dimensions {values.dims}, not {variable.dims}")
-        if values.dtype.kind == "f" and not name.startswith(_MAY_BE_OPEN) and not np.isfinite(values.values).all():
+    data = with_names(data)
+    found, units_of = dict(data.variables), dict[str, LabelledArray]()
+    for name, array in data.variables.items():
+        if _is_unit(name):
+            continue
+        variable = schema.get(name) or COORDINATES[name]
+        if array.dims != variable.dims:
+            raise ValueError(f"{name} has dimensions {array.dims}, not {variable.dims}")
+        if array.values.dtype.kind == "f" and not name.startswith(_MAY_BE_OPEN) and not np.isfinite(array.values).all():
             raise ValueError(f"{name} holds values that are not finite")
-        units, mixed = _units(result, name, variable)
-        values.attrs = ({"units": units} if units else {}) | {"long_name": variable.long_name}
+        units, mixed = _units(data, name, variable)
+        told = ({"units": units} if units else {}) | {"long_name": variable.long_name}
+        found[name] = replace(array, attrs=told)
         if mixed is not None:
-            result = result.assign_coords({f"{name}_units": mixed})
-    result = result.set_coords([name for name in _NAMING if name in result])
+            units_of[f"{name}_units"] = mixed
     made = {"Conventions": CONVENTIONS, "title": title, "source": f"{DISTRIBUTION} {version()}"}
-    result.attrs = made | attributes
-    return result
+    coords = data.coords | units_of.keys() | (set(_NAMING) & found.keys())
+    return LabelledArrays(found | units_of, frozenset(coords), made | attributes)
 
 
 def _is_unit(name: str) -> bool:
     return name.endswith("_units")
 
 
-def _units(dataset: xr.Dataset, name: str, variable: Variable) -> tuple[str, xr.Variable | None]:
+def _units(data: LabelledArrays, name: str, variable: Variable) -> tuple[str, LabelledArray | None]:
     """The unit of all entries, or none and the unit of each."""
     if not variable.turning:
         return variable.units, None
-    dim, turns = turning(dataset, variable.dims)
+    dim, turns = turning(data, variable.dims)
     if not turns.any():
         return variable.units, None
     if turns.all():
         return variable.turning, None
     each, words = np.where(turns, variable.turning, variable.units), {"long_name": f"units of {name}"}
-    return "", xr.Variable(dim, each, words)
+    return "", LabelledArray((dim,), each, words)
 
 
-def incomplete(run: xr.Dataset, why: str) -> xr.Dataset:
+def incomplete(run: AnyRun, why: str) -> AnyRun:
     """What there is of a run that was stopped, marked: attributes `complete` (0), `stopped_at` [s] and `stopped_by`."""
     return run.assign_attrs(complete=0, stopped_at=float(run["time"].values[-1]), stopped_by=why)
 
 
-def require_complete(run: xr.Dataset, what: str = "the run") -> None:
+def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") -> None:
     """InputError for what is left of a run that was stopped, which is no result."""
     if not run.attrs.get("complete", 1):
         raise InputError(

@@ -38,7 +38,9 @@ from flexclear.pipeline.core.errors import ResourceError, shown
 if TYPE_CHECKING:
     import xarray as xr
 
-    Product = Mapping[str, xr.Dataset | bytes]
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+
+    Product = Mapping[str, xr.Dataset | LabelledArrays | bytes]
 
 #: part of a stage (those of sweeps are folders in folders), key or file of an artifact: no way to another folder
 _PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
@@ -48,14 +50,12 @@ MAIN = "nc"
 FAMILY = "family"
 #: attributes of the main file that a command tells, without opening the file
 TOLD = ("warnings", "accuracy_verdict")
-#: bytes of a dataset from which on room on the disk counts for more than time
-COMPRESSED = 1 << 26
 #: lies beside what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
 #: what this process has written last and read back, by its sha256, until it is loaded
-_READ_BACK: dict[str, xr.Dataset] = {}
+_READ_BACK: dict[str, LabelledArrays] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -129,11 +129,15 @@ class Store:
         return record
 
     def load(self, record: Record) -> xr.Dataset:
-        """The main file as a Dataset in memory. The bytes that were checked are those that are parsed.
+        """The main file as a Dataset in memory: what `arrays` gives."""
+        return self.arrays(record).to_xarray()
+
+    def arrays(self, record: Record) -> LabelledArrays:
+        """The main file in memory. The bytes that were checked are those that are parsed.
 
         The last one that this process has written was parsed already; that is given once.
         """
-        import xarray as xr
+        from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
         content = read_whole(path)
@@ -143,7 +147,7 @@ class Store:
         if written is not None:
             return written
         try:
-            return xr.load_dataset(content, engine="netcdf4", decode_times=False)
+            return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
             raise ResourceError(f"{self._shown(path)} holds no dataset ({shown(str(error))}); remove it") from None
 
@@ -178,7 +182,7 @@ class Store:
             system.replace(target, aside)
             self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
 
-    def show_partial(self, dataset: xr.Dataset, folder: str, name: str) -> Path | None:
+    def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Put what is left of work that was stopped beside what is shown; its path, where anything is shown.
 
         It is no artifact, and `show` takes it away.
@@ -299,35 +303,30 @@ def _attributes(product: Product) -> Mapping[str, object]:
     return getattr(product.get(MAIN), "attrs", {})
 
 
-def write_dataset(path: Path, dataset: xr.Dataset) -> str:
+def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     """Write NetCDF-4 atomically, read back and compared before it takes its name; returns its sha256.
 
-    What was read is kept for `Store.load`, until the next one is written.
-    Equal datasets give equal bytes: no times or names of this machine.  Numeric arrays carry fletcher32 sums, so that
-    other programs notice damage too; they are compressed from `COMPRESSED` bytes on, since what a run records has few
-    digits to spare: deflating it takes longer than making it, and leaves half of it.
+    What was read is kept for `Store.arrays`, until the next one is written.
+    Equal datasets give equal bytes: no times or names of this machine.
     """
-    import netCDF4  # noqa: F401 - what `engine` names: its version is a fact of every key
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts import netcdf  # here, since what finds everything fresh writes nothing
+    from flexclear.pipeline.core.artifacts.labelled import of
 
-    packed: dict[str, object] = {"fletcher32": True}
-    if dataset.nbytes >= COMPRESSED:
-        packed |= {"zlib": True, "complevel": 1, "shuffle": True}
-    encoding = {str(n): packed for n, v in dataset.variables.items() if v.ndim and v.size and v.dtype.kind in "fiu"}
+    data = of(dataset)
     with temporary(path) as made:
         try:
-            dataset.to_netcdf(made, engine="netcdf4", encoding=encoding)
+            netcdf.write(made, data)
         except (OSError, RuntimeError) as error:
             # the HDF5 library has no or a wrong name for a full disk; plain bytes get the true reason
-            made.write_bytes(bytes(dataset.nbytes + 2**20))
+            made.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         content = made.read_bytes()
-        read = xr.load_dataset(content, engine="netcdf4", decode_times=False)
-        if not read.equals(dataset):
+        read = netcdf.read(content)
+        if not netcdf.same(read, data):
             raise OSError(errno.EIO, "what was written does not read back", str(path))
         settle(made, path)
     digest = sha256(content)
     _READ_BACK.clear()
-    if read.nbytes < COMPRESSED:
+    if data.nbytes < netcdf.COMPRESSED:
         _READ_BACK[digest] = read
     return digest

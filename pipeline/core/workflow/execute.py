@@ -10,7 +10,7 @@ from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.workflow import journal, opened
 from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key, reasons
+from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order, key, reasons
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
-            data = {name: store.load(above) for name, above in inputs.items()}
+            load = store.arrays if hasattr(run, ARRAYS) else store.load
+            data = {name: load(above) for name, above in inputs.items()}
             begun = store.path(task.stage, key(_with_files(task, known, store)), "part")
             from threadpoolctl import threadpool_limits  # here, since what is fresh needs no BLAS
 

@@ -4,17 +4,30 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from json.encoder import encode_basestring
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, library_versions
 
 #: libraries that every artifact passes through on its way to disk
 STORE = "flexclear.pipeline.core.artifacts.store"
+#: attribute of functions that `given_arrays` marks
+ARRAYS = "given_arrays"
 #: made once: `json.dumps` with options makes one for every value
 _JSON = json.JSONEncoder(ensure_ascii=False, default=str)
+
+
+Stage = TypeVar("Stage", bound=Callable[..., Any])
+
+
+def given_arrays(run: Stage) -> Stage:
+    """Marks the function of a stage that is given its inputs as `LabelledArrays`, not as datasets of xarray."""
+    setattr(run, ARRAYS, True)
+    return run
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +111,29 @@ def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
     """
+    found: list[tuple[str, str]] = []
+    _gather(node, place, found)
+    return found
+
+
+def _gather(node: Any, place: str, found: list[tuple[str, str]]) -> None:
+    """`flatten` into a list: a report has tens of thousands of leaves."""
+    kind = type(node)
+    if kind is str:
+        found.append((place, encode_basestring(node)))
+        return
+    if kind is float and math.isfinite(node):
+        found.append((place, repr(node)))
+        return
     if isinstance(node, Mapping) and node:
         items = [(str(name), value) for name, value in node.items()]
-    elif isinstance(node, (list, tuple)) and any(isinstance(x, (Mapping, list, tuple)) for x in node):
+    elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
         items = [(str(n), value) for n, value in enumerate(node)]
     else:
-        return [(place, _JSON.encode(node))]
-    return [leaf for name, value in items for leaf in flatten(value, f"{place}.{name}".lstrip("."))]
+        found.append((place, _JSON.encode(node)))
+        return
+    for name, value in items:
+        _gather(value, f"{place}.{name}" if place else name.lstrip("."), found)
 
 
 def reasons(new: Mapping[str, str], last: Mapping[str, str] | None, unknown: frozenset[str] = frozenset()) -> list[str]:

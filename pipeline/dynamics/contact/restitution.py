@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from flexclear.pipeline.core.roots import root_between
+
 #: nearest to 1 that psi(-y) may come; beyond it 1 - y is rounding
 NEAREST = 1.0 - 2.0**-53
 #: below this the first term of the series, e = 1 - 2 a / 3, is as exact as a root of differences of rounding size
@@ -52,9 +54,7 @@ def factor(e: float) -> float:
 
 def _root(f: Callable[[float], float], low: float, high: float) -> float:
     """Root of f between two arguments where it has other signs, to rounding."""
-    from scipy.optimize import brentq  # slow to import, and scenes without such a law do without
-
-    return float(brentq(f, low, high, xtol=1e-300, rtol=1e-15))
+    return root_between(f, low, high, xtol=1e-300, rtol=1e-15)
 
 
 def linear_delivered(zeta: float) -> float:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
@@ -18,6 +17,9 @@ from flexclear.pipeline.dynamics.model.interface_basis import (
 )
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def fill(numbering: Numbering) -> dict[Any, Any]:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
+from flexclear.pipeline.core.sparse_graphs import components
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: a shape or moment below this share of the largest of its kind is rounding, not coupling
@@ -82,10 +82,7 @@ def basis(motions: np.ndarray, stiffness: np.ndarray) -> InterfaceBasis:
     Modes that move frames in different ways, as in bending and in torsion, are not mixed.
     """
     held, moving, n = list[np.ndarray](), list[np.ndarray](), len(stiffness)
-    shared = csr_array((np.abs(motions).T @ np.abs(motions)) > 0.0)
-    families, family_of = connected_components(shared, directed=False)
-    for family in range(families):
-        modes = np.flatnonzero(family_of == family)
+    for modes in components((np.abs(motions).T @ np.abs(motions)) > 0.0):
         for kind, columns in zip((held, moving), _family(motions[:, modes], stiffness[modes]), strict=True):
             for column in columns.T:
                 kind.append(np.zeros(n))

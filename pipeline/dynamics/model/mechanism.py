@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import Clearance
@@ -29,6 +28,9 @@ from flexclear.pipeline.dynamics.model.merge import (
 from flexclear.pipeline.dynamics.model.start_table import given_modes
 from flexclear.pipeline.dynamics.model.stops import STOP, End, ends
 from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: share of the largest radius of gyration below which the distances of a scene are no size of it
 NOTHING = 1e-9

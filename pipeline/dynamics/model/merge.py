@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.pipeline.core.scene.schema import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 GROUND = "ground"
 

@@ -264,10 +264,10 @@ def _without_mass(own: np.ndarray, even: np.ndarray) -> np.ndarray | None:
     scaled = even / np.outer(sizes, sizes) if sizes.all() else np.zeros_like(even)
     if not np.linalg.eigvalsh(scaled)[0] > WEIGHTLESS:
         return None  # of links within a joint, which have no mass, in a singular pose: the engine says so
-    from scipy.linalg import eigh  # slow to import, and few links are looked at
-
-    values, vectors = eigh(own / np.outer(sizes, sizes), scaled)
-    return vectors[:, 0] / sizes if values[0] <= WEIGHTLESS else None
+    # own v = value scaled v, by Cholesky's factor: scaled = L L^T, v = L^-T w (scipy.linalg is slow to import)
+    back = np.linalg.inv(np.linalg.cholesky(scaled)).T
+    values, vectors = np.linalg.eigh(back.T @ (own / np.outer(sizes, sizes)) @ back)
+    return back @ vectors[:, 0] / sizes if values[0] <= WEIGHTLESS else None
 
 
 def _refuse_motion(model: Model, twists: np.ndarray) -> None:

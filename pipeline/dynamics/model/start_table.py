@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import suggestion
@@ -14,6 +14,9 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.units import quantity
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.core.sparse_graphs import reverse_cuthill_mckee
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import arrays, flexible_bodies
 from flexclear.pipeline.dynamics.model.couplings import Coupling
@@ -130,11 +131,7 @@ def _order(supports: list[set[int]]) -> list[int]:
     n = len(supports)
     if n < 2:
         return list(range(n))
-    from scipy.sparse import csr_array  # slow to import, and open mechanisms need none of it
-    from scipy.sparse.csgraph import reverse_cuthill_mckee
-
-    graph = np.array([[bool(a & b) for b in supports] for a in supports], dtype=float)
-    return [int(k) for k in reverse_cuthill_mckee(csr_array(graph), symmetric_mode=True)]
+    return reverse_cuthill_mckee(np.array([[bool(a & b) for b in supports] for a in supports]))
 
 
 def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
-from flexclear.pipeline.core.artifacts.schema import RUN, conform
+from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
+from flexclear.pipeline.core.artifacts.schema import RUN, conformed
 from flexclear.pipeline.core.citations import cited
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
@@ -29,11 +30,19 @@ from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 Part = tuple[Variables, dict[str, object]]  #: variables and coordinates
 
 
 def dataset(run: Run) -> xr.Dataset:
+    """All that is recorded of a run (schema RUN), as a dataset."""
+    return recorded(run).to_xarray()
+
+
+def recorded(run: Run) -> LabelledArrays:
     """All that is recorded of a run (schema RUN)."""
     model, trajectory, seen = run.model, run.trajectory, run.observed
     motions = Motions(model, seen)
@@ -74,8 +83,8 @@ def dataset(run: Run) -> xr.Dataset:
     for part in parts:
         variables |= part[0]
         coordinates |= part[1]
-    made = xr.Dataset(variables, coords=coordinates)
-    return conform(made, RUN, title=f"Motion of {subject(run.scene)}", **attributes(run.scene), **_report(run))
+    title, told = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
+    return conformed(labelled(variables, coordinates), RUN, title=title, **told)
 
 
 def subject(scene: Scene) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.artifacts.points import Point, Values
@@ -30,6 +30,9 @@ from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallo
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: where nothing is kept of the way, the ledger of energy is looked at so often
 LOOKS = 50

@@ -14,15 +14,18 @@ Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (m
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.algebra import first_largest, skew
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from functools import cache
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.drives import PathDrive
@@ -15,6 +14,9 @@ from flexclear.pipeline.dynamics.effects import scheme_of
 from flexclear.pipeline.dynamics.model.refill import refilled
 from flexclear.pipeline.dynamics.run.engine import Engine, assemble
 from flexclear.pipeline.dynamics.run.run import engine_of, engines
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def engines_alike(

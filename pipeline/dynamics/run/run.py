@@ -8,7 +8,6 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.progress import Progress
@@ -33,6 +32,8 @@ from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 
 if TYPE_CHECKING:
+    import xarray as xr
+
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
 
 

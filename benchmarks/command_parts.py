@@ -1,0 +1,85 @@
+"""Processor time of one command, told apart by what it goes into: ``python -m benchmarks.command_parts run SCENE``.
+
+In a process of its own, since imports are a part of it. The last line of its output is a table as JSON: part ->
+seconds; a part has none of the time of the parts inside of it.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Mapping
+from functools import wraps
+from importlib import _bootstrap
+from typing import Any
+
+IMPORTS, REST = "imports", "rest"
+_CORE, _RUN = "flexclear.pipeline.core", "flexclear.pipeline.dynamics"
+#: functions by module -> the part that they are
+PARTS: Mapping[str, Mapping[str, str]] = {
+    f"{_CORE}.scene.load": {"load_scene": "scene"},
+    f"{_CORE}.workflow.task": {"facts": "keys", "key": "keys"},
+    f"{_CORE}.artifacts.store": {"Store.find": "keys", "write_dataset": "writing"},
+    f"{_RUN}.run.engine": {"prepare": "assembling"},
+    f"{_RUN}.model.model": {"tabulate": "assembling"},
+    f"{_RUN}.run.trajectory": {"integrate": "integrating"},
+    f"{_RUN}.run.run": {"observed": "recording"},
+    f"{_RUN}.record.dataset": {"recorded": "recording"},
+    "flexclear.pipeline.post.series": {"derived": "deriving"},
+}
+_spent: dict[str, float] = {}
+_inside: list[float] = []
+
+
+def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """The function, whose own time is added to a part."""
+
+    @wraps(function)
+    def called(*arguments: Any, **named: Any) -> Any:
+        begun = time.process_time()
+        _inside.append(0.0)
+        try:
+            return function(*arguments, **named)
+        finally:
+            whole, below = time.process_time() - begun, _inside.pop()
+            _spent[part] = _spent.get(part, 0.0) + whole - below
+            if _inside:
+                _inside[-1] += whole
+
+    return called
+
+
+def listen() -> None:
+    """From now on imports are timed, and the functions of `PARTS` as soon as their modules are there."""
+    find_and_load = timed(IMPORTS, _bootstrap._find_and_load)  # type: ignore[attr-defined]
+
+    def loaded(name: str, import_: Any) -> Any:
+        found = find_and_load(name, import_)
+        for place, part in PARTS.get(name, {}).items():
+            holder, _, attribute = place.rpartition(".")
+            owner = getattr(found, holder) if holder else found
+            function = getattr(owner, attribute)
+            if not hasattr(function, "__wrapped__"):
+                setattr(owner, attribute, timed(part, function))
+        return found
+
+    _bootstrap._find_and_load = loaded  # type: ignore[attr-defined]
+
+
+def main(arguments: list[str]) -> int:
+    """Run the command, and tell its parts."""
+    started = time.process_time()
+    listen()
+    from flexclear.stages.__main__ import main as command
+
+    code = command(arguments)
+    whole = time.process_time()
+    _spent["interpreter"] = started
+    _spent[REST] = whole - sum(_spent.values())
+    print(json.dumps(_spent))
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,127 @@
+"""Whole commands from the shell, and points of a loop in Python: what is spent around the integration."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from benchmarks.command_parts import IMPORTS, REST
+from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.page import Columns, spread, table
+from benchmarks.timing import interleaved
+from flexclear.pipeline.core.artifacts.paths import TREE, results_root
+
+ROUNDS = 5
+#: parts as they stand in the table; what is not there is in the rest
+SHOWN = ("interpreter", IMPORTS, "scene", "keys", "assembling", "integrating", "recording", "writing", "deriving", REST)
+LOOP = """import sys, time
+import flexclear as fc
+scene, times = fc.load_scene(sys.argv[1]), []
+for k in range(8):
+    begun = time.process_time()
+    fc.run(fc.edited(scene, {sys.argv[2]: float(sys.argv[3]) * (1.0 + 1e-6 * k)}))
+    times.append(time.process_time() - begun)
+print(sorted(times)[4])"""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command: arguments, in which ``{}`` is a number that is another one each time.
+
+    value: that number, about.  own: whether it works on the project's results instead of on empty ones.
+    loop: whether it is a loop over `flexclear.run` in Python, of which one point is told.
+    """
+
+    arguments: tuple[str, ...]
+    value: float = 0.0
+    own: bool = False
+    loop: bool = False
+
+
+_CSJ, _IDEAL = "scenes/sps4/csj.toml", "scenes/sps4/ideal.toml"
+_CLEARANCE, _MASS = ("joint.A1.clearance", 0.0005), ("body.platform.mass", 0.31)
+COMMANDS: Mapping[str, Command] = {
+    "run csj, a changed number": Command(("run", "-q", _CSJ, "--set", f"{_CLEARANCE[0]}={{}}"), _CLEARANCE[1]),
+    "run ideal, a changed number": Command(("run", "-q", _IDEAL, "--set", f"{_MASS[0]}={{}}"), _MASS[1]),
+    "run csj, nothing changed": Command(("run", "-q", _CSJ)),
+    "check csj": Command(("check", _CSJ)),
+    "report of the paper, nothing changed": Command(("report", "-q"), own=True),
+    "a point of a loop over csj": Command((_CSJ, _CLEARANCE[0], "{}"), _CLEARANCE[1], loop=True),
+    "a point of a loop over ideal": Command((_IDEAL, _MASS[0], "{}"), _MASS[1], loop=True),
+}
+
+
+def measure(cases: Sequence[Case], jobs: int) -> Measured:
+    """A record for each command; they take turns. Bytecode is kept, as an installed program has it."""
+    with TemporaryDirectory() as folder:
+        fresh = (1.0 + 1e-7 * k for k in itertools.count())
+        times = interleaved({case.name: _timed(COMMANDS[case.name], Path(folder), fresh) for case in cases}, ROUNDS)
+        for case in cases:
+            command = COMMANDS[case.name]
+            parts = {} if command.loop else json.loads(_run(command, Path(folder), fresh, "benchmarks.command_parts"))
+            shares = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
+            yield case, [{"cpu": times[case.name].told("s"), "parts": shares}]
+
+
+def _timed(command: Command, folder: Path, fresh: Iterator[float]) -> Callable[[], float]:
+    def seconds() -> float:
+        if command.loop:
+            return float(_run(command, folder, fresh))
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        _run(command, folder, fresh)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+    return seconds
+
+
+def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "flexclear") -> str:
+    """The last line that a command says."""
+    program = ["-c", LOOP] if command.loop else ["-m", module]
+    arguments = [text.format(repr(command.value * next(fresh))) for text in command.arguments]
+    results = results_root() if command.own else folder / "results"
+    environment = {**os.environ, "FLEXCLEAR_RESULTS": str(results), "PYTHONPYCACHEPREFIX": str(folder / "bytecode")}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    done = subprocess.run(
+        [sys.executable, *program, *arguments],
+        cwd=TREE,
+        env=environment,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        check=True,
+    )
+    return done.stdout.splitlines()[-1]
+
+
+def show(records: list[Record]) -> str:
+    """The table: seconds of the processor, and what they go into in milliseconds."""
+    columns: Columns = {
+        "command": lambda r: r["case"],
+        "CPU [s]": lambda r: spread(r["cpu"], "s", 2),
+        **{f"{part} [ms]": lambda r, part=part: _told(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
+    }
+    return table(records, columns)
+
+
+def _told(parts: Mapping[str, float], part: str) -> str:
+    return f"{1e3 * parts[part]:.0f}" if parts.get(part) else ""
+
+
+FAMILY = Family(
+    what="seconds of whole commands, and what they go into",
+    takes="1 min, and what is stale of the report",
+    page="benchmarks.md",
+    cases=lambda: [Case(name) for name in COMMANDS],
+    measure=measure,
+    show=show,
+    quick="check csj",
+)

@@ -1,0 +1,140 @@
+"""NetCDF-4 files of labelled arrays, byte by byte as xarray writes them: the one writer and the one reader.
+
+What xarray keeps beside NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
+kept as bytes with the attribute `dtype`, and floats have NaN for what was never written.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays
+
+#: bytes of a dataset from which on room on the disk counts for more than time
+COMPRESSED = 1 << 26
+_LOCK = Lock()
+_COORDINATES, _BOOL, _FILL = "coordinates", {"dtype": "bool"}, "_FillValue"
+
+
+def write(path: Path, data: LabelledArrays) -> None:
+    """Write a file; OSError or RuntimeError of the library where it cannot.
+
+    Numeric arrays carry fletcher32 sums, so that other programs notice damage too; they are compressed from
+    `COMPRESSED` bytes on, since what a run records has few digits to spare: deflating it takes longer than making it,
+    and leaves half of it.
+    """
+    import netCDF4
+
+    listed, whole = _listed(data)
+    compress = data.nbytes >= COMPRESSED
+    with _alone(), netCDF4.Dataset(path, "w", format="NETCDF4") as file:
+        for name, value in {**data.attrs, **whole}.items():
+            _set_attribute(file, name, value)
+        for dim, length in data.sizes.items():
+            file.createDimension(dim, length)
+        for name, array in data.variables.items():
+            _write_variable(file, name, array, listed.get(name, {}), compress)
+
+
+@contextlib.contextmanager
+def _alone() -> Iterator[None]:
+    """The library is not made for threads: one at a time, and none of those in which xarray uses it."""
+    loaded = sys.modules.get("xarray.backends.netCDF4_")
+    with _LOCK, loaded.NETCDF4_PYTHON_LOCK if loaded is not None else contextlib.nullcontext():
+        yield
+
+
+def _write_variable(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str], compress: bool) -> None:
+    values, kind = array.values, array.values.dtype.kind
+    truth = _BOOL if kind == "b" else {}
+    kept = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
+    numeric = bool(values.ndim and values.size and kind in "fiu")
+    variable = file.createVariable(
+        name,
+        kept,
+        array.dims,
+        zlib=numeric and compress,
+        complevel=1 if numeric and compress else 4,
+        shuffle=True,
+        fletcher32=numeric,
+        fill_value=values.dtype.type(np.nan) if kind == "f" else None,
+    )
+    variable.setncatts({**array.attrs, **listed, **truth})
+    variable.set_auto_maskandscale(False)
+    # of texts the library takes objects alone
+    variable[...] = values.astype(object) if kind == "U" else values.astype("i1") if truth else values
+
+
+def _set_attribute(file: Any, name: str, value: Any) -> None:
+    texts = isinstance(value, (list, tuple)) and len(value) and all(isinstance(one, str) for one in value)
+    (file.setncattr_string if texts else file.setncattr)(name, value)
+
+
+def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
+    """The attribute `coordinates` of each array, and that of the file for those that no array has all dimensions of."""
+    beside = sorted(data.coords - data.sizes.keys())
+    found, left = dict[str, dict[str, str]](), set(beside)
+    for name, array in data.variables.items():
+        if name in beside or name in array.dims:
+            continue
+        own = [other for other in beside if set(data[other].dims) <= set(array.dims)]
+        if own:
+            found[name] = {_COORDINATES: " ".join(own)}
+            left -= set(own)
+    return found, {_COORDINATES: " ".join(sorted(left))} if left else {}
+
+
+def read(content: bytes) -> LabelledArrays:
+    """The arrays in the bytes of a file.
+
+    Raises OSError, ValueError, RuntimeError or TypeError for other bytes.
+    """
+    import netCDF4
+
+    with _alone(), netCDF4.Dataset("in memory", memory=content) as file:
+        file.set_auto_maskandscale(False)
+        attrs = {name: file.getncattr(name) for name in file.ncattrs()}
+        coords = {name for name in file.variables if name in file.dimensions} | set(_words(attrs))
+        variables = {}
+        for name, variable in file.variables.items():
+            own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
+            coords |= set(_words(own))
+            values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
+            if own.get("dtype") == "bool":
+                del own["dtype"]
+                values = values.astype(bool)
+            variables[name] = LabelledArray(variable.dimensions, values, own)
+    return LabelledArrays(variables, frozenset(coords & variables.keys()), attrs)
+
+
+def _words(attrs: dict[str, Any]) -> list[str]:
+    """The coordinates that attributes list, which are then taken away."""
+    return str(attrs.pop(_COORDINATES, "")).split()
+
+
+def same(one: LabelledArrays, other: LabelledArrays) -> bool:
+    """Whether two have the same arrays with the same names, dimensions and values, to the last bit."""
+    if one.coords != other.coords or one.variables.keys() != other.variables.keys():
+        return False
+    return all(array.dims == other[name].dims and _equal(array, other[name]) for name, array in one.variables.items())
+
+
+def _equal(one: LabelledArray, other: LabelledArray) -> bool:
+    a, b = one.values, other.values
+    if a.shape != b.shape:
+        return False
+    if a.dtype.kind in "OU":
+        return bool(np.all(a == b))
+    # as bytes: not a number is what it was
+    return a.dtype == b.dtype and bool(np.array_equal(_bytes(a), _bytes(b)))
+
+
+def _bytes(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values).reshape(-1).view(np.uint8)

@@ -1,0 +1,86 @@
+"""Files of labelled arrays are those that xarray writes and reads, byte by byte, since users meet them with xarray."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline.core.artifacts import netcdf
+from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, labelled, of
+
+
+def everything() -> xr.Dataset:
+    """All types of values, texts that are no ASCII, empty dimensions, and coordinates of every kind."""
+    return xr.Dataset(
+        {
+            "position": (("time", "body"), np.arange(12.0).reshape(4, 3), {"units": "m", "long_name": "place"}),
+            "closed": (("time",), np.array([True, False, True, True]), {"long_name": "whether closed"}),
+            "any_closed": ((), np.array(True)),
+            "speed": (("time",), np.array([1.0, np.nan, -0.0, np.inf])),
+            "rank": (("time",), np.arange(4, dtype=np.int32)),
+            "count": (("body",), np.arange(3)),
+            "single": (("time",), np.ones(4, dtype=np.float32)),
+            "small": (("time",), np.arange(4, dtype=np.uint8)),
+            "word": ((), "loose"),
+            "law": (("body",), ["Hertz", "Flores é µ", ""]),
+            "event_kind": (("event",), np.zeros(0, dtype="U1")),
+            "event_time": (("event",), np.zeros(0)),
+        },
+        coords={
+            "time": ("time", np.arange(4) * 1e-4, {"units": "s"}),
+            "body": ["ball", "rod", "platform"],
+            "body_kind": ("body", ["rigid", "flexible", "rigid"]),
+            "alone": ("nowhere_else", np.arange(2)),
+            "start": 1.5,
+        },
+        attrs={"title": "µ", "evaluations": 12, "share": 0.25, "list": ["a", "b"], "numbers": np.arange(3)},
+    )
+
+
+def by_xarray(path: Path, data: xr.Dataset) -> bytes:
+    """The bytes that xarray writes with the same sums."""
+    packed: dict[str, object] = {"fletcher32": True}
+    if data.nbytes >= netcdf.COMPRESSED:
+        packed |= {"zlib": True, "complevel": 1}
+    encoding = {str(n): packed for n, v in data.variables.items() if v.ndim and v.size and v.dtype.kind in "fiu"}
+    data.to_netcdf(path, engine="netcdf4", encoding=encoding)
+    return path.read_bytes()
+
+
+@pytest.mark.parametrize("bound", [netcdf.COMPRESSED, 0], ids=["plain", "compressed"])
+def test_files_are_those_of_xarray(bound: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(netcdf, "COMPRESSED", bound)
+    netcdf.write(tmp_path / "ours.nc", of(everything()))
+    assert (tmp_path / "ours.nc").read_bytes() == by_xarray(tmp_path / "theirs.nc", everything())
+
+
+def test_what_is_read_is_what_xarray_reads(tmp_path: Path) -> None:
+    content = by_xarray(tmp_path / "theirs.nc", everything())
+    found, theirs = netcdf.read(content), xr.load_dataset(content, engine="netcdf4", decode_times=False)
+    assert found.to_xarray().identical(theirs)
+    assert list(found.variables) == list(theirs.variables)
+    assert [array.values.dtype for array in found.variables.values()] == [v.dtype for v in theirs.variables.values()]
+
+
+def test_every_difference_is_seen() -> None:
+    whole = of(everything())
+    assert netcdf.same(whole, of(everything()))
+    for name, array in whole.variables.items():
+        if array.values.size:
+            values = array.values.copy()
+            values[(0,) * values.ndim] = "other" if values.dtype.kind in "OU" else not values.flat[0]
+            other = LabelledArrays({**whole.variables, name: LabelledArray(array.dims, values)}, whole.coords)
+            assert not netcdf.same(whole, other), name
+        less = {key: one for key, one in whole.variables.items() if key != name}
+        assert not netcdf.same(whole, LabelledArrays(less, whole.coords & less.keys())), name
+    # signs of zero, and bits of what is no number, are values, too
+    one, minus = (labelled({"x": (("t",), np.array([zero]))}, {}) for zero in (0.0, -0.0))
+    assert not netcdf.same(one, minus)
+
+
+def test_arrays_of_one_dimension_are_of_one_length() -> None:
+    with pytest.raises(ValueError, match="x has the shape"):
+        labelled({"x": (("t",), np.zeros(2)), "y": (("t",), np.zeros(3))}, {})
