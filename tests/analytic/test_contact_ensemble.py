@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from functools import cache
 from pathlib import Path
@@ -119,10 +120,10 @@ def test_stacks_are_not_switched_where_the_processor_keeps_a_second_one(tmp_path
 def test_steps_in_a_crew_end_when_one_of_its_members_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others are told at their next pause; nobody waits for ever."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    proper = trajectory._begin_closed
+    proper, begun = trajectory._begin_closed, itertools.count()
 
     def fails(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
-        if threading.current_thread().name.endswith("_2"):
+        if next(begun) == 2:
             raise SolverError("the third")
         proper(engine, y, events)
 
