@@ -243,7 +243,7 @@ def open(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
 
     The path of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that one, under the file's name.
-    Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of this program.
+    Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of a scene.
     """
     return _stages("run").results(scene)
 

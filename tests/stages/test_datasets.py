@@ -159,7 +159,7 @@ def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
         "none": "there is no file",
         "text": "cannot be read",
         "cut": "cannot be read",
-        "other": "none that flexclear",
+        "other": "no scene's",
     }
     for name, words in said.items():
         with pytest.raises(InputError, match=words):

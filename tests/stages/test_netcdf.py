@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -63,6 +65,14 @@ def test_what_is_read_is_what_xarray_reads(tmp_path: Path) -> None:
     assert found.to_xarray().identical(theirs)
     assert list(found.variables) == list(theirs.variables)
     assert [array.values.dtype for array in found.variables.values()] == [v.dtype for v in theirs.variables.values()]
+
+
+def test_files_are_written_while_another_thread_imports_xarray(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By then there is a module, but without its lock."""
+    name = "xarray.backends.netCDF4_"
+    monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    netcdf.write(tmp_path / "a.nc", of(everything()))
+    assert netcdf.same(netcdf.read((tmp_path / "a.nc").read_bytes()), of(everything()))
 
 
 def test_every_difference_is_seen() -> None:

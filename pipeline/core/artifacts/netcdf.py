@@ -46,8 +46,8 @@ def write(path: Path, data: LabelledArrays) -> None:
 @contextlib.contextmanager
 def _alone() -> Iterator[None]:
     """The library is not made for threads: one at a time, and none of those in which xarray uses it."""
-    loaded = sys.modules.get("xarray.backends.netCDF4_")
-    with _LOCK, loaded.NETCDF4_PYTHON_LOCK if loaded is not None else contextlib.nullcontext():
+    theirs = sys.modules.get("xarray.backends.netCDF4_")  # which another thread may just be importing
+    with _LOCK, getattr(theirs, "NETCDF4_PYTHON_LOCK", contextlib.nullcontext()):
         yield
 
 

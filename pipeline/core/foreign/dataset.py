@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 
 
 def read(path: Path) -> xr.Dataset:
-    """The dataset in a file.  Raises InputError for what is none of this program's, and as `apart.read` does."""
+    """The dataset in a file.
+
+    Raises InputError for what is no scene's (a sweep's, another program's), and as `apart.read` does.
+    """
     import xarray as xr
 
     require_file(path, str(path))
@@ -24,7 +27,8 @@ def read(path: Path) -> xr.Dataset:
     except apart.UnreadableError as error:
         raise InputError(str(path), f"cannot be read as a NetCDF dataset: {error}", _REMEDY) from None
     if not str(found["attributes"].get("source")).startswith(f"{DISTRIBUTION} "):
-        raise InputError(str(path), "is a dataset, but none that flexclear has written", _REMEDY)
+        why = "is a dataset, but no scene's: it has no attribute `source` that names flexclear"
+        raise InputError(str(path), why, _REMEDY)
     made = xr.Dataset({name: tuple(variable) for name, variable in found["variables"].items()})
     return made.set_coords(found["coordinates"]).assign_attrs(found["attributes"])
 
