@@ -49,7 +49,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "no kappa in a segment": (
         segmented((0.0, 0.24), section=GENERAL) | {"theory": "timoshenko"},
-        r"shape\.segments\.0\.section: a Timoshenko beam needs the shear coefficient",
+        r"\[shape\.segments\.0\.section\]: a Timoshenko beam needs the shear coefficient",
     ),
     "kappa above one": (
         RECIPE | {"section": CIRCLE | {"shear_coefficient": 1.2}},

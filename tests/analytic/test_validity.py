@@ -12,8 +12,12 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics, load_scene
 from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.run.validity import BENT, SPIN, largest
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.validity import BENT, SPIN, doubts, largest
 from tests.analytic.mechanism_runs import TREE, bundles
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
@@ -76,6 +80,22 @@ def test_a_run_that_ends_as_its_beam_flies_apart_names_the_beam() -> None:
     assert "beam: at t =" in str(refusal.value)
     assert "turns at 8 rad/s, 2.1 of its first frequency" in str(refusal.value)
     assert "stiffening = {}" in str(refusal.value)
+
+
+def test_what_a_rejected_step_tried_is_not_told() -> None:
+    """A run may pause right after one; what is in the work space then is no state of the motion."""
+    scene = load_scene(TREE / "scenes" / "checks" / "swinging_rod.toml")
+    engine = engine_of(scene, bundles(scene), silent)
+    rest = consistent_start(engine)
+    wild = rest.copy()
+    wild[engine.model.nq : engine.model.nq + engine.model.nv] = 1e6
+    engine.attempt(wild, 0.0)
+    assert "it turns at" in " ".join(doubts(engine))
+    engine.view(m.Y)[:] = rest
+    before = engine.w.copy(), engine.n.copy()
+    assert doubts(engine) == []
+    assert np.array_equal(engine.w, before[0], equal_nan=True)
+    assert np.array_equal(engine.n, before[1])
 
 
 def test_the_largest_displacement_is_that_of_all_nodes_and_rows() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import platform
 
 import numpy as np
 import pytest
@@ -19,13 +20,19 @@ from flexclear.pipeline.core.sparse_graphs import components, reverse_cuthill_mc
 
 @given(st.floats(0.01, 30.0), st.floats(0.0, 1.0), st.sampled_from([1e-300, 1e-17, 1e-9]))
 def test_a_root_is_scipys_to_the_last_bit(stretch: float, share: float, xtol: float) -> None:
-    """Flat, steep and ordinary crossings; both take the same steps, so there is no tolerance."""
+    """Flat, steep and ordinary crossings; both take the same steps, so there is no tolerance.
+
+    But where SciPy's compiler may fuse products and sums, as for ARM: there each is as near to the root as is asked.
+    """
 
     def f(x: float) -> float:
         return math.atan(stretch * (x - share)) + 0.1 * (x - share) ** 3
 
     low, high = -1.0, 2.0
-    assert root_between(f, low, high, xtol, 1e-15) == brentq(f, low, high, xtol=xtol, rtol=1e-15, maxiter=1000)
+    found, known = root_between(f, low, high, xtol, 1e-15), brentq(f, low, high, xtol=xtol, rtol=1e-15, maxiter=1000)
+    if platform.machine() in ("x86_64", "AMD64"):
+        assert found == known
+    assert abs(found - known) <= 20.0 * (xtol + 1e-15 * abs(known))  # on either side of it by once that
 
 
 def test_a_root_at_an_end_is_found_and_none_is_told() -> None:

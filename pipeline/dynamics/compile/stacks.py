@@ -19,6 +19,7 @@ import platform
 import sys
 from collections.abc import Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,8 @@ SIZE = 1 << 20
 POINTER, BACK, STATE, GIVEN, TIME, FUNCTION, ARGUMENTS = 0, 1, 2, 3, 9, 10, 11
 #: states: it may go on, it waits for an evaluation, it has come back, there is none
 READY, WAITING, DONE, IDLE = 0, 1, 2, 3
+#: where Linux tells of this process
+STATUS = Path("/proc/self/status")
 #: of mprotect, on every Linux
 NO_ACCESS = 0
 #: words of a crew's table before the addresses of its records: whether its thread is wanted back
@@ -74,8 +77,20 @@ _CODE = {"wait": _WAIT, "resume": _RESUME, "start": _START}
 
 
 def supported() -> bool:
-    """Whether there is code for this processor and system."""
-    return sys.platform.startswith("linux") and platform.machine() == "x86_64"
+    """Whether there is code for this processor and system, and it may be used here."""
+    return sys.platform.startswith("linux") and platform.machine() == "x86_64" and not shadowed(STATUS)
+
+
+def shadowed(status: Path) -> bool:
+    """Whether the processor keeps a second stack of return addresses, beside which no other stack may be gone on with.
+
+    status: what the system tells of a process.
+    """
+    try:
+        told = status.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return False
+    return any(line.startswith("x86_Thread_features:") and "shstk" in line.split() for line in told.splitlines())
 
 
 @cache

@@ -80,7 +80,8 @@ def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
 def doubts(engine: Engine) -> list[str]:
     """The same of the state that the engine's last step came to; the engine is left as it was."""
     before = engine.w.copy(), engine.n.copy()
-    engine.complete()
+    # the last evaluation may be of a step that was rejected, at speeds that the motion never had
+    engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
     sentences = _doubts(engine)
     engine.w[:], engine.n[:] = before
     return sentences
