@@ -226,8 +226,12 @@ def end_with_parent() -> None:
 
 
 def is_parent(process: int) -> bool:
-    """Whether a process is still the parent of this one: Windows goes on telling the number of one that is gone."""
-    return os.getppid() == process and (_windows() is None or alive(process))
+    """Whether a process that has started this one still runs.
+
+    On Windows the parent's number says nothing: it is told of one that is gone, too, and in a virtual environment it is
+    that of a launcher that stands between the two.
+    """
+    return os.getppid() == process if _windows() is None else alive(process)
 
 
 def plain_output() -> None:

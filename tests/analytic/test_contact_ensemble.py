@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import threading
+from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -123,12 +124,25 @@ def test_steps_in_a_crew_end_when_one_of_its_members_fails(monkeypatch: pytest.M
     proper, begun = trajectory._begin_closed, itertools.count()
 
     def fails(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
-        if next(begun) == 2:
+        if next(begun) == 2:  # whichever thread it is in: one that is done with a member takes another
             raise SolverError("the third")
         proper(engine, y, events)
 
     monkeypatch.setattr(trajectory, "_begin_closed", fails)
     with pytest.raises(SolverError, match="the third"):
+        dynamics.ensemble(scene(), {}, silent)
+    assert not [one for one in threading.enumerate() if one.name == "steps side by side"]
+
+
+@pytest.mark.skipif(INTERPRETED or not stacks.supported(), reason="each member takes its own steps here")
+def test_nobody_waits_for_a_crew_whose_thread_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cores, "cores", lambda: 1)
+
+    def none_left(self: stacks.Stacks, k: int, function: int, arguments: Sequence[int]) -> None:
+        raise MemoryError("the first")
+
+    monkeypatch.setattr(stacks.Stacks, "begin", none_left)
+    with pytest.raises(MemoryError, match="the first"):
         dynamics.ensemble(scene(), {}, silent)
     assert not [one for one in threading.enumerate() if one.name == "steps side by side"]
 

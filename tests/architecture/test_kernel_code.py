@@ -9,8 +9,11 @@ import pytest
 from numba import njit
 from numba.core.codegen import CPUCodeLibrary
 
-from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
+from flexclear.pipeline.dynamics.kernels import field_reader, kernel, lowering, row_reader
 from flexclear.pipeline.dynamics.lowering import Part
+
+#: with other releases kernels compile as Numba does it, to the same results
+needs_lowering = pytest.mark.skipif(not lowering(), reason="this release of Numba has not been looked at")
 
 
 def tower() -> tuple[Callable, Callable, Callable]:
@@ -31,6 +34,7 @@ def tower() -> tuple[Callable, Callable, Callable]:
     return low, middle, high
 
 
+@needs_lowering
 def test_what_python_calls_is_optimised_once_however_deep_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     low, middle, high = tower()
     optimised: list[str] = []
@@ -89,6 +93,7 @@ def test_a_kernel_that_one_caller_names_in_vain_is_there_for_another() -> None:
     assert called(1.0) == 6.0
 
 
+@needs_lowering
 def test_tables_are_looked_up_without_a_function_of_their_own() -> None:
     """As the functions of Python do it that debugging runs; h is an array here, and a pointer in what is compiled."""
     h = np.arange(40) % 11
@@ -107,6 +112,7 @@ def test_tables_are_looked_up_without_a_function_of_their_own() -> None:
     assert not hasattr(fields.dispatcher, "overloads")
 
 
+@needs_lowering
 def test_a_kernel_is_compiled_once_for_integers_that_are_written_out() -> None:
     @kernel
     def double(k):

@@ -287,6 +287,16 @@ def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path
         owner.refuse_namesakes(scenes)
 
 
+def test_a_launcher_between_parent_and_child_is_no_end_of_the_parent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python in a virtual environment of Windows is started by one."""
+    parent = os.getppid() + 1
+    assert not system.is_parent(parent)
+    monkeypatch.setattr(system, "_windows", lambda: object())
+    for runs in (True, False):
+        monkeypatch.setattr(system, "alive", lambda process, runs=runs: runs and process == parent)
+        assert system.is_parent(parent) == runs
+
+
 def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) -> None:
     for text in ('body.a.mesh = "..\\meshes\\rod.toml"', 'body.a.mesh = "C:\\users\\rod.toml"'):
         (tmp_path / "a.toml").write_text(text, encoding="utf-8")

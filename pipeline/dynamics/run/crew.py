@@ -43,17 +43,22 @@ class Crew:
         self._places = np.zeros(6 * lanes, np.int64)
         self._table[stacks.HEAD :] = [record.ctypes.data for record in self._stacks.records]
         self._waiting, self._news, self._closed = deque[_Steps](), Condition(), False
+        self._failed: BaseException | None = None
         self._thread = Thread(target=self._work, name="steps side by side", daemon=True)
         self._thread.start()
 
     def advance(self, function: int, arguments: Sequence[int]) -> None:
-        """Let a stepper run until it comes back."""
+        """Let a stepper run until it comes back; raises what ended the crew's thread, if something did."""
         steps = _Steps(function, arguments)
         with self._news:
+            if self._failed is not None:
+                raise self._failed
             self._waiting.append(steps)
             self._table[0] = 1  # calls the compiled code back, which looks at it between two evaluations
             self._news.notify()
         steps.back.wait()
+        if self._failed is not None:
+            raise self._failed
 
     def close(self) -> None:
         """End the thread; nobody asks for steps any more."""
@@ -64,6 +69,16 @@ class Crew:
 
     def _work(self) -> None:
         busy: list[_Steps | None] = [None] * self.lanes
+        try:
+            self._let_run(busy)
+        except BaseException as error:  # for instance no memory: whoever waits is told, instead of waiting for ever
+            with self._news:
+                self._failed = error
+                for steps in [*self._waiting, *filter(None, busy)]:
+                    steps.back.set()
+
+    def _let_run(self, busy: list[_Steps | None]) -> None:
+        """What the thread does: let steppers run as long as the crew is open."""
         states = self._stacks.records[:, stacks.STATE]
         while self._take(busy):
             self._run(self._table.ctypes.data, self._places.ctypes.data, stacks.addresses()["resume"])
@@ -83,8 +98,8 @@ class Crew:
             self._table[0] = 0
             while self._waiting and None in busy:
                 lane, steps = busy.index(None), self._waiting.popleft()
-                self._stacks.begin(lane, steps.function, steps.arguments)
                 busy[lane] = steps
+                self._stacks.begin(lane, steps.function, steps.arguments)
         return True
 
 
