@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -43,6 +44,14 @@ def once(task: Callable[[], object]) -> float:
     begun = time.process_time()
     task()
     return time.process_time() - begun
+
+
+def of_children(task: Callable[[], object]) -> float:
+    """Processor time of the processes that one call starts and waits for, with those that they start [s]."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    task()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:

@@ -8,7 +8,6 @@ machine without other work only; processor time is that of all processes togethe
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -19,6 +18,7 @@ from pathlib import Path
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
+from benchmarks.timing import of_children
 
 SCENES = ("ideal", "csj", "far_csj_cb")
 
@@ -38,9 +38,9 @@ def _first_run(scene: str, folder: Path) -> Record:
         """Seconds of wall and processor time of the command."""
         said = {"FLEXCLEAR_RESULTS": str(results), "FLEXCLEAR_KERNELS": str(kept)}
         command = [sys.executable, "-m", "flexclear", "run", scene, "-q", *more]
-        spent, begun = _processor_time(), time.monotonic()
-        subprocess.run(command, env={**os.environ, **said}, stdout=subprocess.DEVNULL, check=True)
-        return time.monotonic() - begun, _processor_time() - spent
+        begun, environment = time.monotonic(), {**os.environ, **said}
+        spent = of_children(lambda: subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=True))
+        return time.monotonic() - begun, spent
 
     run(kernels[0], "--to", "bundle")
     cold = run(kernels[1], "--to", "simulate")
@@ -54,12 +54,6 @@ def _first_run(scene: str, folder: Path) -> Record:
         "warm_processor_s": warm[1],
         "kilobytes": sum(file.stat().st_size for file in kernels[1].rglob("*.code")) // 1000,
     }
-
-
-def _processor_time() -> float:
-    """Of the processes that were started here and have ended, with those that they started [s]."""
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
 
 
 def show(records: list[Record]) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import resource
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -16,7 +15,7 @@ from tempfile import TemporaryDirectory
 from benchmarks.command_parts import IMPORTS, REST
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
-from benchmarks.timing import interleaved
+from benchmarks.timing import interleaved, of_children
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 
 ROUNDS = 5
@@ -75,10 +74,7 @@ def _timed(command: Command, folder: Path, fresh: Iterator[float]) -> Callable[[
     def seconds() -> float:
         if command.loop:
             return float(_run(command, folder, fresh))
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        _run(command, folder, fresh)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        return of_children(lambda: _run(command, folder, fresh))
 
     return seconds
 
