@@ -61,16 +61,15 @@ def kernel(function: Callable) -> Any:
 # No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and
 # C took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
 def _compiled(function: Callable) -> Any:
-    from numba import njit
+    from flexclear.pipeline.dynamics.lowering import dispatcher
 
-    return njit(
+    return dispatcher(function,
         error_model="numpy",
         fastmath={"contract", "reassoc", "nsz"},
         _nrt=False,
         no_cfunc_wrapper=True,
         no_cpython_wrapper=True,
-        **lowering(),
-    )(function)
+    )
 
 
 def row_reader(place: int, size: int) -> Any:

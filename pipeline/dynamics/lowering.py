@@ -7,21 +7,66 @@ It needs parts of Numba that nobody promises to keep, and is taken with releases
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from types import ModuleType
 from typing import Any, ClassVar
 
+import llvmlite.binding as llvm
 from numba import types
+from numba.core import ir
 from numba.core import typed_passes as typed
 from numba.core import untyped_passes as untyped
+from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
-from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
+from numba.core.errors import TypingError
+from numba.core.ir_utils import build_definitions
+from numba.core.lowering import Lower
+from numba.core.registry import CPUDispatcher, cpu_target
+from numba.core.rewrites import rewrite_registry
+from numba.core.sigutils import normalize_signature
+from numba.core.ssa import reconstruct_ssa
+from numba.core.transforms import canonicalize_cfg
 from numba.core.typed_passes import NativeLowering
+from numba.core.typeinfer import ConstraintNetwork, TypeInferer
+
+
+@contextmanager
+def _taken_for_there(name: str) -> Iterator[None]:
+    """Whoever looks meanwhile whether there is a module, finds one, and need not import it."""
+    if name in sys.modules:
+        yield
+        return
+    sys.modules[name] = ModuleType(name)
+    try:
+        yield
+    finally:
+        del sys.modules[name]
+
+
+# Numba asks whether SciPy has a BLAS by importing SciPy's linear algebra, which takes as long as a dozen kernels
+with _taken_for_there("scipy.linalg.cython_blas"):
+    import numba.np.arraymath  # noqa: F401
 
 
 class Part(JITCodeLibrary):
     """Unoptimised code of a kernel, and which libraries hold what it calls."""
 
     _whole: Any = None
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """The kernel's code, its variables in registers; what it calls is declared there, and has been tidied itself."""
+        module = llvm.parse_assembly(normalize_ir_text(str(ir_module)))
+        module.name, module.data_layout = ir_module.name, self._codegen._data_layout
+        passes, builder = _function_passes()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
+        self._final_module = module
 
     def finalize(self) -> None:
         """Link, optimise and assemble nothing."""
@@ -75,11 +120,132 @@ class Part(JITCodeLibrary):
         return list(reversed(found))
 
 
+@cache
+def _function_passes() -> Any:
+    """What Numba lets run over each function before all others, made once instead of for each."""
+    return cpu_target.target_context.codegen()._function_pass_manager()
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class Flow(untyped.IRProcessing):
+    """Loops have one way back."""
+
+    _name = "flow"
+
+    def run_pass(self, state: Any) -> bool:
+        """What lives how long is of interest at the end only (`IRLegalization`); Numba finds it five times over."""
+        state.func_ir.blocks = canonicalize_cfg(state.func_ir.blocks)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class Rewrites(untyped.GenericRewrites):
+    """Indices, powers and the like that are written out are told apart from those that are computed."""
+
+    _name = "rewrites"
+
+    def run_pass(self, state: Any) -> bool:
+        """Each rewriting of each block until it finds nothing more."""
+        blocks = state.func_ir.blocks
+        for kind in rewrite_registry.rewrites["before-inference"]:
+            rewrite, left = kind(state), list(blocks)
+            while left:
+                place = left.pop()
+                if rewrite.match(state.func_ir, blocks[place], state.typemap, state.calltypes):
+                    blocks[place] = rewrite.apply()
+                    left.append(place)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class Versions(untyped.ReconstructSSA):
+    """A variable that is assigned more than once becomes several."""
+
+    _name = "versions"
+
+    def run_pass(self, state: Any) -> bool:
+        """As of any function."""
+        state.func_ir = reconstruct_ssa(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class Joins(typed.PreLowerStripPhis):
+    """Where ways meet, a variable has its value from the way that was taken."""
+
+    _name = "joins"
+
+    def run_pass(self, state: Any) -> bool:
+        """As of any function."""
+        state.func_ir = self._strip_phi_nodes(state.func_ir)
+        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
+        return True
+
+
+class Constraints(ConstraintNetwork):
+    """What follows for the types of variables; what Numba would warn of does not occur between numbers."""
+
+    def propagate(self, infer: Any) -> list[Exception]:
+        """Errors, which may be for want of a type that is found later."""
+        found: list[Exception] = []
+        for constraint in self.constraints:
+            try:
+                constraint(infer)
+            except TypingError as error:
+                found.append(error)
+        return found
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class KernelTypes(typed.NopythonTypeInference):
+    """Types of a kernel's variables."""
+
+    _name = "kernel_types"
+
+    def run_pass(self, state: Any) -> bool:
+        """As of any function, but for the warnings that nobody waits for."""
+        context, code = state.typingctx, state.func_ir
+        infer = TypeInferer(context, code, None)
+        infer.constraints = Constraints()
+        with context.callstack.register(state.targetctx.target, infer, code.func_id, state.args):
+            for index, (name, kind) in enumerate(zip(code.arg_names, state.args, strict=True)):
+                infer.seed_argument(name, index, kind)
+            infer.build_constraint()
+            infer.propagate()
+            state.typemap, state.return_type, state.calltypes = infer.unify()
+        return True
+
+
+class KernelLower(Lower):
+    """Numba's lowering without the words for messages that it forms at each statement."""
+
+    def lower_block(self, block: Any) -> None:
+        """Statement by statement."""
+        self.pre_block(block)
+        for statement in block.body:
+            self.loc = statement.loc
+            self.lower_inst(statement)
+        self.post_block(block)
+
+    def lower_inst(self, statement: Any) -> None:
+        """Most assign a value, or say that one is not needed any more."""
+        if isinstance(statement, ir.Assign):
+            name, value = statement.target.name, statement.value
+            argument = value.index + 1 if isinstance(value, ir.Arg) else None
+            self.storevar(self.lower_assign(self.typeof(name), statement), name, argidx=argument)
+        elif isinstance(statement, ir.Del):
+            self.delvar(statement.value)
+        else:
+            super().lower_inst(statement)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(NativeLowering):
     """Lowers a function into a `Part`."""
 
     _name = "part_lowering"
+    lowering_class = KernelLower
 
     def run_pass(self, state: Any) -> bool:
         """As of any function, but for where its code goes."""
@@ -94,14 +260,14 @@ class PartLowering(NativeLowering):
 STEPS = (
     untyped.TranslateByteCode,
     untyped.FixupArgs,
-    untyped.IRProcessing,
+    Flow,
     untyped.RewriteSemanticConstants,
     untyped.DeadBranchPrune,
-    untyped.GenericRewrites,
-    untyped.ReconstructSSA,
+    Rewrites,
+    Versions,
     untyped.DeadBranchPrune,
-    typed.NopythonTypeInference,
-    typed.PreLowerStripPhis,
+    KernelTypes,
+    Joins,
     typed.NoPythonSupportedFeatureValidation,
     typed.IRLegalization,
     typed.AnnotateTypes,
@@ -110,8 +276,17 @@ STEPS = (
 )
 
 
-def _pipeline() -> PassManager:
-    found = PassManager("kernel")
+class Steps(PassManager):
+    """These, one after another; Numba's own manager works the flow of control out again after each, for others' sake."""
+
+    def run(self, state: Any) -> None:
+        """All of them."""
+        for step, _ in self.passes:
+            _pass_registry.get(step).pass_inst.run_pass(state)
+
+
+def _pipeline() -> Steps:
+    found = Steps("kernel")
     for step in STEPS:
         found.add_pass(step, step._name)
     found.finalize()
@@ -161,6 +336,20 @@ class Typing(Target):
         return self.found[function, arguments]
 
 
+class KernelDispatcher(CPUDispatcher):
+    """Compiles a kernel by the types of its arguments; nobody listens how long that takes."""
+
+    def compile(self, sig: Any) -> Any:
+        """Entry point of what has been compiled for these types."""
+        arguments, returned = normalize_signature(sig)
+        found = self.overloads.get(tuple(arguments))
+        if found is None:
+            with self._compiling_counter:
+                found = self._compiler.compile(arguments, returned)
+                self.add_overload(found)
+        return found.entry_point
+
+
 class KernelCompiler(CompilerBase):
     """Numba's pipeline, less the steps that kernels have no use for, with `PartLowering`."""
 
@@ -170,3 +359,8 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self) -> list[PassManager]:
         """The only one; there is no object mode to fall back to."""
         return [PIPELINE]
+
+
+def dispatcher(function: Any, **options: Any) -> KernelDispatcher:
+    """What compiles a kernel; options: as of `numba.njit`."""
+    return KernelDispatcher(function, targetoptions={"nopython": True, "boundscheck": None, **options}, pipeline_class=KernelCompiler)

@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
-from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, lowering
 
 _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
@@ -54,6 +54,8 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
+    if not INTERPRETED:
+        lowering()  # before anything is compiled
     return compiles(cfunc(SIGNATURES[name], error_model="numpy"))
 
 
