@@ -24,15 +24,11 @@ LOOKED_AT = ("0.67.", "0.68.")
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
 
 
-def lowering() -> dict[str, Any]:
-    """Options of the compiler: the step of `lowering`, where the release of Numba is known to take it."""
+def looked_at() -> bool:
+    """Whether the release of Numba is known to take `lowering`."""
     import numba
 
-    if not numba.__version__.startswith(LOOKED_AT):
-        return {}
-    from flexclear.pipeline.dynamics.lowering import KernelCompiler
-
-    return {"pipeline_class": KernelCompiler}
+    return str(numba.__version__).startswith(LOOKED_AT)
 
 
 class Kernel:
@@ -61,15 +57,20 @@ def kernel(function: Callable) -> Any:
 # No kernel allocates, so none counts references; and none is called but by compiled code: wrappers for Python and
 # C took a fifth of the compilation. To call one from Python, as tests do: njit(kernel.py_func).
 def _compiled(function: Callable) -> Any:
-    from flexclear.pipeline.dynamics.lowering import dispatcher
+    options = {
+        "error_model": "numpy",
+        "fastmath": {"contract", "reassoc", "nsz"},
+        "_nrt": False,
+        "no_cfunc_wrapper": True,
+        "no_cpython_wrapper": True,
+    }
+    if looked_at():
+        from flexclear.pipeline.dynamics.lowering import KernelDispatcher
 
-    return dispatcher(function,
-        error_model="numpy",
-        fastmath={"contract", "reassoc", "nsz"},
-        _nrt=False,
-        no_cfunc_wrapper=True,
-        no_cpython_wrapper=True,
-    )
+        return KernelDispatcher.of(function, options)
+    from numba import njit
+
+    return njit(**options)(function)
 
 
 def row_reader(place: int, size: int) -> Any:
@@ -91,7 +92,7 @@ def field_reader(place: int, size: int, field: int) -> Any:
 
 
 def _lookup(function: Callable, place: int, size: int, field: int | None) -> Any:
-    if not lowering():
+    if not looked_at():
         return _compiled(function)
     from flexclear.pipeline.dynamics.lookup import Lookup
 

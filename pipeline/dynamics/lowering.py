@@ -8,7 +8,7 @@ It needs parts of Numba that nobody promises to keep, and is taken with releases
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from types import ModuleType
@@ -59,7 +59,7 @@ class Part(JITCodeLibrary):
     _whole: Any = None
 
     def add_ir_module(self, ir_module: Any) -> None:
-        """The kernel's code, its variables in registers; what it calls is declared there, and has been tidied itself."""
+        """The kernel's code, each function with its variables in registers; what it calls is declared only."""
         module = llvm.parse_assembly(normalize_ir_text(str(ir_module)))
         module.name, module.data_layout = ir_module.name, self._codegen._data_layout
         passes, builder = _function_passes()
@@ -277,7 +277,7 @@ STEPS = (
 
 
 class Steps(PassManager):
-    """These, one after another; Numba's own manager works the flow of control out again after each, for others' sake."""
+    """One after another; Numba's own manager works the flow of control out again after each."""
 
     def run(self, state: Any) -> None:
         """All of them."""
@@ -339,6 +339,13 @@ class Typing(Target):
 class KernelDispatcher(CPUDispatcher):
     """Compiles a kernel by the types of its arguments; nobody listens how long that takes."""
 
+    @classmethod
+    def of(cls, function: Any, options: Mapping[str, Any]) -> KernelDispatcher:
+        """What compiles a function; options: as `numba.njit` has them."""
+        return cls(
+            function, targetoptions={"nopython": True, "boundscheck": None, **options}, pipeline_class=KernelCompiler
+        )
+
     def compile(self, sig: Any) -> Any:
         """Entry point of what has been compiled for these types."""
         arguments, returned = normalize_signature(sig)
@@ -359,8 +366,3 @@ class KernelCompiler(CompilerBase):
     def define_pipelines(self) -> list[PassManager]:
         """The only one; there is no object mode to fall back to."""
         return [PIPELINE]
-
-
-def dispatcher(function: Any, **options: Any) -> KernelDispatcher:
-    """What compiles a kernel; options: as of `numba.njit`."""
-    return KernelDispatcher(function, targetoptions={"nopython": True, "boundscheck": None, **options}, pipeline_class=KernelCompiler)

@@ -8,6 +8,7 @@ once, and so is the integrator, for all mechanisms. A call costs some nanosecond
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 from llvmlite import ir
@@ -16,7 +17,7 @@ from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
-from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, lowering
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, looked_at
 
 _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
@@ -54,8 +55,8 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
-    if not INTERPRETED:
-        lowering()  # before anything is compiled
+    if not INTERPRETED and looked_at():
+        import_module("flexclear.pipeline.dynamics.lowering")  # before anything is compiled: it spares Numba an import
     return compiles(cfunc(SIGNATURES[name], error_model="numpy"))
 
 
