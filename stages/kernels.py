@@ -61,4 +61,6 @@ def warm(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) ->
     from flexclear.pipeline.dynamics.run.run import engine_of
     from flexclear.pipeline.dynamics.run.start import consistent_start
 
-    consistent_start(engine_of(scene, reduced, progress))
+    engine = engine_of(scene, reduced, progress)
+    engine.entry.complete()
+    consistent_start(engine)

@@ -12,7 +12,7 @@ import contextlib
 import gc
 import hashlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -30,15 +30,22 @@ interpreted: dict[int, Callable] = {}
 CODE = ".code"  #: what was compiled of a file
 
 
-def bring(paths: list[Path], tell: Tell) -> None:
-    """Load files, compiling them in this order; those that another process is compiling come last."""
+def bring(paths: list[Path], tell: Tell, late: Collection[Path] = ()) -> list[Path]:
+    """Load files, compiling them in this order; those that another process is compiling come last.
+
+    late: files that are not waited for.  Those of them that another process is at, when all others are there.
+    """
     left = list(paths)
     while left:
-        path = next((path for path in left if take(path, tell)), left[0])
-        if path.stem not in loaded:
+        path = next((path for path in left if take(path, tell)), None)
+        if path is None:
+            path = next((path for path in left if path not in late), None)
+            if path is None:
+                break
             tell(path)
             take(path, lambda _: None, wait=True)
         left.remove(path)
+    return left
 
 
 def take(path: Path, tell: Tell, *, wait: bool = False) -> bool:
@@ -134,6 +141,8 @@ def _without_collector() -> Iterator[None]:
         yield
     finally:
         if collects:
-            gc.freeze()
-            gc.unfreeze()
+            if not gc.get_freeze_count():  # what somebody else has put aside stays there
+                # old at once: to look through what was made took a third of a second after each file
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()

@@ -11,11 +11,14 @@ import ctypes
 import hashlib
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
+from threading import Lock
 from typing import Any
+from weakref import finalize
 
 import numpy as np
 
@@ -47,6 +50,8 @@ ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 #: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the last
 #: two have most kernels in common, which each process compiles once
 ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
+#: what is called first when a run has come to its end: not waited for where the second process is at it
+LATE = "observe"
 #: where the code of kernels stands, and what they number by
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
@@ -72,9 +77,12 @@ class Entry:
     """The compiled functions of a mechanism, by their addresses; h must have been given those.
 
     Calls let other threads run.
+
+    late: where `LATE` is, when it is there.
     """
 
     addresses: Mapping[str, int]
+    late: Late
 
     def connect(self, h: np.ndarray) -> None:
         """Write into the header where this process has put the functions that others call."""
@@ -115,7 +123,7 @@ class Entry:
     ) -> None:
         record = [place(outputs), len(outputs), place(rows), *rows.shape, place(events), *events.shape]
         if by is None:
-            self._functions["advance"](*tables, t, repeat, *record)
+            self._function("advance")(*tables, t, repeat, *record)
         else:
             by(self.addresses["advance"], [*tables, 0, repeat, *record])  # steps have their time in w
 
@@ -132,24 +140,58 @@ class Entry:
     ) -> None:
         """Evaluate what is recorded of every row."""
         given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._functions["observe"](*_tables(h, f, w, n), *given, tolerance, place(out), *out.shape)
+        self._function(LATE)(*_tables(h, f, w, n), *given, tolerance, place(out), *out.shape)
+
+    def complete(self) -> None:
+        """Wait for what is still being compiled."""
+        self.late.address()
 
     @cached_property
-    def _functions(self) -> dict[str, Callable]:
-        if INTERPRETED:
-            return {name: interpreted[self.addresses[name]] for name in PROTOTYPES}
-        return {name: prototype(self.addresses[name]) for name, prototype in PROTOTYPES.items()}
+    def _known(self) -> dict[str, Callable]:
+        return {}
+
+    def _function(self, name: str) -> Callable:
+        found = self._known.get(name)
+        if found is None:
+            address = self.late.address() if name == LATE else self.addresses[name]
+            found = self._known[name] = interpreted[address] if INTERPRETED else PROTOTYPES[name](address)
+        return found
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
     return place(h, np.int64), place(f), place(w), place(n, np.int64)
 
 
+class Late:
+    """A function that may still be in the making, in a process that ends with this one."""
+
+    def __init__(self, path: Path, bring_it: Callable[[], None], helpers: ExitStack) -> None:
+        self._path, self._bring, self._making = path, bring_it, Lock()
+        self._end = finalize(self, helpers.close)
+
+    def address(self) -> int:
+        """Where it is, once it is there."""
+        with self._making:  # members of ensembles run side by side
+            if self._end.alive:
+                self._bring()
+                self._end()
+        return loaded[self._path.stem].address
+
+
 def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     """The compiled functions for these parts; `tell` hears of what has to be compiled."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
-    with disk_limits(folder):
-        return Entry(_addresses(folder, sources.sources(parts, scheme), tell, began))
+    files = {name: _file(folder, name, source) for name, source in sources.sources(parts, scheme).items()}
+    with ExitStack() as helpers:
+        late = files[LATE]
+
+        def bring_late() -> None:
+            with ExitStack() as more:
+                _bring(folder, {LATE: late}, tell, began, more)
+
+        _bring(folder, files, tell, began, helpers, {late})
+        left = Late(late, bring_late, helpers.pop_all())
+    return Entry({name: loaded[path.stem].address for name, path in files.items() if path != late}, left)
 
 
 def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes: int = 0) -> int:
@@ -158,22 +200,32 @@ def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes
     lanes: see `sources.specialised`; of several that of what lets as many steppers run (`compile.lanes`).
     """
     folder, began = writable(kernel_root(), tell), time.monotonic()
-    with disk_limits(folder):
-        found = _addresses(folder, {SPECIALISED: sources.specialised(parts, wiring, lanes)}, tell, began)
-    return found[SPECIALISED]
+    path = _file(folder, SPECIALISED, sources.specialised(parts, wiring, lanes))
+    with ExitStack() as helpers:
+        _bring(folder, {SPECIALISED: path}, tell, began, helpers)
+    return loaded[path.stem].address
 
 
-def _addresses(folder: Path, texts: dict[str, str], tell: Callable[[str], None], began: float) -> dict[str, int]:
-    """Where the function of each source is, by its name, fetched from the folder or compiled into it."""
-    files = {name: _file(folder, name, source) for name, source in texts.items()}
+def _bring(
+    folder: Path,
+    files: Mapping[str, Path],
+    tell: Callable[[str], None],
+    began: float,
+    helpers: ExitStack,
+    late: Collection[Path] = (),
+) -> None:
+    """Load files by the names of their functions, from disk or compiled there.
+
+    helpers: gets the second process, where there is one.  late: files of which that may still be at work.
+    """
     names = {path: name for name, path in files.items() if path.stem not in loaded}
     wanted = sorted(names, key=lambda path: ORDER.index(names[path]))
-    missing = [path for path in wanted if not compiled(path)]
-    with second_process(missing[::-1]):
-        bring(wanted, lambda path: _announce(tell, WORDS[names[path]], began))
-    if missing:
-        prune(folder)
-    return {name: loaded[path.stem].address for name, path in files.items()}
+    with disk_limits(folder):
+        missing = [path for path in wanted if not compiled(path)]
+        helpers.enter_context(second_process(missing[::-1]))
+        bring(wanted, lambda path: _announce(tell, WORDS[names[path]], began), late)
+        if missing:
+            prune(folder)
 
 
 def _announce(tell: Callable[[str], None], what: str, began: float) -> None:
