@@ -77,4 +77,5 @@ FAMILY = Family(
     cases=lambda: [Case(name) for name in SCENES],
     measure=measure,
     show=show,
+    children=True,
 )
