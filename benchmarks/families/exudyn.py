@@ -255,7 +255,10 @@ def _side_by_side(
 
 def show(records: list[Record]) -> str:
     """Times needed for an accuracy, then every run of Exudyn that counts with ours beside it."""
-    heads, runs = {r["case"]: r for r in records if "horizon" in r}, _runs(records)
+    order, runs = list(COMPARISONS), _runs(records)
+    known = {r["case"]: r for r in records if "horizon" in r}
+    # a log may have cases that are no longer compared
+    heads = {case: known[case] for case in sorted(known, key=lambda c: order.index(c) if c in order else len(order))}
     levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
     head = (
         "velocity error below",
