@@ -1,4 +1,4 @@
-"""``flexclear check``: every mistake of scenes and their recipes at once, with file and line; nothing is run."""
+"""``flexclear check``: every mistake of scenes, recipes and sweeps at once, with file and line; nothing is run."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core.errors import InputError, InputErrors
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import compose, load_scene, read_toml
+from flexclear.pipeline.core.scene.oddities import oddities
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.stages import run, s1_mesh, s3_rigid
 from flexclear.stages.graph import Graph
@@ -25,18 +26,22 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene or sweep file, or a name below scenes/")
+    parser.add_argument(
+        "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
+    )
     parser.add_argument("--json", action="store_true", help="print the mistakes as JSON")
 
 
 def command(options: argparse.Namespace) -> int:
-    """Tell all mistakes of all scenes; exit code 2 where there are some."""
+    """Tell all mistakes of all files; exit code 2 where there are some, not for what is only odd."""
     found: dict[str, InputError] = {}
     for name in options.scenes:
         mistakes, scene = examined(name)
         found |= {str(mistake): mistake for mistake in mistakes}
-        if not mistakes and scene is not None and not options.json:
-            print(f"{run.find_scene(name)}: {scene.summary()}; no mistake found")
+        if not mistakes and not options.json:
+            print(f"{run.find_scene(name)}: {scene.summary() if scene is not None else 'recipe'}; no mistake found")
+            for odd in oddities(scene) if scene is not None else ():
+                print(f"flexclear: warning: {lines.located(odd)}", file=sys.stderr)
     if options.json:
         print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
     else:
@@ -48,12 +53,14 @@ def command(options: argparse.Namespace) -> int:
 
 
 def examined(name: str) -> tuple[list[InputError], Scene | None]:
-    """All mistakes of a scene, and the scene where it can be read."""
+    """All mistakes of a scene, sweep or recipe, and the scene where there is one that can be read."""
     found: list[InputError] = []
     try:
         path = run.find_scene(name)
         if _is_sweep(path):
             return _of_sweep(path)
+        if _is_recipe(path):
+            return _collect([partial(_recipe, path)]), None
         found += dangling(compose(path), run.recipe_frames, str(path))
     except InputError as error:
         return _each(error), None
@@ -75,6 +82,12 @@ def _is_sweep(path: Path) -> bool:
     """Whether a file is a sweep of a scene: it has no bodies and extends nothing, but says what is varied or kept."""
     table = read_toml(path)
     return not {"body", "extends"} & set(table) and bool({"vary", "keep", "scene"} & set(table))
+
+
+def _is_recipe(path: Path) -> bool:
+    """Whether a file is a mesh recipe: it has no bodies and extends nothing, but says what it is made of."""
+    table = read_toml(path)
+    return not {"body", "extends"} & set(table) and bool({"shape", "material", "materials"} & set(table))
 
 
 def _of_sweep(path: Path) -> tuple[list[InputError], Scene | None]:
