@@ -8,6 +8,7 @@ A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a ta
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, get_args
@@ -46,7 +47,7 @@ def listed(package: str, name: str, *, where: str, table: str = "NAMES") -> tupl
 
     Raises InputError, placed at `where`, for a name that the family does not have.
     """
-    family = import_module(package)
+    family = sys.modules.get(package) or import_module(package)  # every command asks thousands of times
     names: Mapping[str, str] = getattr(family, table)
     if name not in names:
         raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
