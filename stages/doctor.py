@@ -9,6 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from importlib import import_module
 from pathlib import Path
 
 from flexclear.pipeline.core import machine, system
@@ -16,6 +17,7 @@ from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages import bundle
+from flexclear.stages.run import workplace
 
 LIBRARIES = (
     "numpy",
@@ -72,12 +74,18 @@ class UnwellError(FlexclearError):
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
-    """What it takes: nothing, or what to repeat."""
+    """What it takes: nothing, what to repeat, or what to compile."""
     either = parser.add_mutually_exclusive_group()
     either.add_argument(
         "--bundle", metavar="SCENE", help="run a scene and write all that is needed to repeat it into one file"
     )
     either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="run what such a file holds")
+    either.add_argument(
+        "--compile",
+        nargs="*",
+        metavar="SCENE",
+        help="compile now what runs of these scenes call, without running them; without names what most scenes call",
+    )
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="with --bundle: change a value of the scene"
     )
@@ -95,6 +103,10 @@ def command(options: argparse.Namespace) -> None:
         print(said)
         if not same:
             raise UnwellError("it does not end here as it did there")
+        return
+    if options.compile is not None:
+        names = import_module("flexclear.stages.ahead").compiled(options.compile, workplace())
+        print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
         return
     wrong = []
     for name, text, fine in findings():
