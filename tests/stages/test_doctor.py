@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.stages import doctor
+from flexclear.pipeline.dynamics.compile import files, functions
+from flexclear.stages import ahead, doctor, new
 from flexclear.stages.__main__ import main
 
 
@@ -37,3 +38,31 @@ def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):
         [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "['1', '1']"
+
+
+def test_what_was_compiled_before_a_run_is_all_that_it_calls(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also by the methods among which it chooses; the usual kinds are compiled where no scene is named."""
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    monkeypatch.setattr(ahead, "USUAL", ("pendulum",))
+    assert main(["doctor", "--compile"]) == 0
+    assert not (tmp_path / "results").exists()
+    scene = new.write("pendulum", tmp_path)[0]
+    assert main(["doctor", "--compile", str(scene)]) == 0
+    assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
+
+    def refused(path: Path) -> None:
+        raise AssertionError(f"{path.name} was to be there")
+
+    monkeypatch.setattr(files, "_compile", refused)
+    monkeypatch.setattr(files, "loaded", {})
+    monkeypatch.setattr(functions, "loaded", files.loaded)
+    assert main(["run", str(scene), "--to", "simulate", "-q"]) == 0
+
+
+def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["doctor", "--compile", str(tmp_path / "none.toml")]) == 2
+    assert "none.toml" in capsys.readouterr().err
