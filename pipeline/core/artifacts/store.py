@@ -23,6 +23,7 @@ from flexclear.pipeline.core.artifacts.disk import (
     copy,
     digest_of,
     disk_limits,
+    holds,
     is_copy,
     locked,
     publish,
@@ -54,8 +55,8 @@ TOLD = ("warnings", "accuracy_verdict")
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
-#: what this process has written last and read back, by its sha256, until it is loaded
-_READ_BACK: dict[str, LabelledArrays] = {}
+#: what this process has written last and read back, bytes and arrays by their sha256, until it is loaded
+_READ_BACK: dict[str, tuple[bytes, LabelledArrays]] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -135,17 +136,18 @@ class Store:
     def arrays(self, record: Record) -> LabelledArrays:
         """The main file in memory. The bytes that were checked are those that are parsed.
 
-        The last one that this process has written was parsed already; that is given once.
+        The last one that this process has written was parsed already; that is given once, where the file still holds
+        the same bytes.
         """
         from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
+        written = _READ_BACK.pop(record.files[MAIN], None)
+        if written is not None and holds(path, written[0]):
+            return written[1]
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
-        written = _READ_BACK.pop(record.files[MAIN], None)
-        if written is not None:
-            return written
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
@@ -328,5 +330,5 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     digest = sha256(content)
     _READ_BACK.clear()
     if data.nbytes < netcdf.COMPRESSED:
-        _READ_BACK[digest] = read
+        _READ_BACK[digest] = content, read
     return digest
