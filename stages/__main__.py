@@ -6,6 +6,7 @@ Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machin
 from __future__ import annotations
 
 import argparse
+import atexit
 import gc
 import os
 import sys
@@ -18,6 +19,9 @@ from flexclear.pipeline.core.workflow import workers
 CLOSED_PIPE = 141
 #: new objects before Python looks for garbage: a short command makes hardly any, and spent a tenth of its time looking
 GARBAGE = 50_000
+# at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short command, of
+# which nobody has anything, since the system takes all of it
+atexit.register(gc.freeze)
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
     "new": "a commented scene of one's own to start from",
