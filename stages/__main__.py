@@ -18,7 +18,7 @@ from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
 #: new objects before Python looks for garbage: a short command makes hardly any, and spent a tenth of its time looking
-GARBAGE = 50_000
+GARBAGE = 200_000
 # at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short command, of
 # which nobody has anything, since the system takes all of it
 atexit.register(gc.freeze)

@@ -7,7 +7,6 @@ A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a ta
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, get_args
@@ -60,6 +59,8 @@ def module_name(name: str) -> str:
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     """'did you mean ...?' for the nearest known name, or a list of those there are."""
+    import difflib  # here, since a right name needs none
+
     # the comparison takes the product of both lengths
     near = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
     if near:
