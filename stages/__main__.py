@@ -87,9 +87,11 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
     top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for verb, text in COMMANDS.items():
+    asked = [verb for verb in COMMANDS if verb in arguments[:1]]
+    for verb in asked or COMMANDS:  # all of them only where their list is told
+        text = COMMANDS[verb]
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        if verb in arguments[:1]:
+        if asked:
             module = import_module(f"flexclear.stages.{verb}")
             module.arguments(below)
             below.set_defaults(command=module.command)

@@ -13,7 +13,7 @@ import errno
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,6 +78,11 @@ class Record:
         """Content of the artifact in one digest: that of its main file, else of all its files."""
         return self.files.get(MAIN) or sha256(json.dumps(self.files, sort_keys=True).encode())
 
+    def table(self) -> dict[str, object]:
+        """What its file holds, and `read_record` reads."""
+        kept = {"files": self.files, "facts": self.facts, "said": self.said}
+        return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in kept.items()}}
+
 
 @dataclass(frozen=True, slots=True)
 class Store:
@@ -126,7 +131,7 @@ class Store:
                 digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
             said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
             record = Record(stage, key, digests, dict(facts), said)
-            publish(self.path(stage, key, "json"), checked(asdict(record)))
+            publish(self.path(stage, key, "json"), checked(record.table()))
         return record
 
     def load(self, record: Record) -> xr.Dataset:
@@ -220,7 +225,7 @@ class Store:
         with disk_limits(self.root / folder):
             (self.root / folder / ".facts").mkdir(parents=True, exist_ok=True)
             for path, (stage, facts) in paths.items():
-                publish(path, checked(asdict(Record(stage, FAMILY, {}, dict(facts)))))
+                publish(path, checked(Record(stage, FAMILY, {}, dict(facts)).table()))
             for path in (self.root / folder / ".facts").glob("*.json"):
                 if path not in paths:
                     path.unlink(missing_ok=True)
