@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.stops import ends_an_angle
-from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
+from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
 from flexclear.pipeline.dynamics.run import ledger
@@ -213,20 +213,14 @@ def _motion(motions: Motions) -> Part:
     origin, body = motions.model.mechanism.origin, motions.every_body
     frames, joints = list(motions.model.mechanism.frames), list(motions.model.scene.joint)
     moment, force = every_joint_wrench(motions, joints)
-    series = {
-        ("position", "body", "axis"): body.p + origin,
-        ("quaternion", "body", "quat"): quaternions(body.R),
-        ("velocity", "body", "axis"): body.v,
-        ("angular_velocity", "body", "axis"): body.omega,
-        ("acceleration", "body", "axis"): body.a,
-        ("angular_acceleration", "body", "axis"): body.alpha,
-        ("frame_position", "frame", "axis"): motions.every_frame + origin,
-        ("joint_moment", "joint", "axis"): moment,
-        ("joint_force", "joint", "axis"): force,
+    more = {
+        ("angular_acceleration", "body"): body.alpha,
+        ("frame_position", "frame"): motions.every_frame + origin,
+        ("joint_moment", "joint"): moment,
+        ("joint_force", "joint"): force,
     }
-    variables: Variables = {
-        name: (("time", *dims), np.ascontiguousarray(values)) for (name, *dims), values in series.items()
-    }
+    variables: Variables = motion_series(body, origin)
+    variables |= {name: (("time", dim, "axis"), np.ascontiguousarray(values)) for (name, dim), values in more.items()}
     owners = [name.partition(".")[0] for name in frames]
     coordinates = {"body": motions.moving_bodies, "frame": frames, "frame_body": ("frame", owners)}
     return variables, coordinates | _joints(motions.model)

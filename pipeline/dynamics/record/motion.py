@@ -230,3 +230,15 @@ def quaternions(R: np.ndarray) -> np.ndarray:
     flips = np.where(np.sum(q[1:] * q[:-1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
     q[1:] *= np.cumprod(flips, axis=0)
     return q
+
+
+def motion_series(bodies: Motion, origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Position, orientation, velocities and acceleration of several bodies over time, by variable."""
+    series = {
+        ("position", "axis"): bodies.p + origin,
+        ("quaternion", "quat"): quaternions(bodies.R),
+        ("velocity", "axis"): bodies.v,
+        ("angular_velocity", "axis"): bodies.omega,
+        ("acceleration", "axis"): bodies.a,
+    }
+    return {name: (("time", "body", dim), np.ascontiguousarray(values)) for (name, dim), values in series.items()}
