@@ -16,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.kept import OF_CONTACTS, Kept
-from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
@@ -74,7 +74,7 @@ class Runner:
             values, deviation, count = self._values(scene, place, alive)
             if not self.error:
                 return Point(values, {}, deviation, count)
-            tight = edited(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
+            tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
             better, _, more = self._values(tight, place, alive)
         except (SolverError, InputError) as error:
             return Point({}, {}, {}, 0, str(error))
