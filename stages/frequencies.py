@@ -43,8 +43,11 @@ def text(linear: xr.Dataset) -> str:
         f"{a['scene']} at t = {a['time']:.6g} s, drives {a['drives']}",
         *_pose(linear),
         f"equilibrium: largest unbalanced force {a['residual']:.3g} N after {a['iterations']} iterations",
-        f"mobility {a['mobility']}, {a['motions_without_stiffness']} without stiffness; "
-        f"{a['redundant_closure_rows']} redundant closure rows",
+        *_freedoms(linear),
+    ]
+    if not linear.sizes["vibration"]:
+        return "\n".join([*lines, "nothing vibrates: joints and drives hold all bodies"]) + "\n"
+    lines += [
         f"{'':>4} {'frequency':>14} {'damping':>10}  most kinetic energy in",
         f"{'':>4} {'Hz':>14} {'ratio':>10}",
     ]
@@ -55,6 +58,19 @@ def text(linear: xr.Dataset) -> str:
         alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
         lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")
     return "\n".join(lines) + "\n"
+
+
+def _freedoms(linear: xr.Dataset) -> list[str]:
+    """How many there are, how many of them nothing drives back, and what their count leaves open."""
+    limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
+    lines = [f"mobility {linear.attrs['mobility']}" + (f", {limp} of the motions without stiffness" if limp else "")]
+    if joints := linear.attrs["undetermined_reactions"]:
+        says = "condition of the closed loops follows" if repeated == 1 else "conditions of the closed loops follow"
+        lines.append(
+            f"{repeated} {says} from the others, as three do in a planar loop: motion and frequencies are the same "
+            f"without, but rigid bodies do not determine the reactions of {joints}"
+        )
+    return lines
 
 
 def _pose(linear: xr.Dataset) -> list[str]:
