@@ -50,6 +50,9 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; mistakes of the user are told without a traceback."""
     plain_output()
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
+    # the system takes all memory back when this ends: to look through it for garbage first took half a second where
+    # something had been compiled
+    atexit.register(gc.freeze)
     # pydantic would look through all that is installed for plugins of its own
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
