@@ -22,7 +22,7 @@ from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
-from flexclear.pipeline.dynamics.run.crew import Crew
+from flexclear.pipeline.dynamics.run.crew import Place
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
@@ -55,10 +55,10 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, crew: Crew | None = None) -> tuple[xr.Dataset, str]:
+    def alone(k: int, alive: Progress, place: Place | None = None) -> tuple[xr.Dataset, str]:
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
-        mine.straight.crew = crew
+        mine.straight.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir)
         return _member(last, trajectory, names), switched
 
@@ -71,8 +71,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         else:
 
             def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-                with crews.place() as crew:
-                    return alone(k, alive, crew)
+                with crews.place() as place:
+                    return alone(k, alive, place)
 
             found = side_by_side(member, wanted.members, done, crews.lanes)
     members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
