@@ -151,11 +151,14 @@ def parents(name: str) -> list[str]:
     return [".".join(parts[:n]) for n in range(1, len(parts))]
 
 
-def imported(source: bytes, name: str, package: bool) -> tuple[set[str], set[str]]:
-    """Own names and libraries that one source text imports; imports for type checkers do not count."""
+def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> tuple[set[str], set[str]]:
+    """Own names and libraries that one source text imports; imports for type checkers do not count.
+
+    deep: also in functions, which import what only some need.
+    """
     own: set[str] = set()
     libraries: set[str] = set()
-    for target in _imports(ast.parse(source).body, name if package else name.rpartition(".")[0]):
+    for target in _imports(ast.parse(source).body, name if package else name.rpartition(".")[0], deep):
         top = target.partition(".")[0]
         if top in OWN:
             own.add(target)
@@ -164,8 +167,8 @@ def imported(source: bytes, name: str, package: bool) -> tuple[set[str], set[str
     return own, libraries
 
 
-def _imports(statements: Iterable[ast.stmt], package: str) -> Iterable[str]:
-    """Dotted names that statements import, at any depth; ``from a import b`` gives a and a.b."""
+def _imports(statements: Iterable[ast.stmt], package: str, deep: bool) -> Iterable[str]:
+    """Dotted names that statements import, those of functions only if `deep`; ``from a import b`` gives a and a.b."""
     for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -175,13 +178,13 @@ def _imports(statements: Iterable[ast.stmt], package: str) -> Iterable[str]:
             yield base
             yield from (f"{base}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
-            yield from _imports(node.orelse, package)
+            yield from _imports(node.orelse, package, deep)
         elif isinstance(node, ast.Match):
-            yield from (name for case in node.cases for name in _imports(case.body, package))
-        else:
+            yield from (name for case in node.cases for name in _imports(case.body, package, deep))
+        elif deep or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             # imports are statements, so expressions need not be walked
             for block in ("body", "orelse", "handlers", "finalbody"):
-                yield from _imports(getattr(node, block, ()), package)
+                yield from _imports(getattr(node, block, ()), package, deep)
 
 
 def _is_type_checking(test: ast.expr) -> bool:
