@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.origins import assumed
 from flexclear.pipeline.core.workflow.task import given_arrays
+from flexclear.stages import s1_mesh
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
@@ -28,6 +31,9 @@ def params(scene: Scene) -> dict[str, Any]:
 
 
 def origins(scene: Scene) -> dict[str, str]:
-    """Where values come from, as attributes of datasets."""
-    found = {"sources": scene.sources(), "assumptions": scene.assumptions()}
+    """Where values come from, those of mesh recipes included, as attributes of datasets."""
+    sources = scene.sources()
+    for body, recipe in scene.recipes().items():
+        sources |= s1_mesh.sources(Path(recipe), f"body.{body}.mesh")
+    found = {"sources": sources, "assumptions": assumed(sources)}
     return {name: json.dumps(texts, sort_keys=True) for name, texts in found.items()}
