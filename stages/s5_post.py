@@ -31,9 +31,15 @@ def params(scene: Scene) -> dict[str, Any]:
 
 
 def origins(scene: Scene) -> dict[str, str]:
-    """Where values come from, those of mesh recipes included, as attributes of datasets."""
-    sources = scene.sources()
+    """Where values come from, as attributes of datasets."""
+    texts = sources(scene)
+    found = {"sources": texts, "assumptions": assumed(texts)}
+    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in found.items()}
+
+
+def sources(scene: Scene) -> dict[str, str]:
+    """Where values come from, those of mesh recipes included: place -> text."""
+    found = scene.sources()
     for body, recipe in scene.recipes().items():
-        sources |= s1_mesh.sources(Path(recipe), f"body.{body}.mesh")
-    found = {"sources": sources, "assumptions": assumed(sources)}
-    return {name: json.dumps(texts, sort_keys=True) for name, texts in found.items()}
+        found |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")
+    return found

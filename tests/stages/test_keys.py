@@ -210,8 +210,8 @@ def test_another_sentence_in_a_recipe_makes_no_mesh_again(root: Path, copy: Path
     before, after = graph(root, "sps4/far_cb"), graph(copy, "sps4/far_cb")
     assert changed(keys(before, sources), keys(after, sources)) == {"post"}
     told = s5_post.origins(after.scene)
-    assert json.loads(told["sources"])["body.rod1.mesh.shape"] == "Table 2"
-    assert json.loads(told["assumptions"])["body.rod1.mesh.material"] == "assumed: aluminium"
+    assert json.loads(told["sources"])["body.rod1.recipe.shape"] == "Table 2"
+    assert json.loads(told["assumptions"])["body.rod1.recipe.material"] == "assumed: aluminium"
 
 
 @pytest.mark.parametrize("source", ["5", "{ density = 3 }", "[1]"])
