@@ -356,7 +356,7 @@ def _tracks(runs: list[Record], program: str, note: str) -> Iterator[dict[str, A
         mine = [run for run in done if run["method"] == method]
         yield {
             "name": f"Exudyn, {method}",
-            "note": f"{program}: times of its integration alone, ours hold all that a run records{note}",
+            "note": f"{program}: times of its integration with two sensors{note}",
             "seconds": [run["s"] for run in mine],
             "error": {
                 f"{BODY}.position": [1e-6 * run["position_um"] for run in mine],
