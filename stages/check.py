@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
 from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import compose, load_scene, read_toml
+from flexclear.pipeline.core.scene.oddities import oddities
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.stages import run, s1_mesh, s3_rigid
 from flexclear.stages.graph import Graph
@@ -37,13 +39,18 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> int:
-    """Tell all mistakes of all files; exit code 2 where there are some, 4 where a file only asks for too much."""
+    """Tell all mistakes of all files; exit code 2 where there are some, 4 where a file only asks for too much.
+
+    What is only odd is told, and is no mistake.
+    """
     found: dict[str, FlexclearError] = {}
     for name in options.scenes:
-        mistakes, summary = examined(name)
+        mistakes, seen = examined(name)
         found |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and not options.json:
-            print(f"{run.find_scene(name)}: {summary}; no mistake found")
+            print(f"{run.find_scene(name)}: {seen.summary}; no mistake found")
+            for odd in seen.odd:
+                print(f"flexclear: warning: {lines.located(odd)}", file=sys.stderr)
     if options.json:
         print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
     else:
@@ -55,16 +62,24 @@ def command(options: argparse.Namespace) -> int:
     return min((mistake.exit_code for mistake in found.values()), default=0)
 
 
-def examined(name: str) -> tuple[list[FlexclearError], str]:
-    """All mistakes of a scene, sweep or recipe, and what it is, in words, where it can be read."""
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a file is, in words, and what in it looks odd without being a mistake."""
+
+    summary: str = ""
+    odd: tuple[InputError, ...] = ()
+
+
+def examined(name: str) -> tuple[list[FlexclearError], Seen]:
+    """All mistakes of a scene, sweep or recipe, and what it is where it can be read."""
     try:
         path = run.find_scene(name)
         return LOOKS[kind_of_file(read_toml(path))](path)
     except MISTAKES as error:
-        return _each(error), ""
+        return _each(error), Seen()
 
 
-def _of_scene(path: Path) -> tuple[list[FlexclearError], str]:
+def _of_scene(path: Path) -> tuple[list[FlexclearError], Seen]:
     found = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
     scene = None
     try:
@@ -77,31 +92,33 @@ def _of_scene(path: Path) -> tuple[list[FlexclearError], str]:
         found += _collect(_laws(scene), path)
         if not found and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
             found += _collect([lambda: _assembled(scene)], path)
-    return list({str(error): error for error in found}.values()), scene.summary() if scene else ""
+    seen = Seen(scene.summary(), tuple(oddities(scene))) if scene is not None else Seen()
+    return list({str(error): error for error in found}.values()), seen
 
 
-def _of_sweep(path: Path) -> tuple[list[FlexclearError], str]:
+def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
     """Its own mistakes and those of its scene."""
     from flexclear.stages import sweep, sweep_plan
 
     wanted, scene = sweep.read(path)
-    found, summary = examined(str(scene.path))
+    found, seen = examined(str(scene.path))
     if not found:
         found = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
-    return found, f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {summary}"
+    return found, replace(seen, summary=f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {seen.summary}")
 
 
-def _of_recipe(path: Path) -> tuple[list[FlexclearError], str]:
+def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
     """A recipe is looked at as where a scene names it, with the limits of a scene that says none."""
     found = _collect([lambda: s1_mesh.check_size(path, Limits())])
     if not any(isinstance(error, ResourceError) for error in found):  # what is too large is not meshed
         found += _collect([lambda: _recipe(path)])
     if found:
-        return found, ""
+        return found, Seen()
     table = s1_mesh.params(path)["recipe"]
     frames = ", ".join(table.get("frames", {})) or "none"
     told = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
-    return [], f"{told}, mass {float(_undeformed(path).mass):.6g} kg" if s1_mesh.kind_of(path) == "beam" else told
+    beam = s1_mesh.kind_of(path) == "beam"
+    return [], Seen(f"{told}, mass {float(_undeformed(path).mass):.6g} kg" if beam else told)
 
 
 LOOKS = {SCENE: _of_scene, SWEEP: _of_sweep, RECIPE: _of_recipe}

@@ -52,9 +52,11 @@ def text(linear: xr.Dataset) -> str:
         f"{'':>4} {'Hz':>14} {'ratio':>10}",
     ]
     share = linear["energy_share"].max("moving_body").values
-    columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "dominant")]
-    for number, hertz, damping, name, part in zip(*columns, share, strict=True):
-        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %)")
+    columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
+    for number, hertz, damping, rate, name, part in zip(*columns, share, strict=True):
+        # what is damped so far has two rates and no frequency: two rows of one motion
+        alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
+        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")
     return "\n".join(lines) + "\n"
 
 
@@ -74,5 +76,8 @@ def _freedoms(linear: xr.Dataset) -> list[str]:
 def _pose(linear: xr.Dataset) -> list[str]:
     if "drive_position" not in linear:
         return []
-    places = zip(linear["drive"].values, linear["drive_position"].values, strict=True)
-    return ["drives at " + ", ".join(f"{name} = {value:.6g}" for name, value in places)]
+    names = [str(name) for name in linear["drive"].values]
+    position, each = linear["drive_position"], linear.coords.get("drive_position_units")
+    units = [str(position.attrs.get("units", ""))] * len(names) if each is None else [str(unit) for unit in each.values]
+    places = zip(names, position.values, units, strict=True)
+    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in places)]

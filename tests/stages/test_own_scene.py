@@ -16,6 +16,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.oddities import oddities
 from flexclear.stages import run
 from flexclear.stages.__main__ import main
 from flexclear.stages.as_json import as_json
@@ -59,6 +60,31 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
     said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
     # lists of all names that there are grow with the program
     assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == TOLD[name].strip()
+
+
+@pytest.mark.parametrize(
+    "old,new,told",
+    [
+        (
+            'clearance = "0.1 mm"',
+            "clearance = 0.1",
+            r"\[joint.pin.clearance\], line \d+: 100 mm is more than the pin's radius, 10 mm",
+        ),
+        (
+            'inertia = ["600 kg mm^2", "600 kg mm^2", "1000 kg mm^2"]',
+            "inertia = [600, 600, 1000]",
+            r"\[body.crank.inertia\], line \d+: a radius of gyration of 35.4 m for a body whose frames",
+        ),
+    ],
+)
+def test_what_looks_like_a_slip_of_units_is_told_and_not_refused(
+    old: str, new: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    scene, _ = write("slider-crank", tmp_path)
+    assert old in scene.read_text()
+    scene.write_text(scene.read_text().replace(old, new))
+    assert main(["check", str(scene)]) == 0
+    assert re.search(told, capsys.readouterr().err)
 
 
 def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(
@@ -126,7 +152,7 @@ def test_the_schema_accepts_what_the_loader_accepts(path: Path, validators):
     table = tomllib.loads(path.read_text())
     recipe = "shape" in table
     if not recipe:
-        load_scene(path)
+        assert oddities(load_scene(path)) == []
     assert list(validators[recipe].iter_errors(table)) == []
 
 

@@ -433,14 +433,12 @@ class Scene(Part):
         return {k: v for k, v in self.sources().items() if v.startswith("assumed")}
 
 
-def _collect_sources(node: object, place: str, found: dict[str, str]) -> None:
-    if not isinstance(node, dict):
-        return
+def _collect_sources(node: dict[str, object], place: str, found: dict[str, str]) -> None:
     source = node.get("source")
     if isinstance(source, str):
         found[place or "scene"] = source
     elif isinstance(source, dict):
         found.update({f"{place}.{key}".lstrip("."): text for key, text in source.items()})
     for key, value in node.items():
-        if key != "source":
+        if key != "source" and isinstance(value, dict):
             _collect_sources(value, f"{place}.{key}".lstrip("."), found)
