@@ -11,27 +11,28 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def note_start(h, w):
-    """Note the speeds along which loads bend where a segment starts, which has just been evaluated."""
+def _copy(h, w, source, target):
     for k in range(h[m.N_LOADS]):
         o = m.LOAD_SPEEDS.row(h, k)
-        w[o + m.LOAD_SPEEDS.start] = w[o + m.LOAD_SPEEDS.now]
+        w[o + target] = w[o + source]
+
+
+@kernel
+def note_start(h, w):
+    """Note the speeds along which loads bend where a segment starts, which has just been evaluated."""
+    _copy(h, w, m.LOAD_SPEEDS.now, m.LOAD_SPEEDS.start)
 
 
 @kernel
 def note_end(h, w):
     """The same at the end of a step."""
-    for k in range(h[m.N_LOADS]):
-        o = m.LOAD_SPEEDS.row(h, k)
-        w[o + m.LOAD_SPEEDS.end] = w[o + m.LOAD_SPEEDS.now]
+    _copy(h, w, m.LOAD_SPEEDS.now, m.LOAD_SPEEDS.end)
 
 
 @kernel
 def end_is_start(h, w):
     """The end of an accepted step is the start of the next."""
-    for k in range(h[m.N_LOADS]):
-        o = m.LOAD_SPEEDS.row(h, k)
-        w[o + m.LOAD_SPEEDS.start] = w[o + m.LOAD_SPEEDS.end]
+    _copy(h, w, m.LOAD_SPEEDS.end, m.LOAD_SPEEDS.start)
 
 
 @kernel
