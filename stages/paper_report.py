@@ -86,11 +86,11 @@ def bring(place: Workplace) -> tuple[list[Task], Outcome, dict[str, str]]:
     Returns the tasks as well, and the digests of the files that were read to build them.
     """
     scenes = Scenes()
-    with opened.watched(TREE, outside=(place.store.root,)) as read:
+    with opened.noticed(TREE, outside=(place.store.root,)) as read:
         tasks = report_tasks(place, scenes)
     shown = place.bring(tasks)
     graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
-    with opened.watched(TREE, outside=(place.store.root,)) as read_for_page:
+    with opened.noticed(TREE, outside=(place.store.root,)) as read_for_page:
         page = page_task(place, shown.records, graphs)
     made = place.bring([page])
     check(made)
