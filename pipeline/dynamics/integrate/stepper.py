@@ -28,8 +28,12 @@ from flexclear.pipeline.dynamics.kernels import kernel
 #: what resolve_events returns for an event after which integration starts afresh; another positive number only
 #: records it
 RESTART = 1
+#: for a step that cannot be made as short as the event that was found in it; a negative number ends the run otherwise
+AGAIN = -2
 #: share of the planned step below which a step has been cut short
 CUT = 0.9
+#: such a step is tried again with this share of its length
+SHORTER = 0.3
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
@@ -244,6 +248,10 @@ def make_advance(
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
             happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
+            if happened == AGAIN:
+                n[m.REJECTED] += 1
+                w[c + m.STEP], w[c + m.REJECTED_STEP] = SHORTER * step, 0.0
+                continue
             if happened < 0:
                 return
             n[m.STEPS] += 1
