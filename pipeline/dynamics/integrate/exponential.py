@@ -47,7 +47,7 @@ FACTORIALS = np.array([1.0 * factorial(k) for k in range(NODES + 2)])
 MOST_SWEEPS = 10
 #: how much of the slowest convergence is forgotten from step to step
 FORGETTING = 0.3
-SWIFT, EDGE = 0.12, 0.9
+SWIFT, LEAST = 0.1, 0.01
 RENEW = 0.08
 OLD = 20.0
 
@@ -270,12 +270,15 @@ def error(h, f, w, n, step):
         lift(h, w, basis(h), pair(h, TOTAL), step, out)
         norms = (norms[1], scaled_norm(h, w, out))
     fourth, third = norms
-    norm = fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2) if fourth > 0.0 else 0.0
-    return max(norm, min(EDGE, (w[h[m.MEMORY] + SLOWEST] / SWIFT) ** (0.5 * ERROR_ORDER + 0.5)))
+    most = h[m.CONTROL] + m.MOST_GROWTH
+    w[most] = min(w[most], np.sqrt(SWIFT / max(w[h[m.MEMORY] + SLOWEST], LEAST)))
+    if fourth == 0.0:
+        return 0.0
+    return fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2)
 
 
-def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
-    """The method's kernels."""
+def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> tuple:
+    """The method's kernels; complete: evaluates, and leaves the factors and forces of which the oscillators are made."""
     find_oscillators = modal_basis.make_find_oscillators(retract)
 
     @kernel
@@ -292,7 +295,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         """Oscillators, phi functions, and what is read off the start of the step."""
         o = h[m.MEMORY]
         if w[o + BASIS_HOLDS] == 0.0 or (w[o + TRIED] > 0.0 and w[o + AGE] > 0.0):
-            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], slope(h, NODE))
+            complete(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], slope(h, NODE))
             n[m.EVALUATIONS] += 1
             renew(h, f, w, n)
         if w[o + PHI_STEP] != step:
@@ -358,7 +361,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         w[o + AGE] += 1.0
         if w[o + SLOWEST] > RENEW or w[o + AGE] >= OLD:
             w[o + BASIS_HOLDS] = 0.0
-            if n[m.STATE] == h[m.Y_NEW]:
+            if n[m.STATE] == h[m.Y_NEW] and n[m.ABRIDGED] == 0:
                 renew(h, f, w, n)
 
     return begin, attempt, error, extend, keep

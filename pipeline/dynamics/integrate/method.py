@@ -46,7 +46,8 @@ class Method:
     traits: what is known of it elsewhere.
     slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the search for events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
-    make_kernels: (evaluate, retract) -> kernels that count their evaluations themselves:
+    make_kernels: (evaluate, retract) -> kernels, with a third argument of methods that read more than rates
+        (`Traits.reads_all`): an evaluation of which everything is left. They count their evaluations themselves:
         begin(h, f, w, n) after every restart, with the slope and the length of the first step known;
         attempt(h, f, w, n, step) fills Y_NEW, False when it could not;
         error(h, f, w, n, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);

@@ -83,13 +83,16 @@ def make_advance(
     stepping: Any,
     events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
     poses: Poses = NO_POSES,
+    complete: Callable | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
+    complete: evaluates like `evaluate`, and leaves all of the evaluation; given to methods that read more than rates.
     stepping: the module `adaptive` or `fixed`.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(evaluate, retract)
+    given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
+    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(*given)
     attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
     last, ends = method.last, method.ends
     watch_start, make_resolve_events, any_closed = events

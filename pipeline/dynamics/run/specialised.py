@@ -75,7 +75,7 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> I
 
 def suited(engine: Engine) -> bool:
     """Whether there can be straight code."""
-    return not (INTERPRETED or engine.model.parts.joint_frictions or engine.method.traits.reads_all)
+    return not (INTERPRETED or engine.model.parts.joint_frictions)
 
 
 def _make(engine: Engine, progress: Progress) -> None:
