@@ -68,7 +68,7 @@ class Rung:
     bare: how to time its integration alone [s], whose samples are states.  alike: how to time its integration with the
     body's position and velocity in the samples, as two sensors of another code have them [s]; alike_error: how wrong
     these are.  straight: how to time the whole run by the code for its wiring alone, with which sweeps and ensembles
-    step [s].
+    step [s]; None where there is none.
     """
 
     integrator: str
@@ -80,7 +80,7 @@ class Rung:
     bare: Callable[[], float]
     alike: Callable[[], float]
     alike_error: Error
-    straight: Callable[[], float]
+    straight: Callable[[], float] | None
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,16 @@
 r"""Exponential Lobatto collocation of order 6: stiff modes are followed exactly, everything else by a cubic.
 
-The equations are split at every step, :math:`\dot y = A y + g(y)`: A holds the vibrations that the modal stiffness
-gives the mechanism in its present pose (`modal_basis`), g is what is left, without stiff modes. In
+The equations are split, :math:`\dot y = A y + g(y)`: A holds the vibrations that the modal stiffness and the closed
+contacts give the mechanism in its present state (`modal_basis`), g is what is left, without stiff modes. In
 
 .. math:: y(\theta h) = y_0 + \theta h\,\varphi_1(\theta h A)\,\dot y_0
           + h \sum_{k=1}^{3} k!\,\theta^{k+1}\varphi_{k+1}(\theta h A)\,d_k
 
 the :math:`d_k` are the coefficients of the cubic through g at Lobatto's nodes, minus its start; the nodes' states are
 found by iteration, which converges with h times the slope of g. So steps need not resolve the modes' vibrations, which
-are kept with their phases, and the solution between the nodes is dense output. A needs not be exact: what it lacks is
-in g. Without flexible bodies the method is Lobatto IIIA.
+are kept with their phases, and the solution between the nodes is dense output. A needs not be exact, what it lacks is
+in g: it is kept from step to step while the iteration converges fast. Where nothing vibrates the method is Lobatto
+IIIA.
 
 Source: Hochbruck & Ostermann, Exponential integrators, *Acta Numerica* 19 (2010), sec. 2.2 (collocation);
 Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (Lobatto IIIA) and
@@ -47,13 +48,15 @@ FACTORIALS = np.array([1.0 * factorial(k) for k in range(NODES + 2)])
 MOST_SWEEPS = 10
 #: how much of the slowest convergence is forgotten from step to step
 FORGETTING = 0.3
+#: steps are so long that corrections fall by this factor per sweep, which goes with their square; no less is aimed at
 SWIFT, LEAST = 0.1, 0.01
-RENEW = 0.08
-OLD = 20.0
+#: where they fall more slowly than this, or after so many steps, the oscillators are made anew
+SLOW, OLD = 0.08, 20.0
 
 # Memory between steps -------------------------------------------------------------------------------------------------
-# whether the oscillators are those of the present pose, whether there are any, step of the phi functions, length of the
-# step before (0: none), its rate of convergence, length of the step whose dense output is asked for
+# whether the oscillators serve the present state, whether there are any, step of the phi functions, length of the step
+# before (0: none), its rate of convergence, length of the step whose dense output is asked for, the slowest convergence
+# within the last attempt, steps since the oscillators were made, whether this step has been attempted before
 BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, AGE, TRIED, VECTORS = range(10)
 #: vectors over the state: departures of g from its start at the nodes, and those of the step before
 DEPARTURE, BEFORE = 0, NODES
@@ -106,7 +109,7 @@ def basis(h):
 # Exponential quadrature -----------------------------------------------------------------------------------------------
 @kernel
 def find_phi(h, w, j, step, theta):
-    """The phi functions of all oscillators at a share of the step, as those of node j, and what the sources do there."""
+    """The phi functions of all oscillators at a share of the step, as of node j, and what the sources do there."""
     o, tau = basis(h), theta * step
     for i in range(count(h)):
         at = phi(h, j, i)
@@ -255,7 +258,10 @@ def interpolate(h, w, theta, out):
 
 @kernel
 def error(h, f, w, n, step):
-    """Norm of the local error, 1 at the tolerance: of fourth order, held up by one of third."""
+    """Norm of the local error, 1 at the tolerance: of fourth order, held up by one of third.
+
+    The next step may be as much longer as its sweeps shall converge.
+    """
     out, size = slope(h, ESTIMATE), h[m.NY]
     norms = (0.0, 0.0)
     for which in range(2):
@@ -278,7 +284,7 @@ def error(h, f, w, n, step):
 
 
 def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> tuple:
-    """The method's kernels; complete: evaluates, and leaves the factors and forces of which the oscillators are made."""
+    """The method's kernels; complete: evaluates, and leaves what the oscillators are made of."""
     find_oscillators = modal_basis.make_find_oscillators(retract)
 
     @kernel
@@ -359,7 +365,7 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         o = h[m.MEMORY]
         w[o + LAST_STEP], w[o + TRIED] = step, 0.0
         w[o + AGE] += 1.0
-        if w[o + SLOWEST] > RENEW or w[o + AGE] >= OLD:
+        if w[o + SLOWEST] > SLOW or w[o + AGE] >= OLD:
             w[o + BASIS_HOLDS] = 0.0
             if n[m.STATE] == h[m.Y_NEW] and n[m.ABRIDGED] == 0:
                 renew(h, f, w, n)

@@ -1,10 +1,12 @@
-r"""Vibrations that the modal stiffness alone gives the constrained mechanism, in the pose that has just been evaluated.
+r"""Vibrations that modal stiffness and closed contacts give the constrained mechanism, in the state just evaluated.
 
-With M the mass matrix, J the closures' Jacobian and K the modal stiffness, elastic forces accelerate the coordinates by
-:math:`-P K x`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
-:math:`K^{1/2} P K^{1/2} = Q \Omega^2 Q^T` parts them into oscillators :math:`z = Q^T K^{1/2} x`, each with a shape over
-all coordinates and a share of the modal damping; the positions' rates and the drives' work follow linearly. What this
-leaves out (other forces, coupling by damping, the change of pose) is not stiff.
+With M the mass matrix, J the closures' Jacobian and K the stiffness of springs, which are the modes and the closed
+contacts (`contact_springs`) and of which the rows W give the lengths, springs accelerate the coordinates by
+:math:`-P W^T K W x`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
+:math:`K^{1/2} W P W^T K^{1/2} = Q \Omega^2 Q^T` parts them into oscillators :math:`z = Q^T K^{1/2} W x`, each with a
+shape over all coordinates and a share of the springs' damping; the positions' rates and the drives' work follow
+linearly. What this leaves out (other forces, coupling by damping, the change of pose and depth) is not stiff, friction
+excepted.
 
 A is the matrix of all that: :math:`A y = B \Lambda C y`, where C reads (z, z') off a state, B lifts them to one and
 :math:`C B = 1`, so that functions of A are functions of 2 x 2 matrices.

@@ -31,7 +31,7 @@ from flexclear.pipeline.dynamics.run.start import consistent_start
 #: along both axes; the product of rate and step that its error control settles at
 STAGES, REACH = 12.0, 5.0
 #: an evaluation of the exponential method with its own algebra, in evaluations of the others
-DEARER = 2.0
+DEARER = 1.5
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
 APART = 10.0
 #: a run of fewer evaluations needs no other method
