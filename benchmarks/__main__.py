@@ -14,7 +14,7 @@ from fnmatch import fnmatch
 from importlib.util import find_spec
 from pathlib import Path
 
-from benchmarks import families, log, page
+from benchmarks import families, log, page, system
 from benchmarks.family import WRONG, Case, Family, Record
 from flexclear.pipeline.core.errors import FlexclearError, InputError
 from flexclear.pipeline.core.registry import suggestion
@@ -72,6 +72,9 @@ def _run(name: str, family: Family, options: argparse.Namespace) -> bool:
     if family.needs is not None and not _installed(family.needs[0]):
         library, extra = family.needs
         print(f"{name}: {library} is not installed; .venv/bin/python -m pip install -e '.[{extra}]' brings it")
+        return False
+    if family.children and (why := system.lacking()):
+        print(f"{name}: {why}")
         return False
     every = family.cases(**settings)
     cases = [case for case in every if any(fnmatch(case.name, pattern) for pattern in options.only or ["*"])]

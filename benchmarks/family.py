@@ -39,6 +39,7 @@ class Family:
     modules: what decides about a case. With it, what was found stands until a source that they import changes; without
     it, a case is measured again whenever that is asked for.
     needs: an optional library, and the extra of this project that brings it.
+    children: it measures or limits child processes, which not every system can (`benchmarks.system`).
     """
 
     what: str
@@ -53,3 +54,4 @@ class Family:
     times: bool = True
     modules: Callable[[Case], set[str]] | None = None
     needs: tuple[str, str] | None = None
+    children: bool = False

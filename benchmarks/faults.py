@@ -11,17 +11,16 @@ from __future__ import annotations
 import argparse
 import os
 import random
-import resource
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks import system
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Store, read_record
@@ -61,6 +60,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="+", choices=COMMANDS, metavar="VERB", help="only kills, and of these commands")
     options = parser.parse_args(arguments)
+    if why := system.lacking():
+        parser.error(why)
     rng = random.Random(options.seed)
     with tempfile.TemporaryDirectory(prefix="faults_") as name:
         folder = Path(name)
@@ -204,8 +205,7 @@ def _full(folder: Path, environment: dict[str, str]) -> Counter[str]:
     found = Counter[str]()
     for k, size in enumerate(FULL):
         here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/full{k}"}
-        limit = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (size, size))
-        code = _start(["run", SCENE], here, preexec_fn=limit).wait()
+        code = _start(["run", SCENE], here, preexec_fn=system.limit_files(size)).wait()
         store = Store(Path(here["FLEXCLEAR_RESULTS"]))
         damaged = upkeep.inventory(store, whole=True).damaged if store.root.is_dir() else ()
         found["taken" if damaged or code not in (0, 4) else "found" if code else "harmless"] += 1

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import resource
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from benchmarks import system
 
 #: of times in the log, per second
 UNITS = {"s": 1.0, "us": 1e6}
@@ -48,10 +49,9 @@ def once(task: Callable[[], object]) -> float:
 
 def of_children(task: Callable[[], object]) -> float:
     """Processor time of the processes that one call starts and waits for, with those that they start [s]."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    before = system.seconds_of_children()
     task()
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return system.seconds_of_children() - before
 
 
 def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:

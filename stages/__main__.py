@@ -1,6 +1,7 @@
 """The command ``flexclear``.
 
-Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machine, or of time; 130 interrupted.
+Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machine, of time or of `[limits]`;
+130 interrupted.
 """
 
 from __future__ import annotations

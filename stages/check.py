@@ -1,4 +1,4 @@
-"""``flexclear check``: every mistake of scenes and their recipes at once, with file and line; nothing is run."""
+"""``flexclear check``: every mistake of scenes, recipes and sweeps at once, with file and line; nothing is run."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.errors import InputError, InputErrors
+from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
+from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import compose, load_scene, read_toml
+from flexclear.pipeline.core.scene.oddities import oddities
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.stages import run, s1_mesh, s3_rigid
 from flexclear.stages.graph import Graph
@@ -22,45 +26,65 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.schema import Scene
 
+#: what is told of a file: it is wrong, or asks for too much
+MISTAKES = (InputError, ResourceError)
+
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene or sweep file, or a name below scenes/")
+    parser.add_argument(
+        "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
+    )
     parser.add_argument("--json", action="store_true", help="print the mistakes as JSON")
 
 
 def command(options: argparse.Namespace) -> int:
-    """Tell all mistakes of all scenes; exit code 2 where there are some."""
-    found: dict[str, InputError] = {}
+    """Tell all mistakes of all files; exit code 2 where there are some, 4 where a file only asks for too much.
+
+    What is only odd is told, and is no mistake.
+    """
+    found: dict[str, FlexclearError] = {}
     for name in options.scenes:
-        mistakes, scene = examined(name)
+        mistakes, seen = examined(name)
         found |= {str(mistake): mistake for mistake in mistakes}
-        if not mistakes and scene is not None and not options.json:
-            print(f"{run.find_scene(name)}: {scene.summary()}; no mistake found")
+        if not mistakes and not options.json:
+            print(f"{run.find_scene(name)}: {seen.summary}; no mistake found")
+            for odd in seen.odd:
+                print(f"flexclear: warning: {lines.located(odd)}", file=sys.stderr)
     if options.json:
         print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
     else:
         for mistake in found.values():
-            print(f"flexclear: {lines.located(mistake)}", file=sys.stderr)
+            told = lines.located(mistake) if isinstance(mistake, InputError) else mistake
+            print(f"flexclear: {told}", file=sys.stderr)
         if len(found) > 1:
             print(f"flexclear: {len(found)} mistakes", file=sys.stderr)
-    return InputError.exit_code if found else 0
+    return min((mistake.exit_code for mistake in found.values()), default=0)
 
 
-def examined(name: str) -> tuple[list[InputError], Scene | None]:
-    """All mistakes of a scene, and the scene where it can be read."""
-    found: list[InputError] = []
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """What a file is, in words, and what in it looks odd without being a mistake."""
+
+    summary: str = ""
+    odd: tuple[InputError, ...] = ()
+
+
+def examined(name: str) -> tuple[list[FlexclearError], Seen]:
+    """All mistakes of a scene, sweep or recipe, and what it is where it can be read."""
     try:
         path = run.find_scene(name)
-        if _is_sweep(path):
-            return _of_sweep(path)
-        found += dangling(compose(path), run.recipe_frames, str(path))
-    except InputError as error:
-        return _each(error), None
+        return LOOKS[kind_of_file(read_toml(path))](path)
+    except MISTAKES as error:
+        return _each(error), Seen()
+
+
+def _of_scene(path: Path) -> tuple[list[FlexclearError], Seen]:
+    found = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
     scene = None
     try:
         scene = load_scene(path)
-    except InputError as error:
+    except MISTAKES as error:
         found += _each(error)
     found += _collect(_recipes(path))
     if scene is not None:
@@ -68,27 +92,36 @@ def examined(name: str) -> tuple[list[InputError], Scene | None]:
         found += _collect(_laws(scene), path)
         if not found and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
             found += _collect([lambda: _assembled(scene)], path)
-    return list({str(error): error for error in found}.values()), scene
+    seen = Seen(scene.summary(), tuple(oddities(scene))) if scene is not None else Seen()
+    return list({str(error): error for error in found}.values()), seen
 
 
-def _is_sweep(path: Path) -> bool:
-    """Whether a file is a sweep of a scene: it has no bodies and extends nothing, but says what is varied or kept."""
-    table = read_toml(path)
-    return not {"body", "extends"} & set(table) and bool({"vary", "keep", "scene"} & set(table))
-
-
-def _of_sweep(path: Path) -> tuple[list[InputError], Scene | None]:
-    """All mistakes of a sweep, its own and those of its scene, and that scene."""
+def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
+    """Its own mistakes and those of its scene."""
     from flexclear.stages import sweep, sweep_plan
 
-    try:
-        wanted, scene = sweep.read(path)
-    except InputError as error:
-        return _each(error), None
-    found, _ = examined(str(scene.path))
+    wanted, scene = sweep.read(path)
+    found, seen = examined(str(scene.path))
     if not found:
         found = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
-    return found, scene
+    return found, replace(seen, summary=f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {seen.summary}")
+
+
+def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
+    """A recipe is looked at as where a scene names it, with the limits of a scene that says none."""
+    found = _collect([lambda: s1_mesh.check_size(path, Limits())])
+    if not any(isinstance(error, ResourceError) for error in found):  # what is too large is not meshed
+        found += _collect([lambda: _recipe(path)])
+    if found:
+        return found, Seen()
+    table = s1_mesh.params(path)["recipe"]
+    frames = ", ".join(table.get("frames", {})) or "none"
+    told = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
+    beam = s1_mesh.kind_of(path) == "beam"
+    return [], Seen(f"{told}, mass {float(_undeformed(path).mass):.6g} kg" if beam else told)
+
+
+LOOKS = {SCENE: _of_scene, SWEEP: _of_sweep, RECIPE: _of_recipe}
 
 
 def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
@@ -156,23 +189,25 @@ def _undeformed(recipe: Path) -> xr.Dataset:
     return rigid.build(mesh.build(read_recipe(recipe), place=str(recipe)))
 
 
-def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[InputError]:
+def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[FlexclearError]:
     """What the checks raise; errors without a file are placed in that of `path`."""
-    found: list[InputError] = []
+    found: list[FlexclearError] = []
     for check in checks:
         try:
             with run.in_file(path):
                 check()
-        except InputError as error:
+        except MISTAKES as error:
             found += _each(error)
     return found
 
 
-def _each(error: InputError) -> list[InputError]:
+def _each(error: FlexclearError) -> list[FlexclearError]:
     return list(error.errors) if isinstance(error, InputErrors) else [error]
 
 
-def _record(mistake: InputError) -> dict[str, Any]:
+def _record(mistake: FlexclearError) -> dict[str, Any]:
+    if not isinstance(mistake, InputError):
+        return {"file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
     found = lines.where(mistake)
     file, line = (str(found[0]), found[1]) if found else (None, None)
     return {

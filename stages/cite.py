@@ -1,4 +1,8 @@
-"""``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches."""
+"""``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches.
+
+What every run of the scene imports is apart from what functions import where they need it: another integrator where the
+scene's own is too slow, singular poses, accuracies, frequencies.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,14 @@ from collections.abc import Collection, Iterator
 from importlib import import_module
 
 from flexclear.pipeline.core.citations import cited
-from flexclear.pipeline.core.workflow.fingerprint import Sources, source_file
+from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.registry import module_name
+from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, parents, source_file
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
+
+INTEGRATE, COMPILE = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.compile"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,10 +34,13 @@ def command(options: argparse.Namespace) -> None:
 
 
 def text(graph: Graph, sources: Sources) -> str:
-    """Two lists: methods (module: source) and data (part of the scene: source)."""
+    """Three lists: methods, those that may be needed (module: source), and data (part of the scene: source)."""
     scene = graph.scene
+    found, always = list(methods(graph, sources)), _at_once(graph, sources)
     lines = [f"Methods of {scene.name}"]
-    lines += [f"  {module}: {source}" for module, source in methods(graph, sources)] or ["  (none is named)"]
+    lines += [f"  {module}: {source}" for module, source in found if module in always] or ["  (none is named)"]
+    lines.append("Methods that are used where a run or a command needs them")
+    lines += [f"  {module}: {source}" for module, source in found if module not in always] or ["  (none is named)"]
     lines.append(f"Data of {scene.name}")
     lines += [f"  {place}: {source}" for place, source in scene.sources().items()] or ["  (none is named)"]
     return "\n".join(lines) + "\n"
@@ -42,10 +53,30 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
     reached = sources.closure(roots)
     parts = {name for task in tasks for name in task.modules}
     for name in sorted(reached.keys() - set(_unused(reached, parts))):
+        if name.startswith(f"{COMPILE}."):  # how code is made is no method
+            continue
         path = source_file(sources.root, name)
         assert path is not None  # else it would not be in the closure
         for found in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
             yield name, found
+
+
+def _at_once(graph: Graph, sources: Sources) -> set[str]:
+    """Modules that a run of the scene imports whatever it meets: not those that functions import where they need them,
+    nor the integrators that may take over."""
+    tasks = in_order(graph.up_to("post"))
+    own = module_name(graph.scene.solver.integrator)
+    others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
+    waiting = [task.run.partition(":")[0] for task in tasks] + [name for task in tasks for name in task.modules]
+    seen = set[str]()
+    while waiting:
+        name = waiting.pop()
+        path = source_file(sources.root, name)
+        if name in seen or name in others or path is None:
+            continue
+        seen.add(name)
+        waiting += [*imported(path.read_bytes(), name, path.name == "__init__.py", deep=False)[0], *parents(name)]
+    return seen
 
 
 def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:

@@ -43,20 +43,41 @@ def text(linear: xr.Dataset) -> str:
         f"{a['scene']} at t = {a['time']:.6g} s, drives {a['drives']}",
         *_pose(linear),
         f"equilibrium: largest unbalanced force {a['residual']:.3g} N after {a['iterations']} iterations",
-        f"mobility {a['mobility']}, {a['motions_without_stiffness']} without stiffness; "
-        f"{a['redundant_closure_rows']} redundant closure rows",
+        *_freedoms(linear),
+    ]
+    if not linear.sizes["vibration"]:
+        return "\n".join([*lines, "nothing vibrates: joints and drives hold all bodies"]) + "\n"
+    lines += [
         f"{'':>4} {'frequency':>14} {'damping':>10}  most kinetic energy in",
         f"{'':>4} {'Hz':>14} {'ratio':>10}",
     ]
     share = linear["energy_share"].max("moving_body").values
-    columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "dominant")]
-    for number, hertz, damping, name, part in zip(*columns, share, strict=True):
-        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %)")
+    columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
+    for number, hertz, damping, rate, name, part in zip(*columns, share, strict=True):
+        # what is damped so far has two rates and no frequency: two rows of one motion
+        alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
+        lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")
     return "\n".join(lines) + "\n"
+
+
+def _freedoms(linear: xr.Dataset) -> list[str]:
+    """How many there are, how many of them nothing drives back, and what their count leaves open."""
+    limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
+    lines = [f"mobility {linear.attrs['mobility']}" + (f", {limp} of the motions without stiffness" if limp else "")]
+    if joints := linear.attrs["undetermined_reactions"]:
+        says = "condition of the closed loops follows" if repeated == 1 else "conditions of the closed loops follow"
+        lines.append(
+            f"{repeated} {says} from the others, as three do in a planar loop: motion and frequencies are the same "
+            f"without, but rigid bodies do not determine the reactions of {joints}"
+        )
+    return lines
 
 
 def _pose(linear: xr.Dataset) -> list[str]:
     if "drive_position" not in linear:
         return []
-    places = zip(linear["drive"].values, linear["drive_position"].values, strict=True)
-    return ["drives at " + ", ".join(f"{name} = {value:.6g}" for name, value in places)]
+    names = [str(name) for name in linear["drive"].values]
+    position, each = linear["drive_position"], linear.coords.get("drive_position_units")
+    units = [str(position.attrs.get("units", ""))] * len(names) if each is None else [str(unit) for unit in each.values]
+    places = zip(names, position.values, units, strict=True)
+    return ["drives at " + ", ".join(f"{name} = {value:.6g} {unit}" for name, value, unit in places)]

@@ -49,7 +49,11 @@ def write(kind: str, folder: Path) -> list[Path]:
     targets = [folder / source.name for source in sources]
     for target in targets:
         if target.exists():
-            raise InputError(str(target), "is there already, and is not written over", "name another folder")
+            raise InputError(
+                str(target),
+                "is there already, and is not written over",
+                f"name another folder: flexclear new {kind} FOLDER",
+            )
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for source, target in zip(sources, targets, strict=True):

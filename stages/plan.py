@@ -111,6 +111,13 @@ class Planned:
         run.told(self.folder, files)
 
 
+def _example(scene: Scene) -> str:
+    """What `[accuracy]` of this scene could say."""
+    watched = next((quantity for quantity in scene.watched() if quantity.kind == "position"), None)
+    body = watched.owner if watched is not None else next(iter(scene.rigid()), "body")
+    return f'{body}.position = "10 um"'
+
+
 def bring(scene: Scene, place: Workplace) -> Planned:
     """The plan of a scene, brought up to date; the planned scene's file and the page beside it.
 
@@ -122,7 +129,7 @@ def bring(scene: Scene, place: Workplace) -> Planned:
         raise InputError(
             f"{where} [accuracy]",
             "the scene asks for no accuracy",
-            'name one, such as platform.position = "10 um" in [accuracy]',
+            f"name one with what it may be off, such as {_example(scene)} in [accuracy]",
         )
     if not variants.effects(scene):
         raise InputError(

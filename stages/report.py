@@ -51,9 +51,10 @@ def command(options: argparse.Namespace) -> None:
 
 @dataclass(frozen=True)
 class Scenes:
-    """Graphs of scenes by name, each built once, so that all figures share their tasks."""
+    """Graphs of scenes by name, and times by family, each built once, so that all figures share their tasks."""
 
     graphs: dict[str, Graph] = field(default_factory=dict)
+    times: dict[str, Task] = field(default_factory=dict)
 
     def graph(self, name: str) -> Graph:
         """Graph of ``scenes/<name>.toml``."""
@@ -72,6 +73,11 @@ class Scenes:
         They are seconds of the processor, and so are measured beside other tasks: alone they would be a third of the
         whole report's time, with all other cores idle.
         """
+        if family not in self.times:
+            self.times[family] = self._timing(family)
+        return self.times[family]
+
+    def _timing(self, family: str) -> Task:
         files = sorted((DATA / "scenes" / family).glob("*.toml"))
         if not files:
             raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")

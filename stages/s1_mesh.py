@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.limits import Limits, check_cells
 from flexclear.pipeline.core.scene.load import is_file, read_toml
 from flexclear.pipeline.core.workflow import opened
@@ -30,6 +31,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     edits: values that take the place of the recipe's; of `elements` a factor, which recipes without them go without.
     """
     table = read_toml(recipe)
+    require_kind(table, recipe, RECIPE)
     changes = dict(edits or {})
     factor = changes.pop("elements", None)
     if factor is not None and isinstance(table.get("elements"), int):

@@ -40,7 +40,9 @@ def without_origins(node: Any) -> Any:
     if isinstance(node, dict):
         read = node.get("type") == "table" and "points" in node
         return {k: "" if read and k == "file" else without_origins(v) for k, v in node.items() if k != "source"}
-    return [without_origins(item) for item in node] if isinstance(node, list) else node
+    # most lists are of numbers
+    nested = isinstance(node, list) and any(isinstance(item, (dict, list)) for item in node)
+    return [without_origins(item) for item in node] if nested else node
 
 
 def modules(scene: Scene) -> tuple[str, ...]:

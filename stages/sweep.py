@@ -221,7 +221,8 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
 def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:
     """Points, refusals by their reason, and where the dataset is."""
     refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
-    yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {file}"
+    shown = [run.near(path) for path in (file, file.with_suffix(".png")) if path.exists()]
+    yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {', '.join(shown)}"
     kinds: dict[str, list[str]] = {}
     for reason in refused:
         # the same refusal at another time or size is the same to who reads the summary

@@ -15,6 +15,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.kept import Kept, parse_kept
+from flexclear.pipeline.core.scene.limits import check_members
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
@@ -150,6 +151,7 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
         base = edited(scene, {**sweep.set, "accuracy": None}) if sweep.set else edited(scene, {"accuracy": None})
     except InputError as error:
         raise _placed(f"{where} [set]", error) from None
+    check_members(sweep.members or 0, base.limits, f"{where} [members]")
     made = design(sweep)
     _check_values(base, made, where)
     base = edited(base, made.points()[0])

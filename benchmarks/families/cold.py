@@ -19,6 +19,7 @@ from pathlib import Path
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
 from benchmarks.timing import of_children
+from flexclear.pipeline.core.system import cores
 
 SCENES = ("ideal", "csj", "far_csj_cb")
 
@@ -47,7 +48,7 @@ def _first_run(scene: str, folder: Path) -> Record:
     shutil.rmtree(results / "cache" / "simulate")
     warm = run(kernels[1], "--to", "simulate")
     return {
-        "processors": len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count(),
+        "processors": cores(),
         "wall_s": cold[0],
         "processor_s": cold[1],
         "warm_wall_s": warm[0],
@@ -77,4 +78,5 @@ FAMILY = Family(
     cases=lambda: [Case(name) for name in SCENES],
     measure=measure,
     show=show,
+    children=True,
 )

@@ -120,4 +120,5 @@ FAMILY = Family(
     measure=measure,
     show=show,
     quick="check csj",
+    children=True,
 )

@@ -1,23 +1,26 @@
 """Whole runs against Exudyn at equal error, both against the same converged reference.
 
-Each of Exudyn's runs is measured next to ours that is no worse in position and velocity and needs the fewest
-evaluations. Times are those of the whole integration with its samples; building the model and compiling are in neither.
+Each of Exudyn's runs is measured next to ours that is no worse in position and velocity and needs the least time.
+Times are those of the whole integration with its samples; building the model and compiling are in neither.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from contextlib import closing
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
 from benchmarks import errors
-from benchmarks.errors import Error, Reference, Rung
-from benchmarks.exudyn_model import METHODS, Outcome, solve
+from benchmarks.errors import Error, Reference, Rung, Samples
+from benchmarks.exudyn_apart import Peer
+from benchmarks.exudyn_model import METHODS, Outcome
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
 from benchmarks.page import short
@@ -33,15 +36,21 @@ LONG = 1.0
 SMOOTH = (1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 RARELY = (9e-3, 4.5e-3, 2.25e-3, 1e-3, 2e-4, 1e-4, 5e-5, 2e-5, 1e-5)
 STIFF = (5e-5, 2e-5, 1e-5, 5e-6, 2e-6, 1e-6)
+#: where impacts magnify errors, or the finest run is a reference
+FINER = (*STIFF, 5e-7, 2e-7)
+#: a run that is a reference is recorded so often [s]
+RECORDED = 1e-6
 #: the other methods are no better in the long run; they take part at the first steps of each ladder
 TRIED = 4
+#: a run is left out when another, no worse in either error, takes less than this share of its time
+CLEARLY = 0.9
 
 
 @dataclass(frozen=True)
 class Comparison:
     """A scene, edited or not.
 
-    horizon: end of the comparison [s].  sampling: both codes record every so many seconds.
+    horizon: end of both runs [s].  sampling: both codes record every so many seconds.
     own_law: Exudyn has another friction law.
     study: the cost study in whose figure its runs are points.  note: how they differ from that scene.
     """
@@ -56,6 +65,20 @@ class Comparison:
     note: str = ""
 
 
+@dataclass(frozen=True)
+class Run:
+    """A setting of Exudyn, what came of it, and how wrong that is."""
+
+    method: str
+    step: float
+    outcome: Outcome
+    error: Error | None
+
+    def reaches(self, level: float) -> bool:
+        """Whether its velocity is right to a share of the largest speed."""
+        return self.error is not None and self.error.relative <= level
+
+
 OWN_LAW = "its friction is linear up to one speed and constant above; errors against its own finest run"
 COMPARISONS = {
     "ideal": Comparison("ideal", SMOOTH, study="sps4/ideal"),
@@ -64,7 +87,7 @@ COMPARISONS = {
     "far_cb, recorded every 9 ms": Comparison("far_cb", RARELY, sampling=9e-3),
     "csj without friction": Comparison("csj", STIFF, without_friction),
     "csj, each code with its own friction law": Comparison(
-        "csj", STIFF, own_law=True, study="sps4/csj", note=f"; {OWN_LAW}"
+        "csj", FINER, own_law=True, study="sps4/csj", note=f"; {OWN_LAW}"
     ),
     "far_csj_cb without friction, 5 % modal damping": Comparison(
         "far_csj_cb",
@@ -75,7 +98,7 @@ COMPARISONS = {
     ),
     "far_csj_cb without friction, error up to 30 ms": Comparison(
         "far_csj_cb",
-        STIFF,
+        FINER,
         without_friction,
         horizon=0.03,
         study="sps4/far_csj_cb",
@@ -86,92 +109,156 @@ COMPARISONS = {
 
 def edited(case: Case) -> Mechanism:
     """The mechanism that both codes run."""
-    original = mechanism(case.of.scene)
-    return original.with_scene(case.name, case.of.edit(original.scene))
+    original, asked = mechanism(case.of.scene), case.of
+    scene = asked.edit(original.scene)
+    if asked.horizon is not None:
+        scene = scene.model_copy(update={"time": scene.time.model_copy(update={"end": asked.horizon})})
+    return original.with_scene(case.name, scene)
 
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
     """Of each case a record on what is compared, then one for each of our runs and one for each of Exudyn's."""
     for case in cases:
-        yield case, list(_records(case, edited(case)))
+        here = edited(case)
+        with closing(Peer(here, BODY)) as peer:
+            yield case, list(_records(case, here, peer))
 
 
-def _records(case: Case, here: Mechanism) -> Iterator[Record]:
+def _records(case: Case, here: Mechanism, peer: Peer) -> Iterator[Record]:
     asked: Comparison = case.of
-    horizon = asked.horizon or here.scene.time.end
-    reference = errors.converged(here, BODY, horizon, asked.sampling)
+    reference = errors.converged(here, BODY, here.scene.time.end, asked.sampling)
+    theirs, law = _own(case, peer, reference) if asked.own_law else (reference, {})
+    yield {"horizon": reference.horizon, "version": version("exudyn"), **law}
+    tried = [_tried(peer, method, step, theirs) for method, step in _settings(asked)]
     ours = errors.ladder(here, BODY, reference)
-    theirs, law, steps = reference, {}, asked.steps
-    if asked.own_law:
-        finest = solve(here, BODY, next(iter(METHODS)), steps[-1], asked.sampling)
-        if finest.samples is None:
-            raise RuntimeError(f"Exudyn fails on its finest run of {case.name}: {finest.failure}")
-        theirs, steps = Reference(finest.samples, horizon, asked.sampling), steps[:-1]
-        law = {"difference_of_laws": _numbers(reference.error(finest.samples))}
-    yield {"horizon": horizon, "version": version("exudyn"), **law}
     for r in ours:
         what = {"integrator": r.integrator, "rtol": r.rtol, "evaluations": r.evaluations, "s": r.seconds}
         yield {"by": "flexclear", **what, **_numbers(r.error)}
-    for k, method in enumerate(METHODS):
-        for step in steps[:TRIED] if k else steps:
-            yield {"by": "exudyn", "method": method, "step": step, **_run(here, method, step, theirs, ours)}
+    done = [run for run in tried if run.error is not None]
+    best = [done[k] for k in front([(r.outcome.seconds, r.error.position, r.error.velocity) for r in done if r.error])]
+    wanted = {level: _candidates(done, level) for level in LEVELS}
+    for run in tried:
+        levels = [level for level, runs in wanted.items() if run in runs]
+        record = {"by": "exudyn", "method": run.method, "step": run.step}
+        if run.error is None:
+            yield record | {"failed": run.outcome.failure}
+        elif run in best or levels:
+            yield record | _compared(run, levels, peer, asked.sampling, ours)
+        else:
+            yield record | {"s": run.outcome.seconds, **_numbers(run.error)}
+
+
+def _settings(asked: Comparison) -> list[tuple[str, float]]:
+    """Methods and steps [s] that are tried; with a law of its own the finest run is the reference."""
+    steps = asked.steps[:-1] if asked.own_law else asked.steps
+    return [(method, step) for k, method in enumerate(METHODS) for step in (steps[:TRIED] if k else steps)]
+
+
+def _own(case: Case, peer: Peer, ours: Reference) -> tuple[Reference, Record]:
+    """Exudyn's own finest run as a reference at any time, and how far it is from ours."""
+    finest = peer.run(next(iter(METHODS)), case.of.steps[-1], RECORDED).samples
+    if finest is None:
+        raise RuntimeError(f"Exudyn fails on its finest run of {case.name}")
+    t, velocity = finest.time, finest.velocity
+    position = CubicHermiteSpline(t, finest.position, velocity)
+
+    def at(times: np.ndarray) -> Samples:
+        # within a microsecond of contact a velocity is straight to some micrometres per second
+        return Samples(times, position(times), np.stack([np.interp(times, t, v) for v in velocity.T], axis=1))
+
+    samples = at(ours.samples.time)
+    return replace(ours, samples=samples, at=at), {"difference_of_laws": _numbers(ours.error(samples))}
+
+
+def _tried(peer: Peer, method: str, step: float, reference: Reference) -> Run:
+    outcome = peer.run(method, step, reference.sampling)
+    if outcome.samples is None:
+        return Run(method, step, outcome, None)
+    error = reference.error(outcome.samples)
+    if outcome.seconds < LONG:  # the first run in a process is slower
+        again = peer.run(method, step, reference.sampling)
+        outcome = min(outcome, again, key=lambda o: o.seconds) if again.samples else outcome
+    return Run(method, step, outcome, error)
 
 
 def _numbers(error: Error) -> dict[str, float]:
     return {"position_um": 1e6 * error.position, "velocity_mm_s": 1e3 * error.velocity, "relative": error.relative}
 
 
-def _run(here: Mechanism, method: str, step: float, reference: Reference, ours: list[Rung]) -> Record:
-    """One of their runs, and next to it ours that match its error or one of the levels."""
-    first = solve(here, BODY, method, step, reference.sampling)
-    if first.samples is None:
-        return {"failed": first.failure}
-    try:
-        error = reference.error(first.samples)
-    except ValueError:  # where it cuts its steps, as it may at contacts, its samples come late
-        return {"failed": "its samples are not at the times of the others"}
-    wanted = {"equal": errors.cheapest(ours, lambda e: e.within(error))}
-    for level in LEVELS:
-        wanted[str(level)] = errors.cheapest(ours, partial(_reaches, level))
-    rungs = [rung for rung in wanted.values() if rung]
-    seconds, timed = _side_by_side(partial(solve, here, BODY, method, step, reference.sampling), first, rungs)
-    matches = {name: _match(rung, seconds, timed[_name(rung)]) for name, rung in wanted.items() if rung}
-    return {"s": seconds, **_numbers(error), "ours": matches}
+def front(runs: Sequence[tuple[float, ...]]) -> list[int]:
+    """Which runs count, of their times and errors: no other is no worse in each error in clearly less time."""
+    return [
+        k
+        for k, (mine, *wrong) in enumerate(runs)
+        if not any(s < CLEARLY * mine and all(e <= w for e, w in zip(es, wrong, strict=True)) for s, *es in runs)
+    ]
 
 
-def _name(rung: Rung) -> str:
-    return f"{rung.integrator} {rung.rtol:g}"
+def _candidates(done: list[Run], level: float) -> list[Run]:
+    """The two fastest that reach a level, as times of one run are not sure; where none does, the longest: a bound."""
+    reaching = sorted((run for run in done if run.reaches(level)), key=lambda run: run.outcome.seconds)
+    return reaching[:2] or sorted(done, key=lambda run: -run.outcome.seconds)[:1]
 
 
-def _match(rung: Rung, theirs: float, ours: Sequence[float]) -> dict[str, Any]:
-    whole, bare, alike, *straight = ours
-    found = {"run": _name(rung), "position_um": 1e6 * rung.error.position, "s": whole, "bare_s": bare}
-    found |= {"alike_s": alike, "alike_relative": rung.alike_error.relative}
-    return found | ({"straight_s": straight[0]} if straight else {}) | {"ratio": theirs / whole}
+def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: list[Rung]) -> Record:
+    """One of their runs, and next to it, in turns, ours that is no worse and ours that reach some levels."""
+    assert run.error is not None
+    wanted = {"equal": errors.cheapest(ours, partial(_no_worse, run.error))}
+    wanted |= {str(level): errors.cheapest(ours, partial(_reaches, level)) for level in levels}
+    timers: dict[str, dict[str, Callable[[], float]]] = {}
+    for name, rung in wanted.items():
+        if rung is not None:
+            timers.setdefault(_name(rung), {}).update(_timers(rung, whole=name == "equal"))
+    theirs, times = _side_by_side(partial(peer.run, run.method, run.step, sampling), run.outcome, timers)
+    matches = {name: _match(rung, theirs, times[_name(rung)]) for name, rung in wanted.items() if rung}
+    return {"s": theirs, **_numbers(run.error), "ours": matches}
+
+
+def _no_worse(than: Error, error: Error) -> bool:
+    return error.within(than)
 
 
 def _reaches(level: float, error: Error) -> bool:
     return error.relative <= level
 
 
+def _name(rung: Rung) -> str:
+    return f"{rung.integrator} {rung.rtol:g}"
+
+
+def _timers(rung: Rung, *, whole: bool) -> dict[str, Callable[[], float]]:
+    """What times a run of ours, by its name in the log; beside the whole run, in parts and by straight code."""
+    parts = {"s": rung.time, "bare_s": rung.bare, "alike_s": rung.alike}
+    return {"s": rung.time} if whole else parts | ({"straight_s": rung.straight} if rung.straight else {})
+
+
+def _match(rung: Rung, theirs: float, times: Mapping[str, float]) -> dict[str, Any]:
+    found = {"run": _name(rung), "position_um": 1e6 * rung.error.position, **times}
+    return found | {"alike_relative": rung.alike_error.relative, "ratio": theirs / times["s"]}
+
+
 def _side_by_side(
-    again: Callable[[], Outcome], first: Outcome, rungs: list[Rung]
-) -> tuple[float, dict[str, list[float]]]:
-    """Median times [s] of theirs, by name of ours: whole, integration alone, two sensors, straight code; in turns."""
-    theirs, mine = [first.seconds], {_name(rung): rung for rung in rungs}
-    timers = {name: [r.time, r.bare, r.alike, *([r.straight] if r.straight else [])] for name, r in mine.items()}
-    ours: dict[str, list[list[float]]] = {name: [] for name in mine}
+    again: Callable[[], Outcome], first: Outcome, timers: Mapping[str, Mapping[str, Callable[[], float]]]
+) -> tuple[float, dict[str, dict[str, float]]]:
+    """Median times [s], in turns: of theirs, and of ours by their names and what is timed."""
+    theirs = [first.seconds]
+    ours: dict[str, dict[str, list[float]]] = {name: {part: [] for part in mine} for name, mine in timers.items()}
     for number in range(REPEATS):
         if number and first.seconds < LONG:
             theirs.append(again().seconds)
-        for name, mine_of in timers.items():
-            ours[name].append([timer() for timer in mine_of])
-    return float(np.median(theirs)), {name: np.median(times, axis=0).tolist() for name, times in ours.items()}
+        for name, mine in timers.items():
+            for part, timer in mine.items():
+                ours[name][part].append(timer())
+    medians = {name: {part: float(np.median(t)) for part, t in mine.items()} for name, mine in ours.items()}
+    return float(np.median(theirs)), medians
 
 
 def show(records: list[Record]) -> str:
-    """Times needed for an accuracy, then every run of Exudyn with ours beside it."""
-    heads, runs = {r["case"]: r for r in records if "horizon" in r}, _runs(records)
+    """Times needed for an accuracy, then every run of Exudyn that counts with ours beside it."""
+    order, runs = list(COMPARISONS), _runs(records)
+    known = {r["case"]: r for r in records if "horizon" in r}
+    # a log may have cases that are no longer compared
+    heads = {case: known[case] for case in sorted(known, key=lambda c: order.index(c) if c in order else len(order))}
     levels = [_level_row(case, level, runs[case]) for case in heads for level in LEVELS]
     head = (
         "velocity error below",
@@ -197,8 +284,20 @@ def show(records: list[Record]) -> str:
                 "; each against the converged solution of its own law, which differ by "
                 f"{short(d['position_um'])} um and {short(d['velocity_mm_s'])} mm/s"
             )
-        texts.append(f"{case} ({note}):\n\n{pipe_table(columns, [_run_row(run) for run in runs[case]])}")
+        done = [run for run in runs[case] if "s" in run]
+        best = [done[k] for k in front([(run["s"], run["position_um"], run["velocity_mm_s"]) for run in done])]
+        listed = pipe_table(columns, [_run_row(run) for run in best if "ours" in run])
+        texts.append(f"{case} ({note}):\n\n{listed}\n\n{_unlisted(runs[case])}".rstrip())
     return "\n\n".join(texts)
+
+
+def _unlisted(runs: list[Record]) -> str:
+    """What became of settings that failed."""
+    found: dict[str, list[str]] = {}
+    for run in runs:
+        if "failed" in run:
+            found.setdefault(run["failed"], []).append(_called(run))
+    return "\n".join(f"Failed: {'; '.join(names)} ({why})." for why, names in found.items())
 
 
 def _runs(records: list[Record]) -> dict[str, list[Record]]:
@@ -213,14 +312,14 @@ def _runs(records: list[Record]) -> dict[str, list[Record]]:
 def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     """Their fastest run that reaches a level against ours; theirs may reach none, then its longest run is a bound."""
     name = f"{case}: {100 * level:g} %"
-    done = [r for r in runs if "s" in r and str(level) in r["ours"]]
+    done = [r for r in runs if str(level) in r.get("ours", ())]
     reaching = [r for r in done if r["relative"] <= level]
     if not done:
         return [name, *[""] * 11]
     best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
     mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
-    theirs = [seconds, f"{best['method']}, {best['step']:g} s", short(best["position_um"])]
+    theirs = [seconds, _called(best), short(best["position_um"])]
     # records from before these were measured say nothing about them
     alike, bare, straight = (
         f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("alike_s", "bare_s", "straight_s")
@@ -230,14 +329,14 @@ def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     return [name, *theirs, *mine, ratio, alike, error, bare, straight]
 
 
+def _called(run: Record) -> str:
+    return f"{run['method']}, {run['step']:g} s"
+
+
 def _run_row(run: Record) -> list[str]:
-    name = f"{run['method']}, {run['step']:g} s"
-    if "failed" in run:
-        return [name, "failed", "", "", "", "", ""]
-    cells = [short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
+    cells = [_called(run), short(run["position_um"]), short(run["velocity_mm_s"]), f"{run['s']:.3g}"]
     equal = run["ours"].get("equal")
-    matched = [equal["run"], f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""]
-    return [name, *cells, *matched]
+    return cells + ([equal["run"], f"{equal['s']:.3g}", f"{equal['ratio']:.3g}"] if equal else ["", "", ""])
 
 
 def points(records: list[Record]) -> dict[str, list[dict[str, Any]]]:
@@ -273,11 +372,12 @@ def files(records: list[Record]) -> Mapping[str, bytes]:
 
 FAMILY = Family(
     what="whole runs against Exudyn at equal error",
-    takes="15 min",
+    takes="12 min",
     page="benchmarks.md",
     cases=lambda: [Case(name, asked) for name, asked in COMPARISONS.items()],
     measure=measure,
     show=show,
     files=files,
     needs=("exudyn", "exudyn"),
+    children=True,
 )

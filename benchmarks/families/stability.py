@@ -106,4 +106,5 @@ FAMILY = Family(
     settings={"seed": 20190310, "random": 200},
     times=False,
     modules=runs.modules,
+    children=True,
 )

@@ -68,7 +68,7 @@ class SolverError(FlexclearError):
 
 
 class ResourceError(FlexclearError):
-    """A limit of the machine (disk, memory) stopped the run; nothing half-written is left."""
+    """A limit of the machine (disk, memory) or of `[limits]` stopped the work; nothing half-written is left."""
 
     exit_code = 4
 

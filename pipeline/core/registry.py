@@ -8,6 +8,7 @@ A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a ta
 from __future__ import annotations
 
 import difflib
+import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
 from typing import Any, get_args
@@ -19,13 +20,34 @@ LISTED = 40
 #: longer names are compared with none
 LONGEST_NAME = 100
 
+#: what books and other programs say, the name here that is meant (the first of them that is known), and what to write
+ELSEWHERE = (
+    (("hinge", "pin", "rotational"), "revolute", ""),
+    (("slider", "slide", "translational"), "prismatic", ""),
+    (("ball", "ball-joint"), "spherical", ""),
+    (("weld", "rigid-joint"), "fixed", ""),
+    (("cardan", "hooke"), "universal", ""),
+    (("spring", "damper"), "spring-damper", "it is between two points, 'joint-spring' along a joint"),
+    (("force", "torque"), "law", "a drive prescribes a motion; a force along a joint is a load of type 'joint-force'"),
+    (("motor", "torque"), "joint-force", "it is along a joint; what prescribes a motion is a drive"),
+    (
+        ("constant-speed", "constant-velocity", "speed", "velocity", "ramp", "linear"),
+        "polynomial",
+        "a constant speed is { type = 'polynomial', coefficients = [0, '60 rpm'] }",
+    ),
+    (("sine", "sin", "cosine", "sinusoidal"), "harmonic", ""),
+    (("mu", "coefficient"), "dynamic", ""),
+    (("frames",), "mesh", "frames of a flexible body stand in its recipe"),
+    (("mass", "inertia", "com", "density"), "mesh", "of a flexible body they follow from its recipe"),
+)
+
 
 def listed(package: str, name: str, *, where: str, table: str = "NAMES") -> tuple[str, str]:
     """Module (below the package) and object that a family lists under `name`; neither is imported.
 
     Raises InputError, placed at `where`, for a name that the family does not have.
     """
-    family = import_module(package)
+    family = sys.modules.get(package) or import_module(package)  # every command asks thousands of times
     names: Mapping[str, str] = getattr(family, table)
     if name not in names:
         raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
@@ -59,7 +81,10 @@ def module_name(name: str) -> str:
 
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
-    """'did you mean ...?' for the nearest known name, or a list of those there are."""
+    """'did you mean ...?' for the name that is meant, or the nearest one, or a list of those there are."""
+    for words, meant, told in ELSEWHERE:
+        if name in words and meant in known:
+            return f"did you mean '{meant}'?" + (f" {told}" if told else "")
     # the comparison takes the product of both lengths
     near = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
     if near:

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from flexclear.pipeline.post.plotting.style import INK, SOFT, files, grid, heading, plain, style
 
@@ -49,10 +50,14 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
         told += [f"{refused} refused"] if refused else []
         told += [f"{missing} not run"] if missing else []
         told += _still(sweep, panels)
+        if draw is _curve:
+            told += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in panels)][:1]
         heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(told))
         return files(NAME, figure)
 
 
+#: what the band about a curve is, by the variable that it is drawn from
+BANDS = {".deviation": "bands: ± the members' standard deviation", ".error": "bands: ± the error of time integration"}
 Draw = Callable[[Figure, Axes, xr.Dataset, str], None]
 
 
@@ -135,6 +140,8 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     if spread is not None:
         ax.fill_between(x, y - spread, y + spread, color=LINE, alpha=0.22, lw=0.0)
     ax.plot(x, y, color=LINE, marker="o", ms=3.0)
+    if name.endswith(".count"):
+        ax.yaxis.set_major_locator(MaxNLocator(integer=True))
     _refusals_and_scale(ax, sweep, x)
     _label(ax, sweep, parameter, name)
 

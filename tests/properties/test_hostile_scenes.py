@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.pipeline.core.scene.fields import Inertia, Position
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.units import UNITS, quantity, unit
@@ -65,7 +65,6 @@ HOSTILE: dict[str, tuple[str, ...]] = {
     BASE + "[joint.B]\nbetween = 5": ("[joint.B.type]",),
     BASE + "[load.f]\ntype = 'point-force'\nframe = 'crank.P'\nforce = 5": ("[load.f.force]", "expected a list"),
     BASE + "[solver]\nrtol = -1e-9": ("[solver.rtol]", "must be greater than"),
-    BASE + "[output]\ninterval = 1e-12": ("output.interval", "1e+12 rows"),
     BASE + "[solver]\nevaluations = 99999999999999999999999": ("[solver.evaluations]", "less than or equal to"),
     BASE + "[output]\ninterval = 0": ("[output.interval]", "must be greater than 0"),
     "x = " + "[" * 3000 + "]" * 3000: ("too deeply",),
@@ -92,6 +91,14 @@ def test_a_hostile_file_is_refused_in_words(text: str, tmp_path: Path) -> None:
     assert error.value.exit_code == 2
     for word in HOSTILE[text]:
         assert word in str(error.value)
+
+
+def test_what_is_right_but_too_much_is_refused_as_a_limit(tmp_path: Path) -> None:
+    path = tmp_path / "hostile.toml"
+    path.write_text(BASE + "[output]\ninterval = 1e-12")
+    with pytest.raises(ResourceError, match=r"\[output.interval\]: .*1e\+12 rows") as error:
+        load_scene(path)
+    assert error.value.exit_code == 4
 
 
 def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:

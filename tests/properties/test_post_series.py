@@ -14,7 +14,7 @@ from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.errors import ensemble_deviations, max_deviation, velocity_at_events
 from flexclear.pipeline.post.horizon import horizon, spread
 from flexclear.pipeline.post.poincare import at_times
-from flexclear.pipeline.post.rotations import angle_about_y
+from flexclear.pipeline.post.rotations import angle_about_y, turning
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)
@@ -42,6 +42,40 @@ def test_rotation_between_is_accurate_for_tiny_angles(angle, axis):
     turned = quaternion_product(base, rotation_vector_to_quaternion(angle * axis))
     assert rotation_between(base, turned) == pytest.approx(angle, rel=1e-6, abs=1e-15)
     assert rotation_between(base, -turned) == pytest.approx(rotation_between(base, turned), abs=1e-15)
+
+
+@given(vectors, vectors, st.floats(-40.0, 40.0), st.sampled_from([0.005, 0.25]))
+def test_a_rotation_about_a_fixed_axis_is_drawn_with_its_sign_and_its_full_turns(axis, start, rate, interval):
+    axis = np.array([0.0, 0.6, -0.8]) if np.linalg.norm(axis) < 1e-3 else axis / np.linalg.norm(axis)
+    rate += np.copysign(0.1, rate)  # what does not turn has no axis
+    time = np.arange(0.0, 2.0, interval)  # of the coarser one: ten radians between rows
+    angle = rate * time + 0.3 * np.sin(7.0 * time)
+    turns = np.column_stack([np.cos(0.5 * angle), np.outer(np.sin(0.5 * angle), axis)])
+    turns[::3] *= -1.0  # which is the same rotation
+    q = quaternion_product(turns, rotation_vector_to_quaternion(start))
+    found = turning(time, q, np.outer(rate + 2.1 * np.cos(7.0 * time), axis))
+    assert found.axis is not None
+    along = np.sign(np.dot(found.axis, axis))
+    assert found.axis == pytest.approx(along * axis, abs=1e-7)  # rounding of the products over the smallest turn
+    assert found.angle == pytest.approx(along * angle, abs=1e-6)
+
+
+def test_the_axis_of_a_planar_motion_is_that_of_the_world():
+    angle = np.linspace(0.0, -3.0, 31)
+    q = np.column_stack([np.cos(0.5 * angle), np.zeros((31, 2)), np.sin(0.5 * angle)])
+    found = turning(np.linspace(0.0, 1.0, 31), q, np.tile([0.0, 0.0, -3.0], (31, 1)))
+    assert found.title == "rotation about z"
+    assert found.angle == pytest.approx(angle, abs=1e-13)  # of an arc tangent and its unwrapping
+
+
+def test_a_rotation_about_changing_axes_is_drawn_as_the_angle_from_the_start():
+    time = np.linspace(0.0, 1.0, 201)
+    vectors = np.column_stack([time, 0.5 * np.sin(3.0 * time), np.zeros_like(time)])
+    q = np.array([rotation_vector_to_quaternion(v) for v in vectors])
+    found = turning(time, q, np.zeros((time.size, 3)))
+    assert found.axis is None
+    assert found.title == "rotation from the start"
+    assert found.angle == pytest.approx(rotation_between(q[:1], q), abs=1e-15)  # it is that function
 
 
 def test_a_run_does_not_deviate_from_itself():

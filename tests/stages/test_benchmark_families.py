@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from benchmarks import families, log, page
+from benchmarks import families, faults, log, page
 from benchmarks.__main__ import main
 from benchmarks.families import solids
 from benchmarks.family import Case, Family
@@ -120,6 +120,17 @@ def test_a_name_that_is_no_family_is_refused_with_those_there_are(capsys: pytest
 def test_options_that_ask_for_nothing_are_refused(options: list[str], words: str, capsys: pytest.CaptureFixture):
     assert main(options) == 2
     assert words in capsys.readouterr().err
+
+
+def test_a_system_without_times_of_children_is_told_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):
+    """As on Windows; families that need none run there."""
+    monkeypatch.setitem(sys.modules, "resource", None)
+    assert main(["commands", "cold"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert [line.partition(":")[0] for line in said] == ["commands", "cold"]
+    assert all("which this system does not have" in line for line in said)
+    with pytest.raises(SystemExit, match="2"):
+        faults.main([])
 
 
 def test_without_the_peer_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture):

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import errors, log, maximal, page, timing
+from benchmarks import crew, errors, exudyn_apart, log, maximal, page, timing
 from benchmarks.errors import SAMPLING, Error, Samples
-from benchmarks.exudyn_model import METHODS, holds_at_zero, polynomials, solve
+from benchmarks.exudyn_model import METHODS, Outcome, holds_at_zero, polynomials, solve
 from benchmarks.families import evaluation, exudyn, growth
 from benchmarks.family import Case
 from benchmarks.mechanisms import (
@@ -134,6 +134,56 @@ def test_errors_are_taken_up_to_the_horizon_and_between_equal_times():
         reference.error(Samples(time + 0.3 * SAMPLING, moved, still))
 
 
+def test_samples_that_come_late_are_compared_at_their_own_times(root: Path):
+    """A code that cuts its steps is charged with its errors alone, not with how far things moved until its samples."""
+    here = Mechanism("ideal", scene(root, "ideal"), {})
+    reference = errors.converged(here, "platform", here.scene.time.end)
+    assert reference.at is not None
+    late = np.append(0.0, np.arange(1, 180) * SAMPLING + 3e-4)
+    known = reference.at(late)
+    assert np.array_equal(known.time, late)
+    # our reference is at a tolerance of 1e-13, the closed form's roots at rounding; 0.3 ms are 0.1 mm here
+    assert max(platform_motion(known)) < 1e-9
+    wrong = Samples(late, known.position + np.array([0.0, 0.0, 1e-6]), known.velocity)
+    assert reference.error(wrong).position == pytest.approx(1e-6, rel=1e-6)
+
+
+def test_runs_count_that_no_other_beats():
+    """Of (time, error, error): in clearly less time and no worse in either error."""
+    runs = [(1.0, 1.0, 1.0), (0.5, 1.0, 2.0), (0.5, 1.0, 1.0), (0.95 * 0.5, 0.5, 0.5), (3.0, 0.1, 0.1), (4.0, 0.1, 0.2)]
+    assert exudyn.front(runs) == [1, 2, 3, 4]
+
+
+def test_the_peer_s_crash_is_the_outcome_of_a_setting(monkeypatch: pytest.MonkeyPatch):
+    """A process that dies is replaced; what a used one dies of is asked once more of a fresh one."""
+    begun: list[list[float]] = []
+
+    class Process:
+        def __init__(self, work: object, limit: int) -> None:
+            begun.append([])
+
+        def give(self, parameters: tuple[object, ...]) -> None:
+            begun[-1].append(float(str(parameters[3])))
+
+        def take(self) -> Outcome:
+            step = begun[-1][-1]
+            if step == 1.0 or (step == 2.0 and len(begun[-1]) > 1):
+                raise crew.LostError("its process died (SIGSEGV)")
+            if step == 3.0:
+                raise crew.LostError("did not end within 120 s of processor time", 120.0)
+            return Outcome(step, None if step == 4.0 else Samples(*np.zeros((3, 1))), "no way" if step == 4.0 else "")
+
+        def dismiss(self) -> None:
+            pass
+
+    monkeypatch.setattr(exudyn_apart, "Worker", Process)
+    peer = exudyn_apart.Peer(Mechanism("none", growth.four_bars(1), {}), "bar0")
+    told = [peer.run("any", step, SAMPLING).failure for step in (5.0, 1.0, 5.0, 2.0, 5.0, 3.0, 4.0, 5.0)]
+    died, late = "its process died (SIGSEGV)", "did not end within 120 s of processor time"
+    assert told == ["", died, "", "", "", late, "no way", ""]
+    assert begun == [[5.0, 1.0], [1.0], [5.0, 2.0], [2.0, 5.0, 3.0], [4.0], [5.0]]
+
+
 def test_equal_error_means_worse_in_neither_quantity():
     assert Error(1.0, 1.0, 1.0).within(Error(1.0, 2.0, 1.0))
     assert not Error(1.5, 1.0, 1.0).within(Error(1.0, 2.0, 1.0))
@@ -179,9 +229,9 @@ def test_the_peer_s_model_of_the_ideal_mechanism_converges_to_its_motion(root: P
         samples = solve(here, "platform", next(iter(METHODS)), step, SAMPLING).samples
         assert samples is not None
         found.append(platform_motion(samples))
-    # the trapezoidal rule: 4e-6 m and 1.4e-6 m/s at the first step, a quarter of it at half the step
-    assert found[0][0] < 1e-5
-    assert found[0][1] < 5e-6
+    # the trapezoidal rule: 4.7e-6 m and 1e-5 m/s at the first step, a quarter of it at half the step
+    assert found[0][0] < 5e-5
+    assert found[0][1] < 1e-4
     assert np.allclose(np.divide(found[0], found[1]), 4.0, rtol=0.1)
 
 

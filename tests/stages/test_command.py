@@ -176,6 +176,20 @@ def test_cite_names_methods_that_are_used_and_no_others(command: Said):
     assert "PID" in controlled
 
 
+@pytest.mark.parametrize("scene", ["sps4/csj", "sps4/far_csj_cb"])
+def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(command: Said, scene: str):
+    """All were in one list, with Lyapunov exponents, LU factors and the registers of the processor."""
+    _, said, _ = command("cite", scene)
+    always, _, rest = said.partition("Methods that are used where a run or a command needs them\n")
+    some, _, _ = rest.partition("Data of")
+    for module in ("integrate.dop853", "contact.normal.lankarani_nikravesh", "drives.step"):
+        assert f"{module}:" in always
+    for module in ("integrate.radau", "integrate.newton", "run.periods", "linear.differences", "run.collocation"):
+        assert f"{module}:" in some
+        assert f"{module}:" not in always
+    assert "dynamics.compile" not in said
+
+
 def test_report_lists_only_commands_that_do_something(command: Said):
     """Each verb of the help has its own help, and a function behind it."""
     _, out, _ = command("--help")

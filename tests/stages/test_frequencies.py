@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from flexclear import pipeline
 from flexclear.pipeline.core.errors import FlexclearError, InputError
@@ -15,6 +16,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.stages.__main__ import main
+from flexclear.stages.frequencies import text
 from flexclear.stages.graph import Graph
 
 #: makes one equilibrium in a fresh process and prints the own modules that it loaded
@@ -41,10 +43,26 @@ def test_the_command_prints_pose_residual_and_mobility_then_the_table(
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "checks/pendulum at t = 0.5 s, drives held"
     assert lines[1].startswith("equilibrium: largest unbalanced force")
-    assert lines[2] == "mobility 1, 0 without stiffness; 0 redundant closure rows"
+    assert lines[2] == "mobility 1"
     number, hertz, damping, owner, share = lines[-1].split(maxsplit=4)
     assert (number, damping, owner, share) == ("1", "0", "bob", "(100 %)")
     assert float(hertz) == pytest.approx(np.sqrt(9.81) / (2.0 * np.pi), rel=1e-6)
+
+
+def test_what_loops_say_twice_is_told_where_reactions_depend_on_it() -> None:
+    """A four-bar of hinges whose motor is held: three conditions too many, and nothing that could vibrate."""
+    told = {
+        "scene": "four_bar", "time": 0.0, "drives": "held", "residual": 0.0, "iterations": 0, "mobility": 0,
+        "motions_without_stiffness": 0, "redundant_closure_rows": 3, "undetermined_reactions": "A, B, C, D",
+    }  # fmt: skip
+    still = xr.Dataset(coords={"vibration": np.zeros(0, dtype=int)}, attrs=told)
+    *_, mobility, repeated, nothing = text(still).splitlines()
+    assert mobility == "mobility 0"
+    assert repeated.startswith("3 conditions of the closed loops follow from the others, as three do in a planar loop:")
+    assert repeated.endswith("rigid bodies do not determine the reactions of A, B, C, D")
+    assert nothing == "nothing vibrates: joints and drives hold all bodies"
+    still.attrs |= {"redundant_closure_rows": 2, "undetermined_reactions": ""}  # as of gears: nothing depends on them
+    assert "conditions" not in text(still)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.fingerprint import Sources, imported
+from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, parents, source_file
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
 from flexclear.stages import s4_simulate, s5_post
 from flexclear.stages.graph import Graph
@@ -54,6 +54,12 @@ def test_floats_keep_every_digit():
 def test_what_json_cannot_say_is_kept_as_text():
     """A nan or a date in a recipe is for the recipe's check to refuse, in words."""
     assert flatten({"a": float("nan"), "b": datetime.date(2019, 3, 10)}) == [("a", "NaN"), ("b", '"2019-03-10"')]
+
+
+@given(LEAVES | st.lists(st.floats(allow_nan=True)) | st.lists(st.integers() | st.booleans() | st.text('a"ü\n')))
+def test_leaves_are_written_as_json_writes_them(leaf: object):
+    """Also those that are not given to its encoder."""
+    assert flatten(leaf) == [("", json.dumps(leaf, ensure_ascii=False))]
 
 
 def test_reasons_are_words():
@@ -101,6 +107,15 @@ def f():
     assert libraries == {"numpy", "scipy", "xarray"}
     own, _ = imported(b"from .near import x", "flexclear.pipeline.post", package=True)
     assert own == {"flexclear.pipeline.post.near", "flexclear.pipeline.post.near.x"}
+
+
+def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: Sources):
+    """Whatever the search leaves out as the name of something in a module is no file."""
+    closure = sources.closure(["flexclear.stages.s4_simulate", "flexclear.pipeline.post.figures.fig11"])
+    named = {name for module in closure.values() for name in module.own} | {
+        n for name in closure for n in parents(name)
+    }
+    assert {name for name in named if source_file(root, name) is not None} <= closure.keys()
 
 
 def test_a_root_that_does_not_exist_is_an_error(root: Path):

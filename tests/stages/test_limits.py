@@ -15,7 +15,7 @@ from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.pipeline.core.scene.demand import check_run, row
 from flexclear.pipeline.core.scene.limits import check_cells
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.stages import cost, s4_simulate, sections
 from flexclear.stages.__main__ import main
@@ -53,6 +53,31 @@ def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monk
             check_run(load_scene(path, {f"limits.{key}": "10 kB"}), tmp_path)
     with pytest.raises(InputError, match=r"expected a size such as '4 GB'"):
         load_scene(path, {"limits.memory": "4 stones"})
+
+
+def test_rows_and_members_are_limits_that_a_scene_may_raise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """What is asked for is right, but too much: exit code 4, as for parts, cells and modes."""
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    path = written(tmp_path, SCENE + JOINT)
+    for place, value, told in (
+        ("output.interval", "1e-12 s", "more than the 10000000 that limits.rows allows"),
+        ("ensemble.members", 200_000, "[ensemble.members]: 200000 are more than the 100000 that limits.members allows"),
+    ):
+        assert main(["run", str(path), "--set", f"{place}={value!r}"]) == 4
+        assert told in capsys.readouterr().err
+        with pytest.raises(ResourceError, match=r"^.*limited.toml \["):
+            load_scene(path, {place: value})
+    limits = {"limits.rows": 10**15, "limits.members": 10**6}
+    load_scene(path, limits | {"output.interval": "1e-12 s", "ensemble.members": 200_000})
+    with pytest.raises(ResourceError, match=r"limits\.rows"):
+        with_numbers(load_scene(path), {"output.interval": 1e-12})
+    (tmp_path / "many.toml").write_text(
+        'scene = "limited.toml"\nkeep = ["bob.position.final"]\nmembers = 200_000\nvary."solver.rtol" = [1e-5, 1e-6]\n'
+    )
+    assert main(["check", str(tmp_path / "many.toml")]) == 4
+    assert "[members]: 200000 are more than the 100000" in capsys.readouterr().err
 
 
 def test_limits_are_no_facts_and_reach_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -16,6 +16,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.oddities import oddities
 from flexclear.stages import run
 from flexclear.stages.__main__ import main
 from flexclear.stages.as_json import as_json
@@ -27,6 +28,8 @@ TOLD = dict(
 )
 #: sweeps are no scenes, though they lie beside them
 SCENES = [p for p in sorted((Path(__file__).parents[2] / "scenes").rglob("*.toml")) if p.parent.name != "sweeps"]
+#: right in itself, but more than `[limits]` allows
+TOO_MUCH = ("far too many rows",)
 RECIPES = sorted((Path(__file__).parents[2] / "meshes").rglob("*.toml"))
 
 
@@ -53,10 +56,35 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
     text = (folder / file).read_text()
     assert old is None or old in text
     (folder / file).write_text(text + new if old is None else text.replace(old, new, 1))
-    assert main(["check", str(folder / "slider_crank.toml")]) == 2
+    assert main(["check", str(folder / "slider_crank.toml")]) == (4 if name in TOO_MUCH else 2)
     said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
     # lists of all names that there are grow with the program
     assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == TOLD[name].strip()
+
+
+@pytest.mark.parametrize(
+    "old,new,told",
+    [
+        (
+            'clearance = "0.1 mm"',
+            "clearance = 0.1",
+            r"\[joint.pin.clearance\], line \d+: 100 mm is more than the pin's radius, 10 mm",
+        ),
+        (
+            'inertia = ["600 kg mm^2", "600 kg mm^2", "1000 kg mm^2"]',
+            "inertia = [600, 600, 1000]",
+            r"\[body.crank.inertia\], line \d+: a radius of gyration of 35.4 m for a body whose frames",
+        ),
+    ],
+)
+def test_what_looks_like_a_slip_of_units_is_told_and_not_refused(
+    old: str, new: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    scene, _ = write("slider-crank", tmp_path)
+    assert old in scene.read_text()
+    scene.write_text(scene.read_text().replace(old, new))
+    assert main(["check", str(scene)]) == 0
+    assert re.search(told, capsys.readouterr().err)
 
 
 def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(
@@ -124,7 +152,7 @@ def test_the_schema_accepts_what_the_loader_accepts(path: Path, validators):
     table = tomllib.loads(path.read_text())
     recipe = "shape" in table
     if not recipe:
-        load_scene(path)
+        assert oddities(load_scene(path)) == []
     assert list(validators[recipe].iter_errors(table)) == []
 
 
@@ -195,6 +223,63 @@ def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, c
     scene.write_text(text.replace('position = [0, 0, "260 mm"]', 'position = ["20 mm", 0, "260 mm"]'))
     assert main(["check", str(scene)]) == 2
     assert re.search(r"\[joint\.\w+", capsys.readouterr().err)
+
+
+def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    _, rod = write("slider-crank", tmp_path)
+    assert main(["check", str(rod)]) == 0
+    # 200 mm x 12 mm x 8 mm of 7850 kg/m^3
+    assert f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no mistake" in (
+        capsys.readouterr().out
+    )
+    text = rod.read_text()
+    rod.write_text(
+        text.replace("elements = 10", "element = 10").replace('small_end = { x = "200 mm"', "small_end = { x = 1")
+    )
+    assert main(["check", str(rod), "--json"]) == 2
+    assert {m["place"].partition(" ")[2] for m in json.loads(capsys.readouterr().out)} >= {"[elements]", "[element]"}
+    rod.write_text(text.replace("elements = 10", "elements = 1000000"))
+    assert main(["check", str(rod)]) == 4
+    assert "1e+06 cells are more than the 500000 that limits.cells allows" in capsys.readouterr().err
+
+
+SWEEP = (
+    'scene = "slider_crank.toml"\nkeep = ["wrist.peak_force"]\nvary."joint.wrist.clearance" = ["0.1 mm", "0.2 mm"]\n'
+)
+LOOK = 'flexclear check {} looks at it; bodies of scenes name it: mesh = "{}"'
+#: command, what it is given, what that is, what the command takes, and the way on
+STRAY = {
+    "recipe run": ("run", "rod", "a mesh recipe, not a scene", LOOK),
+    "recipe asked why": ("why", "rod", "a mesh recipe, not a scene", LOOK),
+    "recipe drawn": ("render", "rod", "a mesh recipe, not a scene", LOOK),
+    "recipe swept": ("sweep", "rod", "a mesh recipe, not a sweep of a scene", LOOK),
+    "sweep run": ("run", "many", "a sweep of a scene, not a scene", "flexclear sweep {}"),
+    "sweep planned": ("plan", "many", "a sweep of a scene, not a scene", "flexclear sweep {}"),
+    "scene swept": ("sweep", "slider_crank", "a scene, not a sweep of a scene", "flexclear run {}"),
+}
+
+
+@pytest.mark.parametrize("case", STRAY)
+def test_a_file_that_a_command_does_not_take_is_named_with_the_command_that_does(
+    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    write("slider-crank", tmp_path)
+    (tmp_path / "many.toml").write_text(SWEEP)
+    command, name, said, hint = STRAY[case]
+    path = (tmp_path / f"{name}.toml").resolve()
+    assert main([command, str(path)]) == 2
+    assert capsys.readouterr().err == f"flexclear: {path}: is {said}\n  hint: {hint.format(path, path)}\n"
+
+
+def test_a_sweep_or_a_scene_is_no_mesh_of_a_body(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene, _ = write("slider-crank", tmp_path)
+    (tmp_path / "many.toml").write_text(SWEEP)
+    text = scene.read_text()
+    for other in ("many", "slider_crank"):
+        scene.write_text(text.replace('mesh = "rod.toml"', f'mesh = "{other}.toml"'))
+        assert main(["check", str(scene)]) == 2
+        assert "not a mesh recipe" in capsys.readouterr().err
 
 
 def test_check_looks_at_sweeps_and_at_their_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

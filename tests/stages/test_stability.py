@@ -112,12 +112,19 @@ def test_friction_that_feeds_energy_is_wrong():
 
 
 def test_a_case_that_hangs_and_one_that_dies_are_outcomes_and_the_others_go_on():
-    todo = [Case(f"joints {n}", Parameters(joints=n)) for n in (1, 2, 3, 4)]
+    todo = [Case(f"joints {n}", Parameters(joints=n)) for n in (1, 2, 3, 4, 5)]
     found = {case.of.joints: record for case, record in crew.outcomes(todo, 1, hard_cases.work, limit=2)}
-    assert {n: record["verdict"] for n, record in found.items()} == {1: FINISHED, 2: WRONG, 3: WRONG, 4: FINISHED}
+    assert {n: record["verdict"] for n, record in found.items()} == {
+        1: FINISHED,
+        2: WRONG,
+        3: WRONG,
+        4: WRONG,
+        5: FINISHED,
+    }
     # the system counts in whole seconds: what ends at once has at least one
     assert "did not end within 2 s" in found[2]["reason"]
     assert "died (exit code 7)" in found[3]["reason"]
+    assert "died (SIGSEGV)" in found[4]["reason"]
 
 
 def test_outcomes_are_remembered_until_their_sources_change(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -136,4 +136,10 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "extends nothing there": (SCENE, "title = ", 'extends = "slider.toml"\ntitle = '),
     "extends itself": (SCENE, "title = ", 'extends = "slider_crank.toml"\ntitle = '),
     "replace without extends": (SCENE, None, '\n[replace.joint.pin]\ntype = "fixed"\n'),
+    # as books and other programs say it
+    "joint called hinge": (SCENE, 'type = "revolute"', 'type = "hinge"'),
+    "spring between two points": (SCENE, 'type = "gravity"', 'type = "spring"'),
+    "torque of a drive": (SCENE, 'joint = "main"', 'joint = "main"\ntorque = "2 N m"'),
+    "friction called mu": (SCENE, "static = 0.1, dynamic = 0.08", "static = 0.1, dynamic = 0.08, mu = 0.1"),
+    "frames of a flexible body": (SCENE, 'mesh = "rod.toml" ', 'frames.end = {}\nmesh = "rod.toml" '),
 }  # fmt: skip

@@ -204,6 +204,8 @@ def sweep(root: Path) -> int:
     removed = 0
     for folder, _, names in os.walk(root):
         for name in names:
+            if not name.endswith((".tmp", ".part", ".lock")):
+                continue
             path = Path(folder, name)
             if name.endswith(".tmp") and _abandoned(path):
                 with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps

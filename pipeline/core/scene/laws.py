@@ -313,11 +313,9 @@ def law_types(node: object) -> Iterator[str]:
     """Types of all laws anywhere in a part, those inside sums and sections included."""
     if isinstance(node, KINDS):
         yield node.type
-    if isinstance(node, Part):
-        for name in type(node).model_fields:
-            yield from law_types(getattr(node, name))
-    elif isinstance(node, (tuple, list)):
-        for item in node:
+    below = [getattr(node, name) for name in type(node).model_fields] if isinstance(node, Part) else node
+    for item in below if isinstance(below, (tuple, list)) else ():
+        if isinstance(item, (Part, tuple, list)):  # a table has thousands of numbers
             yield from law_types(item)
 
 

@@ -36,6 +36,7 @@ class Limits(Part):
     memory, disk: default: four fifths of what is free.
     parts: bodies, joints, drives and loads, of each at most so many.
     cells: elements or cells of one mesh.  modes: elastic coordinates of one body.
+    rows: of a run.  members: of an ensemble.
     """
 
     time: Annotated[Time, Field(gt=0.0)] | None = None
@@ -44,6 +45,8 @@ class Limits(Part):
     parts: Annotated[int, Field(ge=1)] = 2000
     cells: Annotated[int, Field(ge=1)] = 500_000
     modes: Annotated[int, Field(ge=1)] = 2000
+    rows: Annotated[int, Field(ge=1)] = 10_000_000
+    members: Annotated[int, Field(ge=2)] = 100_000
 
     @property
     def time_words(self) -> str:
@@ -53,6 +56,22 @@ class Limits(Part):
     def written(self) -> dict[str, Any]:
         """As a table that can be read again."""
         return self.model_dump(exclude={"source"}, exclude_none=True)
+
+
+def check_rows(rows: float, interval: float, limits: Limits) -> None:
+    """ResourceError when an interval of output [s] asks for more rows than a run may have."""
+    if rows > limits.rows:
+        raise ResourceError(
+            f"[output.interval]: {interval:g} s asks for {rows:.3g} rows, more than the {limits.rows} that limits.rows "
+            "allows; choose a longer one"
+        )
+
+
+def check_members(members: int, limits: Limits, place: str = "[ensemble.members]") -> None:
+    """ResourceError when an ensemble is to have more members than it may."""
+    if members > limits.members:
+        told = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
+        raise ResourceError(f"{place}: {told} are more than the {limits.members} that limits.members allows")
 
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:

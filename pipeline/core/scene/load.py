@@ -14,9 +14,10 @@ from typing import Annotated, Any
 from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core import portable
-from flexclear.pipeline.core.errors import InputError, shown
+from flexclear.pipeline.core.errors import InputError, ResourceError, shown
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
+from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
 from flexclear.pipeline.core.scene.limits import check_parts
 from flexclear.pipeline.core.scene.mistakes import input_errors
 from flexclear.pipeline.core.scene.not_toml import not_toml
@@ -49,10 +50,7 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
         _put(table, place, value, f"override of {path}")
     _absolute_files(table, path)
     check_parts(table, path, FAMILIES)
-    try:
-        scene = Scene.model_validate(table)
-    except ValidationError as error:
-        raise input_errors(path, error, Scene) from None
+    scene = _read(table, path)
     scene._name = name
     scene._path = path
     return scene
@@ -71,11 +69,8 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
     _absolute_files(found, Path.cwd() / place)
     for key, value in (override or {}).items():
         _put(found, key, value, "override of scene")
-    check_parts(found, Path("scene"), FAMILIES)
-    try:
-        scene = Scene.model_validate(found)
-    except ValidationError as error:
-        raise input_errors("scene", error, Scene) from None
+    check_parts(found, place, FAMILIES)
+    scene = _read(found, place)
     name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     scene._name = f"{name}-scene" if portable.is_device(name) else name
     return scene
@@ -90,12 +85,19 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
         elif place in table:
             del table[place]
     _absolute_files(table, scene._path or Path.cwd() / "scene")
-    try:
-        result = Scene.model_validate(table)
-    except ValidationError as error:
-        raise input_errors(Path(scene.name), error, Scene) from None
+    result = _read(table, Path(scene.name))
     result._name, result._path = scene._name, scene._path
     return result
+
+
+def _read(table: dict[str, Any], place: Path) -> Scene:
+    """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are told of this place."""
+    try:
+        return Scene.model_validate(table)
+    except ValidationError as error:
+        raise input_errors(place, error, Scene) from None
+    except ResourceError as error:
+        raise ResourceError(f"{place} {error}") from None
 
 
 def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
@@ -124,7 +126,7 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
             whole = {**getattr(result, family), **read} if name else read
             result = result.model_copy(update={family: whole})
             result.check()
-        except (ValidationError, InputError, ValueError):
+        except (ValidationError, InputError, ResourceError, ValueError):
             return edited(scene, override)  # which tells what is wrong, with its place
     return result
 
@@ -176,6 +178,7 @@ def compose(path: Path, above: tuple[Path, ...] = ()) -> dict[str, Any]:
     if len(above) == LONGEST_CHAIN:
         raise InputError(str(above[0]), f"extends more than {LONGEST_CHAIN} scenes in a row", "leave some out")
     table = read_toml(path)
+    require_kind(table, path, SCENE)
     _require_tables(table, path)
     if "extends" not in table:
         extra = [key for key in EDITS if key in table]

@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.clearance import (
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from flexclear.pipeline.core.scene.gears import Gear
-from flexclear.pipeline.core.scene.limits import Limits
+from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
 from flexclear.pipeline.core.scene.output import Output
 from flexclear.pipeline.core.scene.parts import (
@@ -39,8 +39,6 @@ from flexclear.pipeline.core.units import quantity
 Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it tells the whole relative motion
 SINGLE = ("revolute", "prismatic")
-#: rows of a run that a machine can be asked to hold
-MOST_ROWS = 1e7
 #: samples of a controller; at each of them a step ends
 MOST_SAMPLES = 1e6
 
@@ -68,7 +66,7 @@ class Ensemble(Part):
     members: how many runs.  perturbation: by which length the balls are offset.  seed: of the random directions.
     """
 
-    members: Annotated[int, Field(ge=2, le=100_000)] = 16
+    members: Annotated[int, Field(ge=2)] = 16
     perturbation: Annotated[Length, Field(gt=0.0)] = 1e-8
     seed: Annotated[int, Field(ge=0)] = 20190310
     bodies: tuple[str, ...] | None = None
@@ -222,13 +220,10 @@ class Scene(Part):
     limits: Limits = Limits()
     view: View | None = None
 
-    def _rows_can_be_kept(self) -> None:
-        rows = (self.time.end - self.time.start) / self.output.interval
-        if rows > MOST_ROWS:
-            raise ValueError(
-                f"output.interval = {self.output.interval:g} s asks for {rows:.3g} rows, more than {MOST_ROWS:g}: "
-                "choose a longer one"
-            )
+    def _amounts_are_allowed(self) -> None:
+        check_rows((self.time.end - self.time.start) / self.output.interval, self.output.interval, self.limits)
+        if self.ensemble is not None:
+            check_members(self.ensemble.members, self.limits)
 
     def _samples_can_be_made(self) -> None:
         for name, load in self.load.items():
@@ -286,8 +281,9 @@ class Scene(Part):
         return self
 
     def check(self) -> None:
-        """ValueError where parts and settings that are right by themselves do not go together."""
-        self._rows_can_be_kept()
+        """ValueError where parts and settings that are right by themselves do not go together; ResourceError where they
+        ask for more than `[limits]` allows."""
+        self._amounts_are_allowed()
         self._samples_can_be_made()
         self._quantities_are_there()
         self._stressed_bodies_are_flexible()
@@ -437,14 +433,12 @@ class Scene(Part):
         return {k: v for k, v in self.sources().items() if v.startswith("assumed")}
 
 
-def _collect_sources(node: object, place: str, found: dict[str, str]) -> None:
-    if not isinstance(node, dict):
-        return
+def _collect_sources(node: dict[str, object], place: str, found: dict[str, str]) -> None:
     source = node.get("source")
     if isinstance(source, str):
         found[place or "scene"] = source
     elif isinstance(source, dict):
         found.update({f"{place}.{key}".lstrip("."): text for key, text in source.items()})
     for key, value in node.items():
-        if key != "source":
+        if key != "source" and isinstance(value, dict):
             _collect_sources(value, f"{place}.{key}".lstrip("."), found)

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.file_kinds import SWEEP, require_kind
 from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.mistakes import input_errors
 from flexclear.pipeline.core.units import any_quantity
@@ -136,7 +136,7 @@ class Sweep(Part):
     combine: Literal["grid", "list"] = "grid"
     sample: Sample | None = None
     keep: Annotated[tuple[str, ...], Field(min_length=1)]
-    members: Annotated[int, Field(ge=2, le=100_000)] | None = None
+    members: Annotated[int, Field(ge=2)] | None = None
     error: bool = False
 
     _name: str = PrivateAttr(default="sweep")
@@ -213,8 +213,7 @@ def read_sweep(table: Mapping[str, Any], where: str | Path) -> Sweep:
 def load_sweep(path: Path) -> Sweep:
     """The sweep in a TOML file; InputError for a file that cannot be read, or is a scene."""
     table = read_toml(path)
-    if "body" in table or "extends" in table:
-        raise InputError(str(path), "is a scene, not a sweep of one", "name a file with the keys scene, vary and keep")
+    require_kind(table, path, SWEEP)
     sweep = read_sweep(table, path)
     sweep._name = path.stem
     return sweep

@@ -27,7 +27,7 @@ def key_of(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sour
 
     Which files these are is known since it was made for the first time; before, there is nothing under any key.
     """
-    return key(_with_files(task, _facts(task, inputs, sources), store))
+    return _with_files(task, _facts(task, inputs, sources), store)[1]
 
 
 def find(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources) -> Record | None:
@@ -44,13 +44,13 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     plain = key(known)
     with store.lock(task.stage, plain, lambda: progress(None, "waiting for another process that makes the same")):
         # whoever asked for the task has told its faults
-        record = Store(store.root).find(task.stage, key(_with_files(task, known, store)))
+        record = Store(store.root).find(task.stage, _with_files(task, known, store)[1])
         if record is None:
             module, _, function = task.run.partition(":")
             run = getattr(import_module(module), function)
             load = store.arrays if hasattr(run, ARRAYS) else store.load
             data = {name: load(above) for name, above in inputs.items()}
-            begun = store.path(task.stage, key(_with_files(task, known, store)), "part")
+            begun = store.path(task.stage, _with_files(task, known, store)[1], "part")
             from threadpoolctl import threadpool_limits  # here, since what is fresh needs no BLAS
 
             with (
@@ -78,13 +78,13 @@ def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
-    now = _with_files(task, _facts(task, fresh, sources), store)
+    now, name = _with_files(task, _facts(task, fresh, sources), store)
     last = store.last(task.folder, task.label)
     if last is None and stale:
         return State(task, None, ("never run",))
     above = [f"its input {name} would be made again" for name in sorted(stale)]
     if not stale:
-        record = store.find(task.stage, key(now))
+        record = store.find(task.stage, name)
         if record is not None:
             return State(task, record, ())
     why = reasons(now, None if last is None else last.facts, stale) + above
@@ -101,10 +101,14 @@ def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[s
     return facts(task, {name: record.digest for name, record in inputs.items()}, sources)
 
 
-def _with_files(task: Task, known: Mapping[str, str], store: Store) -> dict[str, str]:
-    """Facts with those of the files that the task has ever opened when all else was as it is."""
-    names = store.names(task.stage, key(known))
-    return {**known, **opened.facts(opened.digests(names, task.base))}
+def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Mapping[str, str], str]:
+    """Facts with those of the files that the task has ever opened when all else was as it is, and their key."""
+    plain = key(known)
+    names = store.names(task.stage, plain)
+    if not names:
+        return known, plain
+    whole = {**known, **opened.facts(opened.digests(names, task.base))}
+    return whole, key(whole)
 
 
 def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dict[str, str]:

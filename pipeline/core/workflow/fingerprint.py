@@ -33,11 +33,12 @@ DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtk
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """One source file: digest of its bytes, own modules and libraries that it imports."""
+    """One source file: digest of its bytes, own modules and libraries that it imports, whether others may lie below."""
 
     digest: str
     own: frozenset[str]
     libraries: frozenset[str]
+    package: bool
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,9 @@ class Sources:
     memo: Path | None = None
     read: dict[str, Module | None] = field(default_factory=dict, repr=False, compare=False)
     imports: dict[str, tuple[str, list[str], list[str]]] = field(default_factory=dict, repr=False, compare=False)
+    next: dict[str, tuple[str, ...]] = field(default_factory=dict, repr=False, compare=False)
     closures: dict[frozenset[str], dict[str, Module]] = field(default_factory=dict, repr=False, compare=False)
+    codes: dict[frozenset[str], dict[str, str]] = field(default_factory=dict, repr=False, compare=False)
 
     def closure(self, roots: Iterable[str]) -> dict[str, Module]:
         """Every own module that `roots` reach by imports, packages on the way included.
@@ -70,30 +73,49 @@ class Sources:
                     publish(self.memo, checked(self.imports))
         return self.closures[wanted]
 
+    def code(self, roots: Iterable[str]) -> dict[str, str]:
+        """Facts of the code that `roots` reach, by kind and name: digests of modules, versions of libraries.
+
+        Many tasks share them: they are not to be changed.
+        """
+        wanted = frozenset(roots)
+        if wanted not in self.codes:
+            closure = self.closure(wanted)
+            libraries = frozenset().union(*(module.libraries for module in closure.values()))
+            self.codes[wanted] = {f"module {name}": module.digest for name, module in closure.items()} | {
+                f"library {name}": version for name, version in library_versions(libraries).items()
+            }
+        return self.codes[wanted]
+
     def module(self, name: str) -> Module | None:
         """The module called `name`, or None when there is no such file (an attribute, say)."""
         if name not in self.read:
-            path = source_file(self.root, name)
+            above = self.read.get(name.rpartition(".")[0])
+            # most names are of what modules hold: four files less to look for
+            path = source_file(self.root, name) if above is None or above.package else None
             self.read[name] = None if path is None else self._parse(path, name)
         return self.read[name]
 
     def _reach(self, wanted: frozenset[str]) -> dict[str, Module]:
-        found, seen = dict[str, Module](), set[str]()
+        found: dict[str, Module] = {}
         waiting = sorted(wanted)
         for name in waiting:
             if self.module(name) is None:
                 raise LookupError(f"no module {name} under {self.root}")
         while waiting:
             name = waiting.pop()
-            if name in seen:
-                continue
-            seen.add(name)
-            module = self.module(name)
-            if module is not None:
+            module = self.read[name]
+            if name not in found and module is not None:
                 found[name] = module
-                waiting.extend(module.own)
-                waiting.extend(parents(name))
+                waiting.extend(self._next(name, module))
         return found
+
+    def _next(self, name: str, module: Module) -> tuple[str, ...]:
+        """The modules that one reaches at once: what it imports may be an attribute of a module, and no module."""
+        if name not in self.next:
+            reached = sorted({*module.own, *parents(name)})  # a module before the names that it holds
+            self.next[name] = tuple(other for other in reached if self.module(other) is not None)
+        return self.next[name]
 
     def _parse(self, path: Path, name: str) -> Module:
         source = path.read_bytes()
@@ -104,7 +126,7 @@ class Sources:
                 KNOWN[name] = (digest, sorted(own), sorted(libraries))
             self.imports[name] = KNOWN[name]
         _, own_names, library_names = self.imports[name]
-        return Module(digest, frozenset(own_names), frozenset(library_names))
+        return Module(digest, frozenset(own_names), frozenset(library_names), path.name == "__init__.py")
 
     def _remember(self) -> None:
         """Read the memo, once; one that is damaged is as good as none."""
@@ -130,11 +152,14 @@ def parents(name: str) -> list[str]:
     return [".".join(parts[:n]) for n in range(1, len(parts))]
 
 
-def imported(source: bytes, name: str, package: bool) -> tuple[set[str], set[str]]:
-    """Own names and libraries that one source text imports; imports for type checkers do not count."""
+def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> tuple[set[str], set[str]]:
+    """Own names and libraries that one source text imports; imports for type checkers do not count.
+
+    deep: also in functions, which import what only some need.
+    """
     own: set[str] = set()
     libraries: set[str] = set()
-    for target in _imports(ast.parse(source).body, name if package else name.rpartition(".")[0]):
+    for target in _imports(ast.parse(source).body, name if package else name.rpartition(".")[0], deep):
         top = target.partition(".")[0]
         if top in OWN:
             own.add(target)
@@ -143,8 +168,8 @@ def imported(source: bytes, name: str, package: bool) -> tuple[set[str], set[str
     return own, libraries
 
 
-def _imports(statements: Iterable[ast.stmt], package: str) -> Iterable[str]:
-    """Dotted names that statements import, at any depth; ``from a import b`` gives a and a.b."""
+def _imports(statements: Iterable[ast.stmt], package: str, deep: bool) -> Iterable[str]:
+    """Dotted names that statements import, those of functions only if `deep`; ``from a import b`` gives a and a.b."""
     for node in statements:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -154,13 +179,13 @@ def _imports(statements: Iterable[ast.stmt], package: str) -> Iterable[str]:
             yield base
             yield from (f"{base}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.If) and _is_type_checking(node.test):
-            yield from _imports(node.orelse, package)
+            yield from _imports(node.orelse, package, deep)
         elif isinstance(node, ast.Match):
-            yield from (name for case in node.cases for name in _imports(case.body, package))
-        else:
+            yield from (name for case in node.cases for name in _imports(case.body, package, deep))
+        elif deep or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
             # imports are statements, so expressions need not be walked
             for block in ("body", "orelse", "handlers", "finalbody"):
-                yield from _imports(getattr(node, block, ()), package)
+                yield from _imports(getattr(node, block, ()), package, deep)
 
 
 def _is_type_checking(test: ast.expr) -> bool:
@@ -168,6 +193,7 @@ def _is_type_checking(test: ast.expr) -> bool:
     return name == "TYPE_CHECKING"
 
 
+@cache
 def library_versions(packages: frozenset[str]) -> dict[str, str]:
     """Versions of the libraries that hold these import packages, and of all that those require in turn."""
     found = {name: library_version(name) for name in packages}

@@ -51,17 +51,20 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
-    found = {part.module for part in named(scene)}
-    found |= _reached(specialised(most_parts(scene), ())) | _reached(specialised(most_parts(scene), (), lanes=2))
-    for scheme in schemes(scene):
-        for source in sources(most_parts(scene), scheme).values():
-            found |= _reached(source)
-    return tuple(sorted(found))
+    found, parts = {part.module for part in named(scene)}, most_parts(scene)
+    return tuple(sorted(found.union(*(_composed(parts, scheme) for scheme in schemes(scene)))))
+
+
+@cache
+def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
+    """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
+    texts = [*sources(parts, scheme).values(), specialised(parts, ()), specialised(parts, (), lanes=2)]
+    return frozenset().union(*map(_reached, texts))
 
 
 @cache
 def _reached(source: str) -> frozenset[str]:
-    """Modules that a generated file imports; many scenes share one, and every command asks this of each."""
+    """Modules that a generated file imports; steps depend on few of the parts."""
     names, _ = imported(source.encode(), "entry", package=False)
     return frozenset(name for name in names if source_file(TREE, name))  # others are in modules
 

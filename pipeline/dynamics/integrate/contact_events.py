@@ -19,10 +19,10 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
-from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end_on_kink, together, watch_nothing
+from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end_on_kink, together
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event
-from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, RESTART
+from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, RESTART, watch_nothing
 from flexclear.pipeline.dynamics.integrate.within_step import NEAR, make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import at, dot, sub

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.stepper import watch_nothing
 from flexclear.pipeline.dynamics.integrate.within_step import make_locate_level
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -51,11 +52,6 @@ class Kinks(NamedTuple):
 
 
 @kernel
-def watch_nothing(h, w):
-    """What is watched of contacts anyway is enough."""
-
-
-@kernel
 def nearness(h, w, size):
     """How far from a kink counts as there, in what it is measured by, of this size."""
     return NEAR * np.sqrt(w[h[m.CONTROL] + m.RTOL]) * size
@@ -84,6 +80,7 @@ def first_of_contacts(h, f, w, n):
     return found
 
 
+#: what is watched of contacts anyway is enough
 CONTACT_KINKS = Kinks(watch_nothing, watch_nothing, watch_nothing, first_of_contacts)
 
 

@@ -52,7 +52,7 @@ def plan(h, w, step, following):
 
 @kernel
 def watch_nothing(h, w):
-    """No contact to watch."""
+    """Nothing is noted, of contacts or of friction."""
 
 
 @kernel

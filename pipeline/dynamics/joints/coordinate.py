@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @dataclass(frozen=True)
@@ -55,3 +58,14 @@ TRANSLATION = Coordinate("translation", False)
 def angle_about_z(R: np.ndarray) -> float:
     """Angle [rad] in (-pi, pi] of the turn about z that R is, or is nearest to."""
     return float(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1]))
+
+
+def rates_are_speeds(count: int) -> Callable:
+    """The kernel `position_rate` of a joint with as many speeds, each of which is the rate of a position."""
+
+    @kernel
+    def position_rate(w, x, u, rate):
+        for k in range(count):
+            w[rate + k] = w[u + k]
+
+    return position_rate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z
+from flexclear.pipeline.dynamics.joints.coordinate import ROTATION, Coordinate, angle_about_z, rates_are_speeds
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, about_z
 
@@ -18,10 +18,7 @@ def motion(w, x, u, S):
     return about_z(w[x + 2]), (w[x], w[x + 1], 0.0), ZERO, ZERO
 
 
-@kernel
-def position_rate(w, x, u, rate):
-    """The positions' rates are the speeds."""
-    w[rate], w[rate + 1], w[rate + 2] = w[u], w[u + 1], w[u + 2]
+position_rate = rates_are_speeds(3)
 
 
 class Planar:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.joints.coordinate import TRANSLATION
+from flexclear.pipeline.dynamics.joints.coordinate import TRANSLATION, rates_are_speeds
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import IDENTITY, ZERO
 
@@ -18,10 +18,7 @@ def motion(w, x, u, S):
     return IDENTITY, (0.0, 0.0, w[x]), ZERO, ZERO
 
 
-@kernel
-def position_rate(w, x, u, rate):
-    """The position's rate is the speed."""
-    w[rate] = w[u]
+position_rate = rates_are_speeds(1)
 
 
 class Prismatic:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.joints.coordinate import ROTATION, angle_about_z
+from flexclear.pipeline.dynamics.joints.coordinate import ROTATION, angle_about_z, rates_are_speeds
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, about_z
 
@@ -18,10 +18,7 @@ def motion(w, x, u, S):
     return about_z(w[x]), ZERO, ZERO, ZERO
 
 
-@kernel
-def position_rate(w, x, u, rate):
-    """The position's rate is the speed."""
-    w[rate] = w[u]
+position_rate = rates_are_speeds(1)
 
 
 class Revolute:

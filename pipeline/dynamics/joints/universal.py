@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate, rates_are_speeds
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, cross, put, scale
 
@@ -22,10 +22,7 @@ def motion(w, x, u, S):
     return R, ZERO, scale(w[u] * w[u + 1], cross(first, second)), ZERO
 
 
-@kernel
-def position_rate(w, x, u, rate):
-    """The positions' rates are the speeds."""
-    w[rate], w[rate + 1] = w[u], w[u + 1]
+position_rate = rates_are_speeds(2)
 
 
 class Universal:

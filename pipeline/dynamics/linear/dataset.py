@@ -42,6 +42,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
         iterations=rest.iterations,
         mobility=rest.at.Z.shape[1],
         redundant_closure_rows=rest.at.redundant,
+        undetermined_reactions=", ".join(n for n in bench.scene.joint if n in bench.engine.mobility.redundant_joints),
     )
 
 

@@ -74,7 +74,9 @@ class Mobility:
 
     def text(self) -> str:
         """In words, for the user."""
-        return f"mobility {self.mobility}, {self.redundant} redundant"
+        says = "condition follows" if self.redundant == 1 else "conditions follow"
+        more = f", {self.redundant} closure {says} from the others" if self.redundant else ""
+        return f"mobility {self.mobility}{more}"
 
 
 def analyse(model: Model) -> Mobility:

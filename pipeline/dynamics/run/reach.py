@@ -41,24 +41,34 @@ def require_shallow(engine: Engine) -> None:
     Contacts give way where ideal joints do not, so that a drive leads a loop with clearance beyond its reach in ever
     shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
     """
-    from flexclear.pipeline.dynamics.contact.validity import pressed_through
+    from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
+    from flexclear.pipeline.dynamics.run.overtravel import forced_depth
 
     model, kept = engine.model, (engine.w.copy(), engine.n.copy())
     t = float(engine.control[m.TIME])
     engine.attempt(engine.view(m.Y).copy(), t)
     gaps = engine.table(m.TOUCH)["gap"].copy()
     powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
+    pulled = bool(model.drives) and bool(np.any(powers > 0.0))
+    drive = model.drives[int(np.argmax(powers))] if pulled else ""
+    away = (
+        f"drive {drive} leads out of reach: shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
+    )
     engine.w[:], engine.n[:] = kept
-    for contact, gap in zip(model.contacts, gaps, strict=True):
-        if told := pressed_through(contact.words, contact.joint, -float(gap)):
+    for k, (contact, depth) in enumerate(zip(model.contacts, -gaps, strict=True)):
+        if told := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
-            if model.drives and np.any(powers > 0.0):
-                drive = model.drives[int(np.argmax(powers))]
-                remedy = (
-                    f"drive {drive} leads out of reach: shorten the travel in [drive.{drive.partition('.')[0]}], or "
-                    f"change lengths; else {remedy}"
-                )
-            raise SolverError(f"at t = {t:.6g} s: {told}: {remedy}")
+            raise SolverError(f"at t = {t:.6g} s: {told}: {f'{away}; else {remedy}' if pulled else remedy}")
+        if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
+            continue
+        time, least = forced_depth(engine, k)
+        engine.w[:], engine.n[:] = kept
+        if least:
+            raise SolverError(
+                f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
+                f"at t = {time:.6g} s they have to be {least:.3g} m deep at the least, more than the inner surface's "
+                f"radius ({contact.joint.radius:.3g} m), however the mechanism gives way: {away}"
+            )
 
 
 def end_in_pose(engine: Engine, rows: np.ndarray) -> str:

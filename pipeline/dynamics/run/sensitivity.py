@@ -18,7 +18,7 @@ from flexclear.pipeline.core.quantities import PARTED
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.observation import frames
-from flexclear.pipeline.dynamics.run.start import project
+from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
 
 #: the two are compared at so many regular outputs, which bounds the cost, and wherever a contact of the run ends
@@ -95,7 +95,7 @@ def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
 
     def offset_rates(speeds: np.ndarray) -> np.ndarray:
-        _moving(engine, y, speeds)
+        rates_at_speeds(engine, y, speeds)
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
         offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
         offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
@@ -111,12 +111,5 @@ def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.n
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
     moved, nq = y.copy(), engine.model.nq
     # rates per unit time, for one unit: a displacement of 1e-8 m is linear
-    moved[:nq] += _moving(engine, y, speeds)[:nq] - _moving(engine, y, np.zeros(len(speeds)))[:nq]
+    moved[:nq] += rates_at_speeds(engine, y, speeds)[:nq] - rates_at_speeds(engine, y, np.zeros(len(speeds)))[:nq]
     return project(engine, moved)
-
-
-def _moving(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.ndarray:
-    """Rates of the start's state with other speeds, as nearly as drives and loops allow."""
-    moved = y.copy()
-    moved[engine.model.speeds] = speeds
-    return engine.evaluate(project(engine, moved), engine.start)

@@ -101,6 +101,13 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     return seen.state[0].copy()
 
 
+def rates_at_speeds(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.ndarray:
+    """Rates of a state at the start with other speeds, as nearly as drives and loops allow."""
+    moved = y.copy()
+    moved[engine.model.speeds] = speeds
+    return engine.evaluate(project(engine, moved), engine.start)
+
+
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     """Contacts whose surfaces overlap at the start, by number, and how deep [m]."""
     contacts = engine.model.contacts

@@ -14,7 +14,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig04.png and fig04.svg."""
     return mode_shapes.make(
         "fig04",
-        "Figure 4: free-free modes bend the rod about its middle, its ends move most",
+        "Figure 4: free-free modes leave the rod's ends free, which move most",
         data[NEEDS[0]],
         TABLE5_NORMAL_MODE,
     )

@@ -34,7 +34,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         axes[0, 0].legend(loc="upper left", fontsize=8)
         style.heading(
             figure,
-            f"Figure 6: friction grows over {1e3 * limits[0]:g} mm/s and falls from {limits[2]:g} to {limits[3]:g}",
+            f"Figure 6: friction rises to {limits[2]:g} at {1e3 * limits[0]:g} mm/s and falls to {limits[3]:g} at "
+            f"{1e3 * limits[1]:g} mm/s",
             "modified Coulomb law, force against the sliding velocity; negative velocities mirror the law",
         )
         return style.files("fig06", figure)

@@ -25,7 +25,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         tilt = float(np.degrees(np.abs(ideal.angle).max()))
         style.heading(
             figure,
-            f"Figure 8: the platform tilts by {tilt:.1f}° and comes back",
+            f"Figure 8: the platform tilts by {tilt:.2f}° and comes back",
             "rotation about y0 = asin R_WP[0, 2], ideal model",
         )
         return style.files("fig08", figure)
@@ -35,7 +35,7 @@ def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None
     """A dot and the value at the largest tilt."""
     i = int(np.argmax(np.abs(angle)))
     axes.plot(time[i], angle[i], "o", color=IDEAL.color, ms=5)
-    text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s"
+    text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s".replace("-", "−")
     below = angle[i] > 0.0
     axes.annotate(
         text,

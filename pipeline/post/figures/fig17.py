@@ -38,8 +38,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         style.heading(
             figure,
             "Figure 17: the ball flies from wall to wall; with a flexible rod its ways part from run to run",
-            "centre of the ball in the socket; grey: clearance sphere; dots: where impacts begin; pale beyond "
-            "the horizon",
+            "centre of the ball in the socket; grey: clearance sphere; pale: beyond the horizon; dots: where impacts "
+            "begin before it",
         )
         return style.files("fig17", figure)
 

@@ -9,8 +9,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.algebra import first_largest, rotation_between
+from flexclear.pipeline.core.algebra import first_largest
 from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.rotations import Turning, turning
 
 #: factor and unit of smaller and larger values, largest first
 PREFIXES = {
@@ -42,6 +43,8 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     """
     if not quantities.is_series(quantity):
         return [_force(run, quantity.owner) for run in runs]
+    if quantity.kind == "orientation":
+        return [_turned(run, quantity) if has(run, quantity) else None for run in runs]
     found = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
     there = [values for values in found if values is not None]
     if quantity.kind in BY_COMPONENT and there:
@@ -49,7 +52,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
         title = f"{quantity.owner}: {quantity.kind.replace('_', ' ')} along {'xyz'[k]}"
         title = title.replace("angular velocity along", "angular velocity about")
     else:
-        k, title = 0, f"{quantity.owner}: {quantity.kind.replace('_', ' ')}"
+        k, title = 0, f"{quantity.owner}: {_kind(runs, quantity)}"
     return [
         None
         if values is None
@@ -71,10 +74,24 @@ def has(run: xr.Dataset, quantity: Quantity) -> bool:
     return kind.owner in run.coords and quantity.owner in run[kind.owner].values
 
 
+def _turned(run: xr.Dataset, quantity: Quantity) -> Curve:
+    turned = turned_by(run, quantity.owner)
+    return Curve(f"{quantity.owner}: {turned.title}", quantity.unit, run["time"].values, turned.angle, NONE)
+
+
+def turned_by(run: xr.Dataset, body: str) -> Turning:
+    """How far a body of a run has turned since the start."""
+    mine = run.sel(body=body)
+    return turning(run["time"].values, mine["quaternion"].values, mine["angular_velocity"].values)
+
+
+def _kind(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
+    """What the quantity is called: what a drive supplies about an axis is a torque."""
+    turns = any(has(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
+    return "drive torque" if quantity.kind == "drive_force" and turns else quantity.kind.replace("_", " ")
+
+
 def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray:
-    if quantity.kind == "orientation":
-        angle: np.ndarray = rotation_between(values[:1], values)
-        return angle
     if quantity.kind in BY_COMPONENT:
         return values[:, component]
     return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.post.overview.curves import by_unit
+from flexclear.pipeline.post.overview.curves import by_unit, turned_by
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
 
@@ -29,8 +29,8 @@ ENERGIES = {
     "drive_work": "work of drives",
     "load_work": "work of loads",
 }
-#: title of the picture of a ball or pin in its socket
-CENTRE = "centre in its socket (mm)"
+#: what holds a pin, by type of joint; a ball is in a socket
+HOLDERS = {"clearance-revolute": "journal", "clearance-slot": "slot"}
 #: of an energy that is not drawn: its share of the largest one
 UNSEEN = 1e-6
 
@@ -78,9 +78,10 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
         for i, (axis, color) in enumerate(AXES_COLORS.items()):
             row[0].plot(time, factor * moved[:, k, i], color=color, label=axis)
             row[1].plot(time, rate * speed[:, k, i], color=color, lw=0.9)
-        row[2].plot(time, np.degrees(post["rotation"].values[:, k]), color=style.INK)
+        turned = turned_by(run, names[k])
+        row[2].plot(time, np.degrees(turned.angle), color=style.INK)
         for panel, what in zip(
-            row, (f"displacement ({unit})", f"velocity ({rate_unit})", "rotation from the start (°)"), strict=True
+            row, (f"displacement ({unit})", f"velocity ({rate_unit})", f"{turned.title} (°)"), strict=True
         ):
             panel.set_title(f"{names[k]}: {what}")
             panel.set_xlim(time[0], time[-1])
@@ -127,7 +128,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         unit = quantities.unit(run, Quantity(names[k], "peak_force"))
         if names[k] in joints:
             orbit(row[0], run, float(post["clearance"].values[k]), k)
-            row[0].set_title(f"{names[k]}: {CENTRE}")
+            row[0].set_title(f"{names[k]}: {centre(run, k)}")
         else:  # the end of a stop
             row[0].set_visible(False)
         small = "µm" if unit == "N" else "µrad"
@@ -167,7 +168,7 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.6, alpha=0.8)
     reach = 1.15 * radius
     axes.set(xlabel="xyz"[i], ylabel="xyz"[j], aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
-    axes.set_title(CENTRE)
+    axes.set_title(centre(run, contact))
     return offset[:, i], offset[:, j]
 
 
@@ -175,10 +176,19 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
 PLANES = {"clearance-revolute": (0, 1), "clearance-slot": (0, 1), "ball-on-plane": (0, 2)}
 
 
-def _plane(run: xr.Dataset, offset: np.ndarray, contact: int) -> tuple[int, int]:
+def centre(run: xr.Dataset, contact: int) -> str:
+    """Title of the picture of a ball or pin in what holds it."""
+    return f"centre in its {HOLDERS.get(_type(run, contact), 'socket')} (mm)"
+
+
+def _type(run: xr.Dataset, contact: int) -> str:
     joint = parameters(run).get("joint", {}).get(str(run["contact"].values[contact]), {})
+    return str(joint.get("type", ""))
+
+
+def _plane(run: xr.Dataset, offset: np.ndarray, contact: int) -> tuple[int, int]:
     i, j = sorted(int(k) for k in np.argsort(np.ptp(offset, axis=0))[-2:])
-    return PLANES.get(joint.get("type", ""), (i, j))
+    return PLANES.get(_type(run, contact), (i, j))
 
 
 def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:

@@ -11,7 +11,7 @@ import xarray as xr
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import Curve, curves, has, scaled
-from flexclear.pipeline.post.overview.figures import CENTRE, CONTACTS, orbit
+from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
 
@@ -45,7 +45,8 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
             _overlay(row[0], runs, found)
             _apart(row[1], runs, quantity, found)
         style.shared_legend(figure, axes[0, 0], min(len(runs), 3))
-        style.heading(figure, "Runs beside each other", f"right: distance from {next(iter(runs))}")
+        pale = "; pale: beyond the horizon of a run" if any("horizon" in run for run in runs.values()) else ""
+        style.heading(figure, "Runs beside each other", f"right: distance from {next(iter(runs))}{pale}")
         files = style.files(name, figure)
         return files | _orbits(f"{name}_contacts", runs)
 
@@ -70,7 +71,10 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[C
             continue
         color, last = own[k], _horizon(run)
         firm = curve.time <= last
-        look: dict[str, Any] = {"color": color, "lw": 1.8 if k == 0 else 1.0, "zorder": 1.5 if k == 0 else 2.0}
+        # dashes over the others, so that none hides what lies below it
+        look: dict[str, Any] = {"color": color} | (
+            {"lw": 1.2, "ls": (0, (5, 3)), "zorder": 2.5} if k == 0 else {"lw": 1.1}
+        )
         axes.plot(1e3 * curve.time[firm], factor * curve.values[firm], label=label, **look)
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
@@ -117,7 +121,7 @@ def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
     figure, axes = style.grid(rows, columns, (max(4.0, 2.75 * columns), 0.6 + 3.0 * rows))
     for panel, (label, run, k) in zip(axes.flat, found, strict=False):
         orbit(panel, run, float(derive(run)["clearance"].values[k]), k)
-        panel.set_title(f"{run['contact'].values[k]}: {label}\n{CENTRE}")
+        panel.set_title(f"{run['contact'].values[k]}: {label}\n{centre(run, k)}")
     for panel in axes.flat[len(found) :]:
         panel.set_visible(False)
     return style.files(name, figure)

@@ -144,7 +144,7 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     axes.set_ylim(-top, top)
     axes.set_yticks([-top, 0.0, top])
     axes.minorticks_off()
-    told = f"linear within ±{linear:.0e}, logarithmic beyond"
+    told = f"linear within ±{linear:g}, logarithmic beyond"
     axes.text(0.995, 0.03, told, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 

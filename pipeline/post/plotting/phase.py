@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
+from flexclear.pipeline.core.quantities import common_times
 from flexclear.pipeline.post import poincare
 from flexclear.pipeline.post.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
 from flexclear.pipeline.post.plotting import style
@@ -57,6 +58,13 @@ def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
     axes[0, 0].set_ylabel(f"phase plot\n{plane.y_label}")
     axes[1, 0].set_ylabel(f"section\n{plane.y_label}")
     return figure
+
+
+def off_ideal(values: Values, data: dict[str, xr.Dataset]) -> float:
+    """Largest difference of the model with clearance alone from the ideal one, over that one's largest value."""
+    clear, ideal = motion(CSJ, data), motion(IDEAL, data)
+    i, j = common_times(clear.time, ideal.time)
+    return float(np.abs(values(clear)[i] - values(ideal)[j]).max() / np.abs(values(ideal)).max())
 
 
 def trajectory(axes: Axes, plane: Plane, run: Motion) -> None:

@@ -10,7 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from flexclear.pipeline.post.overview.figures import orbit
+from flexclear.pipeline.post.overview.figures import centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
 from flexclear.pipeline.post.series import derive
@@ -30,7 +30,7 @@ def frames(
         name = str(run["contact"].values[contact])
         x, y = orbit(left, run, float(derive(run)["clearance"].values[contact]), contact)
         time, force = 1e3 * run["time"].values, run["contact_normal_force"].values[:, contact]
-        left.set_title(f"{name}: centre in its socket (mm)")
+        left.set_title(f"{name}: {centre(run, contact)}")
         right.plot(time, force, color="#D55E00", lw=0.9)
         right.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
         right.set_title(f"{name}: normal force (N)")

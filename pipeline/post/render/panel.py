@@ -14,7 +14,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.post.overview.figures import orbit
+from flexclear.pipeline.post.overview.curves import turned_by
+from flexclear.pipeline.post.overview.figures import centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import joint_view
 
@@ -64,11 +65,10 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
     if contact:
         number = list(run["contact"].values).index(loose[_first(loose, watch) or 0])
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
+        axes[2].set_title(f"{run['contact'].values[number]}: {centre(run, number)}")
         cursors.append((_dot(axes[2], 7), x, y))
     for panel in axes:
         panel.title.set_fontsize(8.2)
-    if contact:
-        axes[2].set_title("path in the socket (mm)")
     figure.suptitle(" ", fontsize=13)  # keeps the place of the clock
     clock = figure.text(
         0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
@@ -94,9 +94,10 @@ def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
 
 def _motion(axes: style.Axes, run: xr.Dataset, post: xr.Dataset, body: int) -> tuple[Any, np.ndarray, np.ndarray]:
     """How far the body has turned, or, where it does not turn, how far it has gone along the axis of its way."""
-    angle, moved = np.degrees(post.rotation.values[:, body]), post.displacement.values[:, body]
-    if angle.max() > STILL:
-        axes.set_title(f"{run.body.values[body]}: rotation (°)")
+    turned, moved = turned_by(run, str(run.body.values[body])), post.displacement.values[:, body]
+    angle = np.degrees(turned.angle)
+    if np.abs(angle).max() > STILL:
+        axes.set_title(f"{run.body.values[body]}: {turned.title} (°)")
         return _curve(axes, run, angle, "#0072B2")
     axis = int(np.argmax(np.ptp(moved, axis=0)))
     axes.set_title(f"{run.body.values[body]}: way along {'xyz'[axis]} (mm)")

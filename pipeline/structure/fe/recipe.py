@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.mistakes import input_errors
 from flexclear.pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
@@ -31,7 +32,9 @@ MODELS: dict[str, type[Recipe]] = {
 
 def read_recipe(path: str | Path) -> dict[str, Any]:
     """The recipe in a TOML file as a plain table in SI units; InputError names every mistake in it."""
-    return parse(read_toml(Path(path)), str(path)).model_dump(mode="json", exclude_none=True)
+    table = read_toml(Path(path))
+    require_kind(table, Path(path), RECIPE)
+    return parse(table, str(path)).model_dump(mode="json", exclude_none=True)
 
 
 def parse(table: Mapping[str, Any], place: str) -> Recipe:

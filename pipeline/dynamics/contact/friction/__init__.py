@@ -1,5 +1,5 @@
-"""Friction laws. To add one: a module here that is called like the law, and its parameters in core/scene/clearance;
-the property tests pick it up.
+"""Friction laws. To add one: a module here that is called like the law, its parameters in core/scene/clearance,
+and a case in tests/properties/test_dynamics_friction and test_dynamics_clearance.
 
 Each module has a class, called like its parameters, with
 - ``traction(z, slip, f_n, p) -> (force, loss, stored, z_rate)``: kernel; force [N] on the ball against

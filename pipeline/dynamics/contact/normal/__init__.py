@@ -1,4 +1,4 @@
-"""Normal contact laws. To add one: a module here, a line below; the property tests pick it up.
+"""Normal contact laws. To add one: a module here, a line below, and a case in tests/properties/test_dynamics_laws.
 
 Each module has a `LAW` with its own ``exponent`` and with ``resolve(law, stiffness, mass) -> Resolved``
 (see `contact.law`): the numbers for one of the compiled forms in `contact.form`, and the

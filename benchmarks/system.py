@@ -1,0 +1,51 @@
+"""What only some systems tell and limit: the processor time of child processes, and what a process may take.
+
+Windows has no module `resource`. What needs it refuses there in words (`lacking`), and nothing else does.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+
+def lacking() -> str:
+    """Why child processes can be neither measured nor limited here; empty where they can."""
+    try:
+        known = find_spec("resource") is not None
+    except ValueError:  # its import is blocked
+        known = False
+    return "" if known else "needs processor times and limits of child processes, which this system does not have"
+
+
+def _resource() -> Any:
+    return import_module("resource")
+
+
+def seconds_of_children() -> float:
+    """Processor time of all child processes that ended so far [s], with theirs."""
+    used = _resource().getrusage(_resource().RUSAGE_CHILDREN)
+    return float(used.ru_utime + used.ru_stime)
+
+
+def limit_seconds(seconds: int | None) -> None:
+    """Let this process take so much more processor time [s], whole seconds; None: as much as it may."""
+    resource = _resource()
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    soft = hard if seconds is None else int(used.ru_utime + used.ru_stime) + seconds
+    resource.setrlimit(resource.RLIMIT_CPU, (soft, hard))
+
+
+def limit_files(size: int) -> Callable[[], None]:
+    """What lets a process write no file longer than so many bytes."""
+    resource = _resource()
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def ended_by(exit_code: int) -> str:
+    """Name of the signal that ended a process, such as SIGSEGV; empty when it was none."""
+    return signal.Signals(-exit_code).name if exit_code < 0 else ""

@@ -1,0 +1,36 @@
+"""What a TOML file is: a scene, a sweep of one, or a mesh recipe; another kind than wanted is refused with a way on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from flexclear.pipeline.core.errors import InputError
+
+SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
+#: keys that only files of a kind have
+TELLING = {
+    SCENE: {"body", "joint", "extends", "time"},
+    SWEEP: {"vary", "keep", "scene"},
+    RECIPE: {"shape", "material", "section", "interfaces", "elements"},
+}
+#: what each kind is for, after its path
+USE = {
+    SCENE: "flexclear run {path}",
+    SWEEP: "flexclear sweep {path}",
+    RECIPE: 'flexclear check {path} looks at it; bodies of scenes name it: mesh = "{path}"',
+}
+
+
+def kind_of_file(table: Mapping[str, Any]) -> str:
+    """SCENE, SWEEP or RECIPE: what most of a file's keys say; SCENE where none tells."""
+    found = {kind: len(keys & set(table)) for kind, keys in TELLING.items()}
+    return max(found, key=lambda kind: found[kind])
+
+
+def require_kind(table: Mapping[str, Any], path: Path, wanted: str) -> None:
+    """InputError when the table in a file is of another kind than is wanted."""
+    kind = kind_of_file(table)
+    if kind != wanted and (kind != SCENE or TELLING[SCENE] & set(table)):
+        raise InputError(str(path), f"is {kind}, not {wanted}", USE[kind].format(path=path))
