@@ -28,7 +28,8 @@ from flexclear.pipeline.dynamics.kernels import kernel
 #: what resolve_events returns for an event after which integration starts afresh; another positive number only
 #: records it
 RESTART = 1
-#: for a step that cannot be made as short as the event that was found in it; a negative number ends the run otherwise
+#: for a step of chosen length that cannot be made with its end on the event found in it; other negative numbers end the
+#: run
 AGAIN = -2
 #: share of the planned step below which a step has been cut short
 CUT = 0.9
@@ -251,7 +252,7 @@ def make_advance(
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
             happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
-            if happened == AGAIN:
+            if happened == AGAIN and w[c + m.FIXED] == 0.0:
                 n[m.REJECTED] += 1
                 w[c + m.STEP], w[c + m.REJECTED_STEP] = SHORTER * step, 0.0
                 continue
