@@ -7,6 +7,7 @@ Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machin
 from __future__ import annotations
 
 import argparse
+import atexit
 import gc
 import os
 import sys
@@ -18,7 +19,10 @@ from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
 #: new objects before Python looks for garbage: a short command makes hardly any, and spent a tenth of its time looking
-GARBAGE = 50_000
+GARBAGE = 200_000
+# at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short command, of
+# which nobody has anything, since the system takes all of it
+atexit.register(gc.freeze)
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
     "new": "a commented scene of one's own to start from",
@@ -83,9 +87,11 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
     top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
     top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for verb, text in COMMANDS.items():
+    asked = [verb for verb in COMMANDS if verb in arguments[:1]]
+    for verb in asked or COMMANDS:  # all of them only where their list is told
+        text = COMMANDS[verb]
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
-        if verb in arguments[:1]:
+        if asked:
             module = import_module(f"flexclear.stages.{verb}")
             module.arguments(below)
             below.set_defaults(command=module.command)

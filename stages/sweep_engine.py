@@ -21,6 +21,10 @@ from flexclear.stages.sweep_points import source_digest, work
 SHARE, MOST, QUEUED = 0.5, 1000, 2
 #: towards the end less is handed out, a share of what is left, so that all workers finish together; least seconds of it
 LEAST = 0.02
+#: evaluations of a point from which on it is run beside others, and of all that wait, for which code is made
+WORTH, WORTH_CODE = 5_000, 5_000_000
+#: so many at least, and seconds of their work: the more, the less is waited for the last ones
+ABREAST, SHARE_ABREAST = 8, 5.0
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
 #: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
@@ -45,8 +49,8 @@ class Job:
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
 Points = list[dict[str, Any]]
-#: gives `stages.sweep_points.work` to whoever does it, with its first five arguments
-Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None]], Future[Any]]
+#: gives `stages.sweep_points.work` to whoever does it, with its first six arguments
+Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None], bool], Future[Any]]
 
 
 @dataclass(frozen=True)
@@ -68,14 +72,17 @@ class Engine:
         StoppedError when all is to stop.
         """
         waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
+        evaluations, abreast = 0.0, False  # of the points that were finished last; whether code is made for several
         while waiting or running:
             stopping.check()
             # nothing is compiled twice: until the first point is there nothing else begins
             width = self.width()
             while waiting and len(running) < (QUEUED * width if pace else 1):
-                mine = _take(waiting, _portion(sum(map(len, waiting)), pace, width) if pace else 1)
+                left = sum(map(len, waiting))
+                abreast = evaluations >= WORTH and (abreast or left * evaluations >= WORTH_CODE)
+                mine = _take(waiting, _portion(left, pace, width, abreast) if pace else 1)
                 keep = self.here and not 0.0 < pace < LONG
-                running[self._given(mine, families, alone=not pace, keep=keep)] = mine
+                running[self._given(mine, families, alone=not pace, keep=keep, abreast=abreast)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -93,14 +100,17 @@ class Engine:
                     self.renew()
                     break
                 done(list(zip(mine, points, strict=True)), seconds)
+                evaluations = sum(point.evaluations for point in points) / len(points)
                 first, lost = not pace, 0  # what the first one took held compiling and fetching
                 pace = max(1e-6, seconds / len(mine)) if not first else SHARE / 2.0
 
-    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool) -> Future[Any]:
+    def _given(
+        self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool, abreast: bool
+    ) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
         journals = [job.journal if keep else None for job in mine]
         try:
-            return self.submit(family, families[family], points, alone, journals)
+            return self.submit(family, families[family], points, alone, journals, abreast)
         except BrokenProcessPool as error:
             failed: Future[Any] = Future()
             failed.set_exception(error)
@@ -115,10 +125,16 @@ def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     return [list(reversed(mine)) for mine in reversed(found.values())]
 
 
-def _portion(left: int, pace: float, width: int) -> int:
-    """Points that are handed out at a time. left: those that wait; pace: seconds of each."""
+def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
+    """Points that are handed out at a time. left: those that wait; pace: seconds of each.
+
+    abreast: whether they are run side by side; of few, most would wait for the last one.
+    """
     asking = PER_WORKER * width
-    seconds = min(max(SHARE, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    share = SHARE_ABREAST if abreast else SHARE
+    seconds = min(max(share, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    if abreast:
+        return ABREAST * min(MOST // ABREAST, max(1, round(seconds / pace / ABREAST)))
     return min(MOST, max(1, int(seconds / pace)))
 
 
@@ -142,9 +158,9 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
         return
     pools: list[ProcessPoolExecutor] = [workers.pool(width)]
 
-    def submit(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
+    def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
         with workers.without_main():
-            return pools[-1].submit(work, family, packed, points, alone, journals)
+            return pools[-1].submit(work, family, packed, *rest)
 
     def renew() -> None:
         workers.kill(pools[-1])
@@ -158,10 +174,10 @@ def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
     pools[-1].shutdown()
 
 
-def _here(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
+def _here(*given: Any) -> Future[Any]:
     """The work, done in this process at once."""
     future: Future[Any] = Future()
-    future.set_result(work(family, packed, points, alone, journals))
+    future.set_result(work(*given))
     return future
 
 
@@ -198,11 +214,11 @@ def _on_cluster(client: Any, place: str) -> Engine:
     executor, seen = client.get_executor(), [now(), _threads(client, place)]
     held: dict[str, Any] = {}
 
-    def submit(family: str, packed: bytes, points: Points, alone: bool, journals: Sequence[Path | None]) -> Future[Any]:
+    def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
         # sent once; workers fetch it from each other, and the scheduler has it made again when it is lost with one
         if family not in held:
             held[family] = client.submit(bytes, packed, key=f"family-{family}", pure=False)
-        future: Future[Any] = executor.submit(work, family, held[family], points, alone, journals, source_digest())
+        future: Future[Any] = executor.submit(work, family, held[family], *rest, source_digest())
         return future
 
     def width() -> int:

@@ -10,9 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.workflow import journal
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.record.point import Runner
+    from flexclear.pipeline.dynamics.run.crew import Place
 
 #: runners that a worker keeps
 RUNNERS = 8
@@ -35,7 +41,7 @@ class Family:
 
 
 @lru_cache(maxsize=RUNNERS)
-def _opened(key: str, packed: bytes) -> tuple[Any, Any]:
+def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
     import pickle
 
@@ -55,40 +61,74 @@ def work(
     points: Sequence[Mapping[str, Any]],
     alone: bool,
     journals: Sequence[Path | None] = (),
+    abreast: bool = False,
     sources: str = "",
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
     journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
+    abreast: whether they are worth to be run side by side; no point depends on it.
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
     of a worker that has joined since.
     """
     from threadpoolctl import threadpool_limits
 
     from flexclear.pipeline.core.errors import InputError
-    from flexclear.pipeline.core.scene.load import with_numbers
-    from flexclear.pipeline.core.workflow import cores, journal
+    from flexclear.pipeline.core.workflow import cores
 
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
     cores.tell(alone)
     threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
     scene, runner = _opened(key, packed)
-    begun, found = time.process_time(), list[Point]()
-    for point, place in zip(points, journals or [None] * len(points), strict=True):
-        try:
-            edited = with_numbers(scene, point)
-        except InputError as error:
-            found.append(Point({}, {}, {}, 0, str(error)))
-            continue
-        if place is None:
-            found.append(runner.run(edited))
-            continue
-        with journal.kept(place.parent, place.name) as kept:
-            found.append(runner.run(edited))
-            kept.remove()
+    begun, own = time.process_time(), list(journals or [None] * len(points))
+    if not abreast:
+        found = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
+    else:
+        found = _abreast(runner, scene, points, own)
+    for where in filter(None, own):
+        journal.remove(where)
     return found, time.process_time() - begun
+
+
+def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], own: list[Path | None]) -> list[Point]:
+    """Points side by side, each in a thread, where that can be."""
+    from flexclear.pipeline.core.workflow.cores import side_by_side
+
+    with runner.abreast(scene, len(points)) as crews:
+
+        def one(k: int, alive: Progress) -> Point:
+            if crews is None:
+                return _point(runner, scene, points[k], own[k], alive=alive)
+            with crews.place() as place:
+                return _point(runner, scene, points[k], own[k], place, alive)
+
+        return side_by_side(one, len(points), lambda _: None, 1 if crews is None else crews.lanes)
+
+
+def _point(
+    runner: Runner,
+    scene: Scene,
+    point: Mapping[str, Any],
+    own: Path | None,
+    place: Place | None = None,
+    alive: Progress = silent,
+) -> Point:
+    """A point; what it has done so far, also when it is done, is kept where it has a journal."""
+    from flexclear.pipeline.core.errors import InputError
+    from flexclear.pipeline.core.scene.load import with_numbers
+
+    try:
+        edited = with_numbers(scene, point)
+    except InputError as error:
+        return Point({}, {}, {}, 0, str(error))
+    if own is None:
+        return runner.run(edited, place, alive)
+    with journal.kept(own.parent, own.name) as kept:
+        found = runner.run(edited, place, alive)
+        kept.write()  # others of its batch may take long
+        return found
 
 
 @cache

@@ -46,21 +46,45 @@ def quaternion_to_matrix(q: np.ndarray) -> np.ndarray:
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
-def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion of a rotation matrix, w >= 0, shape (..., 4). Stable for every angle."""
-    R = np.asarray(R, dtype=float)
-    trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
-    # four times the squared components; a row per component that may be divided by: the largest (Shepperd 1978)
-    squares = 1.0 + np.concatenate([trace, 2.0 * np.diagonal(R, axis1=-2, axis2=-1) - trace], axis=-1)
-    rows = np.empty((*R.shape[:-2], 4, 4))
-    rows[..., 0, 0] = squares[..., 0]
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """What `numpy.cross` gives of arrays (..., 3), in Fortran's order.
+
+    Long series in that order have one component after the other, each of them in one piece.
+    """
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape), order="F")
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
-        rows[..., 0, k + 1] = rows[..., k + 1, 0] = R[..., j, i] - R[..., i, j]
-        rows[..., k + 1, 1:] = R[..., :, k] + R[..., k, :]
-        rows[..., k + 1, k + 1] = squares[..., k + 1]
-    best = np.argmax(squares, axis=-1)[..., None, None]
-    q = np.take_along_axis(rows, best, axis=-2)[..., 0, :]
+        np.multiply(a[..., i], b[..., j], out=out[..., k])
+        out[..., k] -= a[..., j] * b[..., i]
+    return out
+
+
+def turned(R: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """R v of arrays (..., 3, 3) and (..., 3), in Fortran's order; see `cross`."""
+    out = np.empty((*np.broadcast_shapes(R.shape[:-2], v.shape[:-1]), 3), order="F")
+    for i in range(3):
+        np.multiply(R[..., i, 0], v[..., 0], out=out[..., i])
+        out[..., i] += R[..., i, 1] * v[..., 1]
+        out[..., i] += R[..., i, 2] * v[..., 2]
+    return out
+
+
+def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion of a rotation matrix, w >= 0, shape (..., 4), in Fortran's order. Stable for every angle."""
+    R = np.asarray(R, dtype=float)
+    trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
+    # four times the products of two components, of each with all: the row is taken, and divided, whose own square is
+    # the largest (Shepperd 1978)
+    squares = [1.0 + trace, *(1.0 + (2.0 * R[..., k, k] - trace) for k in range(3))]
+    xy, yz, zx = (R[..., (k + 1) % 3, k] + R[..., k, (k + 1) % 3] for k in range(3))
+    wx, wy, wz = (R[..., (k + 2) % 3, (k + 1) % 3] - R[..., (k + 1) % 3, (k + 2) % 3] for k in range(3))
+    w, x, y, z = squares
+    rows = ((w, wx, wy, wz), (wx, x, xy, zx), (wy, xy, y, yz), (wz, zx, yz, z))
+    best, q = np.argmax(squares, axis=0), np.empty((*R.shape[:-2], 4), order="F")
+    for largest, row in enumerate(rows):
+        those = best == largest
+        for k in range(4):
+            np.copyto(q[..., k : k + 1], row[k][..., None], where=those[..., None])
     q /= np.linalg.norm(q, axis=-1, keepdims=True)
     return np.where(q[..., :1] >= 0.0, q, -q)
 

@@ -7,7 +7,6 @@ A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a ta
 
 from __future__ import annotations
 
-import difflib
 import sys
 from collections.abc import Iterable, Mapping
 from importlib import import_module
@@ -85,6 +84,8 @@ def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     for words, meant, told in ELSEWHERE:
         if name in words and meant in known:
             return f"did you mean '{meant}'?" + (f" {told}" if told else "")
+    import difflib  # here, since a right name needs none
+
     # the comparison takes the product of both lengths
     near = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
     if near:

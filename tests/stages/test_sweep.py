@@ -5,6 +5,7 @@ from __future__ import annotations
 import runpy
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +15,17 @@ import xarray as xr
 from scipy.special import ellipk
 
 from flexclear import pipeline
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts.points import unit
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.pipeline.core.units import udunits
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
+from flexclear.pipeline.dynamics.run import engine
 from flexclear.pipeline.post.sweep import figures
 from flexclear.stages import sweep, sweep_plan
 from flexclear.stages.__main__ import main
@@ -66,6 +70,13 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
     assert found.attrs["complete"] == 1
 
 
+@pytest.fixture
+def evaluated_as_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs and sections evaluate as points do, each operation rounded as it stands; else they differ by rounding."""
+    monkeypatch.setattr(engine, "Straight", partial(engine.Straight, wanted=True, exact=True))
+
+
+@pytest.mark.usefixtures("evaluated_as_points")
 def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
     """Without the record, the twin and the dataset of a run, the numbers are the same to the last bit."""
     path = root / "scenes/checks/bounce.toml"
@@ -75,7 +86,7 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
     values = [0.6, 0.8]
     found = pipeline.sweep(path, {"joint.contact.normal.restitution": values}, keep, workers=1)
     for k, value in enumerate(values):
-        one = pipeline.run(pipeline.load_scene(path, {"joint.contact.normal.restitution": value}))
+        one = dynamics.simulate(load_scene(path, override={"joint.contact.normal.restitution": value}), {}, silent)
         here, velocity = found.isel({"joint.contact.normal.restitution": k}), one["velocity"].sel(body="ball").values
         closing = (one["event_kind"] == "closing") & (one["event_approach_speed"] > 1e-4)
         speed, t = np.linalg.norm(velocity, axis=1), one["time"].values
@@ -96,13 +107,15 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
         assert here["evaluations"] == one.attrs["evaluations"]
 
 
+@pytest.mark.usefixtures("evaluated_as_points")
 def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
     """What `flexclear sections` finds without a neighbour is what a point keeps, to the last bit."""
     path, count = root / "scenes/checks/driven_pendulum.toml", {"sections.transient": 2, "sections.periods": 20}
     keep = ["bob.position.sections", "bob.angular_velocity.sections"]
     vary = {"load.torque.force.amplitude": [0.9, 1.5]}
     found = pipeline.sweep(path, vary, keep, set=count, workers=1)
-    whole, _ = pipeline.sections(pipeline.load_scene(path, count | {"sections.exponent_periods": 20}))
+    asked = {"load.torque.force.amplitude": 1.5, "sections.exponent_periods": 20, **count}
+    whole = dynamics.sections(load_scene(path, override=asked), {}, silent)
     here = found.isel({"load.torque.force.amplitude": 1})
     assert here["bob.position.sections"].dims == ("section", "axis")
     assert np.array_equal(here["bob.position.sections"].values, whole["position"].sel(body="bob").values)

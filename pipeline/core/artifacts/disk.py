@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: bytes that no table of records, facts or imports has
 LARGEST_TABLE = 64 << 20
+#: bytes that are compared at once
+PIECE = 1 << 17
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 #: temporary files of other machines that share the disk, and unfinished work, are swept when they are so old [s]
@@ -74,6 +76,15 @@ def publish(path: Path, content: bytes) -> str:
             raise OSError(errno.EIO, "what was written does not read back", str(path))
         settle(made, path)
     return sha256(content)
+
+
+def holds(path: Path, content: bytes) -> bool:
+    """Whether an ordinary file holds these bytes and no others; OSError for others."""
+    if require_ordinary(path) != len(content):
+        return False
+    view = memoryview(content)
+    with path.open("rb", buffering=0) as file:  # piece by piece: what is new to memory takes longer than to compare it
+        return all(file.read(PIECE) == view[k : k + PIECE].tobytes() for k in range(0, len(view), PIECE))
 
 
 def checked(table: Mapping[str, Any]) -> bytes:

@@ -1,4 +1,4 @@
-"""NetCDF-4 files of labelled arrays, byte by byte as xarray writes them: the one writer and the one reader.
+"""NetCDF-4 files of labelled arrays, with all that xarray writes into them: the one writer and the one reader.
 
 What xarray keeps beside NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
 kept as bytes with the attribute `dtype`, and floats have NaN for what was never written.
@@ -19,6 +19,10 @@ from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledAr
 
 #: bytes of a dataset from which on room on the disk counts for more than time
 COMPRESSED = 1 << 26
+#: bytes of values from which on the library is told not to keep what it has read: that would cost more than it takes
+_LARGE = 1 << 16
+#: how the library takes values of a kind, where otherwise than they are
+_TAKEN = {"U": np.dtype("O"), "b": np.dtype("i1")}
 _LOCK = Lock()
 _COORDINATES, _BOOL, _FILL = "coordinates", {"dtype": "bool"}, "_FillValue"
 
@@ -28,7 +32,8 @@ def write(path: Path, data: LabelledArrays) -> None:
 
     Numeric arrays carry fletcher32 sums, so that other programs notice damage too; they are compressed from
     `COMPRESSED` bytes on, since what a run records has few digits to spare: deflating it takes longer than making it,
-    and leaves half of it.
+    and leaves half of it.  They are written when all are defined: each change between the two lets the library write
+    all that it has so far, which took as long as the rest.
     """
     import netCDF4
 
@@ -39,8 +44,10 @@ def write(path: Path, data: LabelledArrays) -> None:
             _set_attribute(file, name, value)
         for dim, length in data.sizes.items():
             file.createDimension(dim, length)
-        for name, array in data.variables.items():
-            _write_variable(file, name, array, listed.get(name, {}), compress)
+        every = [_define(file, name, one, listed.get(name, {}), compress) for name, one in data.variables.items()]
+        for variable, array in zip(every, data.variables.values(), strict=True):
+            dtype = array.values.dtype
+            variable[...] = array.values.astype(_TAKEN.get(dtype.kind, dtype), copy=False)
 
 
 @contextlib.contextmanager
@@ -51,7 +58,8 @@ def _alone() -> Iterator[None]:
         yield
 
 
-def _write_variable(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str], compress: bool) -> None:
+def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str], compress: bool) -> Any:
+    """A variable of the file, with all but its values."""
     values, kind = array.values, array.values.dtype.kind
     truth = _BOOL if kind == "b" else {}
     kept = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
@@ -65,11 +73,11 @@ def _write_variable(file: Any, name: str, array: LabelledArray, listed: Mapping[
         shuffle=True,
         fletcher32=numeric,
         fill_value=values.dtype.type(np.nan) if kind == "f" else None,
+        chunk_cache=1,  # byte: nothing is written twice
     )
     variable.setncatts({**array.attrs, **listed, **truth})
     variable.set_auto_maskandscale(False)
-    # of texts the library takes objects alone
-    variable[...] = values.astype(object) if kind == "U" else values.astype("i1") if truth else values
+    return variable
 
 
 def _set_attribute(file: Any, name: str, value: Any) -> None:
@@ -106,7 +114,10 @@ def read(content: bytes) -> LabelledArrays:
         for name, variable in file.variables.items():
             own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
             coords |= set(_words(own))
-            values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
+            text = variable.dtype is str
+            if not text and variable.size * variable.dtype.itemsize >= _LARGE:
+                variable.set_var_chunk_cache(1)
+            values = np.asarray(variable[...], dtype=str if text else None)
             if own.get("dtype") == "bool":
                 del own["dtype"]
                 values = values.astype(bool)

@@ -13,7 +13,7 @@ import errno
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from flexclear.pipeline.core.artifacts.disk import (
     copy,
     digest_of,
     disk_limits,
+    holds,
     is_copy,
     locked,
     publish,
@@ -54,8 +55,8 @@ TOLD = ("warnings", "accuracy_verdict")
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
-#: what this process has written last and read back, by its sha256, until it is loaded
-_READ_BACK: dict[str, LabelledArrays] = {}
+#: what this process has written last and read back, bytes and arrays by their sha256, until it is loaded
+_READ_BACK: dict[str, tuple[bytes, LabelledArrays]] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -76,6 +77,11 @@ class Record:
     def digest(self) -> str:
         """Content of the artifact in one digest: that of its main file, else of all its files."""
         return self.files.get(MAIN) or sha256(json.dumps(self.files, sort_keys=True).encode())
+
+    def table(self) -> dict[str, object]:
+        """What its file holds, and `read_record` reads."""
+        kept = {"files": self.files, "facts": self.facts, "said": self.said}
+        return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in kept.items()}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +131,7 @@ class Store:
                 digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
             said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
             record = Record(stage, key, digests, dict(facts), said)
-            publish(self.path(stage, key, "json"), checked(asdict(record)))
+            publish(self.path(stage, key, "json"), checked(record.table()))
         return record
 
     def load(self, record: Record) -> xr.Dataset:
@@ -135,17 +141,18 @@ class Store:
     def arrays(self, record: Record) -> LabelledArrays:
         """The main file in memory. The bytes that were checked are those that are parsed.
 
-        The last one that this process has written was parsed already; that is given once.
+        The last one that this process has written was parsed already; that is given once, where the file still holds
+        the same bytes.
         """
         from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
+        written = _READ_BACK.pop(record.files[MAIN], None)
+        if written is not None and holds(path, written[0]):
+            return written[1]
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
-        written = _READ_BACK.pop(record.files[MAIN], None)
-        if written is not None:
-            return written
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
@@ -218,7 +225,7 @@ class Store:
         with disk_limits(self.root / folder):
             (self.root / folder / ".facts").mkdir(parents=True, exist_ok=True)
             for path, (stage, facts) in paths.items():
-                publish(path, checked(asdict(Record(stage, FAMILY, {}, dict(facts)))))
+                publish(path, checked(Record(stage, FAMILY, {}, dict(facts)).table()))
             for path in (self.root / folder / ".facts").glob("*.json"):
                 if path not in paths:
                     path.unlink(missing_ok=True)
@@ -328,5 +335,5 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     digest = sha256(content)
     _READ_BACK.clear()
     if data.nbytes < netcdf.COMPRESSED:
-        _READ_BACK[digest] = read
+        _READ_BACK[digest] = content, read
     return digest

@@ -176,7 +176,7 @@ Source = str | dict[str, str]
 class Part(BaseModel):
     """Base of everything a scene may say: frozen, and no unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     source: Source | None = Field(
         default=None, description="where the values come from; 'assumed: why' for an assumption"

@@ -47,6 +47,7 @@ def side_by_side(
     raised.
     """
     from concurrent.futures import CancelledError, ThreadPoolExecutor
+    from contextvars import copy_context
     from threading import Event
 
     given_up = Event()
@@ -56,7 +57,7 @@ def side_by_side(
             raise CancelledError
 
     with ThreadPoolExecutor(min(threads or width(), count)) as pool:
-        waiting, results = [pool.submit(work, k, progress) for k in range(count)], list[Result]()
+        waiting, results = [pool.submit(copy_context().run, work, k, progress) for k in range(count)], list[Result]()
         try:
             for future in waiting:
                 results.append(future.result())

@@ -13,6 +13,7 @@ import io
 import json
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import RLock
@@ -132,8 +133,7 @@ class Journal:
 
     def remove(self) -> None:
         """The task is done."""
-        for path in self.folder.glob(f"{self.key}.*.part"):
-            path.unlink(missing_ok=True)
+        remove(self.folder / self.key)
 
     def _put(self, name: str, state: State) -> None:
         chunks = self._chunks.setdefault(name, [])
@@ -179,25 +179,33 @@ class Journal:
         return self.folder / f"{self.key}.{name}.part"
 
 
-_current: Journal | None = None
+def remove(task: Path) -> None:
+    """The task of a journal, `folder/key`, is done."""
+    for path in task.parent.glob(f"{task.name}.*.part"):
+        path.unlink(missing_ok=True)
+
+
+#: of each thread what it was when the thread was given its work, unless it works on a task of its own
+_current: ContextVar[Journal | None] = ContextVar("journal", default=None)
 
 
 def current() -> Journal | None:
-    """The journal of the task that this process works on; None where nothing is kept."""
-    return _current
+    """The journal of the task that is worked on; None where nothing is kept."""
+    return _current.get()
 
 
 @contextlib.contextmanager
 def kept(folder: Path, key: str) -> Iterator[Journal]:
     """Meanwhile unfinished work is written; whoever has stored what came of it removes it."""
-    global _current
-    before, _current = _current, Journal(folder, key)
+    made = Journal(folder, key)
+    before = _current.set(made)
     try:
-        yield _current
+        yield made
     finally:
-        _current = before
+        _current.reset(before)
 
 
 def seconds() -> float:
     """Processor time of this process [s], as if the work had never been interrupted, and nothing were kept of it."""
-    return time.process_time() + (_current.restored - _current.aside if _current is not None else 0.0)
+    mine = _current.get()
+    return time.process_time() + (mine.restored - mine.aside if mine is not None else 0.0)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core import system
 from flexclear.pipeline.core.workflow import cores, stopping
 from flexclear.pipeline.core.workflow.family import follow
 
@@ -55,6 +56,7 @@ def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
 
 def _begin(parent: int, bell: Bell | None) -> None:
     follow(parent)
+    system.keep_memory()
     if bell is not None:
         stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
 
@@ -121,6 +123,11 @@ def kept() -> Iterator[None]:
         _keeping -= 1
         while _idle and not _keeping:
             _idle.pop().end()
+
+
+def of_a_command() -> bool:
+    """Whether this process is a command's own: inside of `kept`."""
+    return _keeping > 0
 
 
 @contextmanager

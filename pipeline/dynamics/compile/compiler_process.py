@@ -8,16 +8,19 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 import threading
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.workflow.cores import free
 from flexclear.pipeline.dynamics.compile.files import claimed, take
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+
+if TYPE_CHECKING:
+    import subprocess
 
 # started by a command, since multiprocessing would run the user's script again in the child
 COMMAND = """import json, sys
@@ -52,6 +55,8 @@ def wanted() -> bool:
 
 
 def _start(paths: list[Path]) -> subprocess.Popen[bytes] | None:
+    import subprocess  # here, since what finds all code on disk compiles nothing
+
     folders = json.dumps([str(folder) for folder in sys.path])
     try:
         return subprocess.Popen(

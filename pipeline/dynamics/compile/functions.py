@@ -57,7 +57,7 @@ PROTOTYPES = {
     "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, *_TABLE_AT),
     "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
 }
-LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _INTEGER)
+LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _PLACE, _INTEGER)
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:

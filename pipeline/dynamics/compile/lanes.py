@@ -13,9 +13,22 @@ from numba import types
 from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics.compile.calls import call
-from flexclear.pipeline.dynamics.compile.stacks import DONE, GIVEN, HEAD, READY, STATE, TIME, WAITING
+from flexclear.pipeline.dynamics.compile.stacks import (
+    ALONE,
+    DONE,
+    GIVEN,
+    HEAD,
+    READY,
+    STATE,
+    TIME,
+    WAITING,
+    WANTED,
+)
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.specialise.straight import exactly
+
+#: all lanes at once take as long as this share of them does one by one
+FEW = 4
 
 
 def _pointer(kind: Any) -> Any:
@@ -34,16 +47,19 @@ def _pointer(kind: Any) -> Any:
 integers, floats = _pointer(types.int64), _pointer(types.float64)
 
 
-def make_lanes(laws: Callable, abreast: Callable, lanes: int) -> Callable:
-    """The kernel run(table, places, resume), which comes back when a function has, or when it is called back.
+def make_lanes(laws: Callable, note: Callable, abreast: Callable, lanes: int) -> Callable:
+    """The kernel run(table, places, numbers, resume), which comes back when a function has, or when it is called back.
 
-    table: HEAD, then addresses of the records.  places: room for 6 lanes words.  resume: address of `stacks`' function.
+    table: HEAD, then addresses of the records.  places: room for 6 lanes words, then for whose numbers are in which
+    lane, 0 where they are to be put there again.  numbers: as of `straight.abreast`.  resume: address of `stacks`'
+    function.
     """
+    few = lanes // FEW
 
     @kernel
     def let_run(table, resume):
-        """Each function on to its next evaluation: how many have come back, and the record of one that waits."""
-        done, waiting = 0, 0
+        """Each function on to its next evaluation: how many have come back and how many wait, the record of one."""
+        done, waiting, last = 0, 0, 0
         for k in range(lanes):
             record = integers(table[HEAD + k])
             if record[STATE] == READY:
@@ -51,30 +67,51 @@ def make_lanes(laws: Callable, abreast: Callable, lanes: int) -> Callable:
             if record[STATE] == DONE:
                 done += 1
             elif record[STATE] == WAITING:
-                waiting = table[HEAD + k]
-        return done, waiting
+                waiting, last = waiting + 1, table[HEAD + k]
+        return done, waiting, last
 
     @kernel
-    def evaluate(table, places, spare):
+    def one_by_one(table):
+        """All evaluations that are waited for, each alone."""
+        for k in range(lanes):
+            own = integers(table[HEAD + k])
+            if own[STATE] == WAITING:
+                h, f, w, n = (
+                    integers(own[GIVEN]),
+                    floats(own[GIVEN + 1]),
+                    floats(own[GIVEN + 2]),
+                    integers(own[GIVEN + 3]),
+                )
+                call(table[ALONE], (h, f, w, n, floats(table[HEAD + k])[TIME], own[GIVEN + 4], own[GIVEN + 5]))
+                own[STATE] = READY
+
+    @kernel
+    def evaluate(table, places, numbers, spare):
         """All evaluations that are waited for; lanes without one repeat another's, to the same places."""
         for k in range(lanes):
             own = integers(table[HEAD + k])
             record = own if own[STATE] == WAITING else integers(spare)
             for e in range(6):
                 places[e * lanes + k] = record[GIVEN + e]
+            if places[6 * lanes + k] != record[GIVEN + 1]:
+                places[6 * lanes + k] = record[GIVEN + 1]
+                note(integers(record[GIVEN]), floats(record[GIVEN + 1]), numbers, k)
             if own[STATE] == WAITING:
                 h, f = integers(own[GIVEN]), floats(own[GIVEN + 1])
                 w, n = floats(own[GIVEN + 2]), integers(own[GIVEN + 3])
                 laws(h, f, w, n, floats(table[HEAD + k])[TIME])
                 own[STATE] = READY
-        abreast(places)
+        abreast(places, numbers)
 
     @kernel
-    def run(table, places, resume):
+    def run(table, places, numbers, resume):
         while True:
-            done, waiting = let_run(table, resume)
-            if done > 0 or table[0] != 0 or waiting == 0:
+            done, waiting, last = let_run(table, resume)
+            if done > 0 or table[WANTED] != 0 or waiting == 0:
                 return
-            evaluate(table, places, waiting)
+            if waiting <= few and table[ALONE] != 0:
+                one_by_one(table)
+            else:
+                evaluate(table, places, numbers, last)
 
     return exactly(run)

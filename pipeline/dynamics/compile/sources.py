@@ -263,12 +263,12 @@ def specialised(h, f, w, n, t, y, dy):
 """
 LANES = """WIRING = (
 {wiring})
-run = make_lanes({laws}, abreast(rates, WIRING, {lanes}), {lanes})
+run = make_lanes({laws}, *abreast(rates, WIRING, {lanes}), {lanes})
 
 
 @calls.exported("lanes")
-def lanes(table, places, resume):
-    run(table, places, resume)
+def lanes(table, places, numbers, resume):
+    run(table, places, numbers, resume)
     return 0
 """
 PROJECT = """@calls.exported("project")

@@ -35,8 +35,9 @@ READY, WAITING, DONE, IDLE = 0, 1, 2, 3
 STATUS = Path("/proc/self/status")
 #: of mprotect, on every Linux
 NO_ACCESS = 0
-#: words of a crew's table before the addresses of its records: whether its thread is wanted back
-HEAD = 1
+#: words of a crew's table: whether its thread is wanted back, the address of what evaluates one state or 0, and from
+#: where on there are the addresses of its records
+WANTED, ALONE, HEAD = 0, 1, 2
 #: words of a record, and those that a stack holds before its function has begun
 RECORD, BEGIN = 32, 9
 _SAVED = ("rbp", "rbx", "r12", "r13", "r14", "r15")

@@ -26,11 +26,3 @@ def on_frames(model: Model, seen: Observed, body: str) -> Acting:
 
         found += on_geared_frames(model, seen)
     return [acting for acting in found if model.mechanism.frames[acting[0]].body == body]
-
-
-def on_body(model: Model, seen: Observed, body: str) -> tuple[np.ndarray, np.ndarray]:
-    """Sum of it: moment about the kernels' origin, force; (time, 3) each."""
-    moment, force = np.zeros((len(seen.state), 3)), np.zeros((len(seen.state), 3))
-    for _, n, f in on_frames(model, seen, body):
-        moment, force = moment + n, force + f
-    return moment, force

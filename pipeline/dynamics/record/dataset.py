@@ -22,9 +22,9 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.stops import ends_an_angle
-from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
+from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.record.topology import topology
-from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
+from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
 from flexclear.pipeline.dynamics.run import ledger
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.run import Run
@@ -209,31 +209,20 @@ def _report(run: Run) -> dict[str, float | int | str]:
     return told
 
 
-def _stacked(values: list[np.ndarray], rows: int) -> np.ndarray:
-    """Vectors (time, 3) or (time, 4) of some things, (time, things, ..); of none, an empty array."""
-    return np.stack(values, axis=1) if values else np.zeros((rows, 0, 3))
-
-
 def _motion(motions: Motions) -> Part:
-    origin, rows = motions.model.mechanism.origin, len(motions.seen.state)
-    bodies, frames, wrenches = motions.bodies, motions.frame_positions, joint_wrenches(motions)
-    per_body = {
-        "position": [motion.p + origin for motion in bodies.values()],
-        "quaternion": [quaternions(motion.R) for motion in bodies.values()],
-        "velocity": [motion.v for motion in bodies.values()],
-        "angular_velocity": [motion.omega for motion in bodies.values()],
-        "acceleration": [motion.a for motion in bodies.values()],
-        "angular_acceleration": [motion.alpha for motion in bodies.values()],
+    origin, body = motions.model.mechanism.origin, motions.every_body
+    frames, joints = list(motions.model.mechanism.frames), list(motions.model.scene.joint)
+    moment, force = every_joint_wrench(motions, joints)
+    more = {
+        ("angular_acceleration", "body"): body.alpha,
+        ("frame_position", "frame"): motions.every_frame + origin,
+        ("joint_moment", "joint"): moment,
+        ("joint_force", "joint"): force,
     }
-    variables: Variables = {
-        name: (("time", "body", "quat" if name == "quaternion" else "axis"), _stacked(values, rows))
-        for name, values in per_body.items()
-    }
-    variables["frame_position"] = (("time", "frame", "axis"), _stacked([p + origin for p in frames.values()], rows))
-    for name, k in (("joint_moment", 0), ("joint_force", 1)):
-        variables[name] = (("time", "joint", "axis"), _stacked([w[k] for w in wrenches.values()], rows))
+    variables: Variables = motion_series(body, origin)
+    variables |= {name: (("time", dim, "axis"), np.ascontiguousarray(values)) for (name, dim), values in more.items()}
     owners = [name.partition(".")[0] for name in frames]
-    coordinates = {"body": list(bodies), "frame": list(frames), "frame_body": ("frame", owners)}
+    coordinates = {"body": motions.moving_bodies, "frame": frames, "frame_body": ("frame", owners)}
     return variables, coordinates | _joints(motions.model)
 
 

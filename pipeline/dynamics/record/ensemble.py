@@ -21,8 +21,8 @@ from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
-from flexclear.pipeline.dynamics.record.motion import Motion, Motions, quaternions
-from flexclear.pipeline.dynamics.run.crew import Crew
+from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
+from flexclear.pipeline.dynamics.run.crew import Place
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
@@ -55,10 +55,10 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, crew: Crew | None = None) -> tuple[xr.Dataset, str]:
+    def alone(k: int, alive: Progress, place: Place | None = None) -> tuple[xr.Dataset, str]:
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
-        mine.straight.crew = crew
+        mine.straight.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir)
         return _member(last, trajectory, names), switched
 
@@ -71,8 +71,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         else:
 
             def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-                with crews.place() as crew:
-                    return alone(k, alive, crew)
+                with crews.place() as place:
+                    return alone(k, alive, place)
 
             found = side_by_side(member, wanted.members, done, crews.lanes)
     members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
@@ -109,8 +109,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     kept = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)
     require_closed(model, trajectory, seen)
-    bodies = Motions(model, seen).bodies
-    series = motion_series([bodies[n] for n in names], model.mechanism.origin)
+    series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     variables = {
         **{name: (dims, values[kept]) for name, (dims, values) in series.items()},
         # of the rows at events, too: an impact is shorter than the output interval
@@ -122,18 +121,6 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
         "contact_time_share": (("contact",), share),
     }
     return xr.Dataset(variables, coords={"time": regular, "body": names, **contact_names(model)})
-
-
-def motion_series(motions: list[Motion], origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
-    """Position, orientation, velocities and acceleration of bodies over time, by variable."""
-    dims = ("time", "body", "axis")
-    return {
-        "position": (dims, np.stack([m.p + origin for m in motions], axis=1)),
-        "quaternion": (("time", "body", "quat"), np.stack([quaternions(m.R) for m in motions], axis=1)),
-        "velocity": (dims, np.stack([m.v for m in motions], axis=1)),
-        "angular_velocity": (dims, np.stack([m.omega for m in motions], axis=1)),
-        "acceleration": (dims, np.stack([m.a for m in motions], axis=1)),
-    }
 
 
 def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,10 +13,10 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.artifacts.points import Point, Values
 from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.kept import OF_CONTACTS, Kept
-from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
@@ -23,11 +25,13 @@ from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
+from flexclear.pipeline.dynamics.run.crew import Crews, Place, crews
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
@@ -38,6 +42,8 @@ if TYPE_CHECKING:
 LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
+#: points that step side by side, and the fewest that do: of less, each is evaluated alone all the same
+ABREAST, FEWEST = 8, 3
 
 
 @dataclass
@@ -53,37 +59,74 @@ class Runner:
     members: int = 0
     error: bool = False
     engine: Engine | None = None
+    _making: Lock = field(default_factory=Lock)
+    #: what is seen of all rows is large, and seen in turn it is there once
+    _looking: Lock = field(default_factory=Lock)
 
-    def run(self, scene: Scene) -> Point:
-        """One point; what physics or the input of this point refuses is told in the point, not raised."""
+    def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
+        """One point; what physics or the input of this point refuses is told in the point, not raised.
+
+        place: where its steps may be taken beside those of other points, which changes no bit of it.  alive: called now
+        and then; what it raises ends the work.
+        """
         scene = thinned(scene, self.kept)
         try:
-            values, deviation, count = self._values(scene)
+            values, deviation, count = self._values(scene, place, alive)
             if not self.error:
                 return Point(values, {}, deviation, count)
-            tight = edited(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
-            better, _, more = self._values(tight)
+            tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
+            better, _, more = self._values(tight, place, alive)
         except (SolverError, InputError) as error:
             return Point({}, {}, {}, 0, str(error))
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
-    def _values(self, scene: Scene) -> tuple[Values, Values, int]:
-        engine, other = engines_alike(self.engine, scene, self.bundles)
-        self.engine = self.engine or engine
-        engine.straight.wanted = True
+    @contextmanager
+    def abreast(self, scene: Scene, points: int) -> Iterator[Crews | None]:
+        """Where so many points like that of a scene may step side by side; None where each is to be run alone."""
+        if points < FEWEST or not self._steps_abreast(scene):
+            yield None
+            return
+        with crews(ABREAST, threads=1) as made:
+            yield made
+
+    def _steps_abreast(self, scene: Scene) -> bool:
+        try:
+            self._engines(thinned(scene, self.kept))
+        except (SolverError, InputError):
+            return False  # as the points will tell, each by itself
+        return self.engine is not None and side_by_side(self.engine)
+
+    def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
+        engine, other = self._engines(scene)
+        # exact, since how many points are run side by side depends on the machine and on how long they take
+        engine.straight.wanted = engine.straight.exact = True
+        engine.straight.place = place
         if in_sections(self.kept):
-            values, count = _sections(engine, self.kept)
+            values, count = _sections(engine, self.kept, alive)
             return values, {}, count
         found, count = list[Values](), 0
         for start in self._starts(engine):
-            last, trajectory, _ = follow(engine, start, silent, other)
-            found.append(_kept(last, trajectory, self.kept))
+            last, trajectory, _ = follow(engine, start, alive, other)
+            with self._looking:
+                found.append(_kept(last, trajectory, self.kept))
             count += trajectory.counters["evaluations"]
         if not self.members:
             return found[0], {}, count
         stacked = {name: np.stack([values[name] for values in found]) for name in found[0]}
         means = {name: values.mean(axis=0) for name, values in stacked.items()}
         return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
+
+    def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
+        """What runs a point, and the maker of what goes on with another integrator; made one at a time."""
+        with self._making:
+            engine, other = engines_alike(self.engine, scene, self.bundles)
+            self.engine = self.engine or engine
+
+        def heir(name: str) -> Engine:
+            with self._making:
+                return other(name)
+
+        return engine, heir
 
     def _starts(self, engine: Engine) -> list[np.ndarray]:
         start, model = consistent_start(engine), engine.model
@@ -132,7 +175,7 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Value
     return values
 
 
-def _sections(engine: Engine, kept: Sequence[Kept]) -> tuple[Values, int]:
+def _sections(engine: Engine, kept: Sequence[Kept], alive: Progress) -> tuple[Values, int]:
     """What is kept once in each period, after the transient, and the evaluations that all periods took."""
     scene = engine.model.scene
     wanted, period = scene.sections or Sections(), section_period(scene)
@@ -141,6 +184,7 @@ def _sections(engine: Engine, kept: Sequence[Kept]) -> tuple[Values, int]:
     looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + wanted.phase)
     values, evaluations = dict[str, list[np.ndarray]](), 0
     for done in periods(parts, start, range(0), Cursor()):
+        alive(None, f"period {done.number}")
         evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
         if done.number >= wanted.transient:
             here = done.parts[looked_at]

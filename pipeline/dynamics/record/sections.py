@@ -20,8 +20,8 @@ from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
-from flexclear.pipeline.dynamics.record.ensemble import kept_bodies, motion_series
-from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
+from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.periods import APART, Cursor, Period, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
@@ -162,8 +162,7 @@ class _Tape:
         """Motion of the kept bodies, and the contacts' offsets, at some rows."""
         kept = replace(trajectory, rows=trajectory.rows[rows])
         seen, model = observed(part, kept), part.model
-        bodies = Motions(model, seen).bodies
-        series = motion_series([bodies[n] for n in self.names], model.mechanism.origin)
+        series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)
         if model.contacts:
             series["contact_offset"] = (("time", "contact", "axis"), seen.touch["offset"].copy())
         return series

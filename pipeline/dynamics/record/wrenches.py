@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
+from flexclear.pipeline.core.algebra import cross, turned
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.couplings import Coupling
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.acting import on_body
+from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
@@ -23,21 +24,26 @@ def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> di
 
     names: of the joints; all when None.
     """
+    wanted = list(motions.model.scene.joint if names is None else names)
+    moment, force = every_joint_wrench(motions, wanted)
+    return {name: (moment[:, k], force[:, k]) for k, name in enumerate(wanted)}
+
+
+def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
+    """The same of several joints at once, (time, joint, 3), in Fortran's order."""
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
     for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
         moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds beside its contact
         push = seen.touch["force"][:, c]
-        known[contact.name] = (moment + np.cross(seen.touch["point"][:, c], push), force + push)
-    wanted = model.scene.joint if names is None else names
-    if any(name not in known for name in wanted):
+        known[contact.name] = (moment + cross(seen.touch["point"][:, c], push), force + push)
+    if any(name not in known for name in names):
         known |= _inside_groups(motions, known)
-    result = {}
-    for name in wanted:
-        moment, force = known[name]
-        arm = motions.frame_position(model.scene.joint[name].between[1])
-        result[name] = (moment - np.cross(arm, force), force)
-    return result
+    moments, forces = (np.empty((len(seen.state), len(names), 3), order="F") for _ in range(2))
+    for k, name in enumerate(names):
+        moments[:, k], forces[:, k] = known[name]
+    arms = motions.positions([model.scene.joint[name].between[1] for name in names])
+    return moments - cross(arms, forces), forces
 
 
 def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -48,21 +54,23 @@ def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, n
 
 
 def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
-    wrenches = {}
+    moment, force = _wrenches(seen.link_wrenches)
+    found = dict[str, Wrench]()
     for i, link in enumerate(model.links):
         if link.branch.edge is not None:
             sign = -1.0 if link.branch.reverse else 1.0
-            wrenches[link.branch.edge.name] = _wrench(seen.link_wrenches[:, i], sign)
-    return wrenches
+            found[link.branch.edge.name] = sign * moment[:, i], sign * force[:, i]
+    return found
 
 
 def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
+    moment, force = _wrenches(seen.closure_wrenches)
     joints = [(c, closure) for c, closure in enumerate(model.closures) if not isinstance(closure, Coupling)]
-    return {closure.name: _wrench(seen.closure_wrenches[:, c]) for c, closure in joints}
+    return {closure.name: (moment[:, c], force[:, c]) for c, closure in joints}
 
 
-def _wrench(rows: np.ndarray, sign: float = 1.0) -> Wrench:
-    return sign * rows["moment"], sign * rows["force"]
+def _wrenches(rows: np.ndarray) -> Wrench:
+    return np.asfortranarray(rows["moment"]), np.asfortranarray(rows["force"])
 
 
 def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, Wrench]:
@@ -71,16 +79,17 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     for link in model.links:
         every = model.scene.joint.items()
         inner = [n for n, j in every if n not in known and _is_inside(model, j.between, link.places)]
-        demand = {b: _demand(motions, b, known) for b in link.places}
         tree = _forest(model, inner, list(link.places))
+        sides = {name: _far_side(model, name, tree) for name in tree}
+        # in the scene's order: sums of more than two depend on it
+        beyond = {name: [body for body in link.places if body in side] for name, (side, _) in sides.items()}
+        demand = _demands(motions, sorted({body for bodies in beyond.values() for body in bodies}), known)
         for name in inner:
             if name not in tree:
                 # a second path between bodies that are joined already: it carries nothing here
-                zero = np.zeros_like(next(iter(demand.values()))[0])
-                inside[name] = (zero, zero)
+                inside[name] = (np.zeros((len(motions.seen.state), 3)), np.zeros((len(motions.seen.state), 3)))
                 continue
-            side, sign = _far_side(model, name, tree)
-            moment, force = (sign * np.sum([demand[b][k] for b in side], axis=0) for k in (0, 1))
+            moment, force = (sides[name][1] * np.sum([demand[b][k] for b in beyond[name]], axis=0) for k in (0, 1))
             inside[name] = (moment, force)
     return inside
 
@@ -89,25 +98,41 @@ def _is_inside(model: Model, between: tuple[str, str], places: Mapping[str, obje
     return all(model.mechanism.frames[f].body in places for f in between)
 
 
-def _demand(motions: Motions, name: str, known: Mapping[str, Wrench]) -> Wrench:
-    """What the fixed joints must supply to a body: its inertia less gravity, loads, paths and all other joints."""
+def _demands(motions: Motions, names: Sequence[str], known: Mapping[str, Wrench]) -> dict[str, Wrench]:
+    """What the fixed joints must supply to bodies: their inertia less gravity, loads, paths and all other joints."""
     model, seen = motions.model, motions.seen
-    moment, force = np.zeros((len(seen.state), 3)), np.zeros((len(seen.state), 3))
-    body = model.scene.body[name]
-    if isinstance(body, RigidBody):
-        motion = motions.bodies[name]
-        J = motion.R @ np.array(body.inertia) @ np.swapaxes(motion.R, 1, 2)
-        force = body.mass * (motion.a - model.gravity)
-        spin = np.einsum("tij,tj->ti", J, motion.omega)
-        moment = np.einsum("tij,tj->ti", J, motion.alpha) + np.cross(motion.omega, spin) + np.cross(motion.p, force)
-    for joint_name, (n, f) in known.items():
-        a, b = _joined(model, joint_name)
-        if name in (a, b):
-            sign = 1.0 if name == b else -1.0
-            moment, force = moment - sign * n, force - sign * f
-    n, f = on_body(model, seen, name)
-    moment, force = moment - n, force - f
-    return moment, force
+    found = {name: (np.zeros((len(seen.state), 3)), np.zeros((len(seen.state), 3))) for name in names}
+    rigid = [name for name in names if isinstance(model.scene.body[name], RigidBody)]
+    if rigid:
+        moments, forces = _inertial(motions, rigid)
+        found |= {name: (moments[:, k], forces[:, k]) for k, name in enumerate(rigid)}
+    for joint, (n, f) in known.items():
+        first, second = _joined(model, joint)
+        if first in found:
+            moment, force = found[first]
+            found[first] = moment + n, force + f
+        if second in found:
+            moment, force = found[second]
+            found[second] = moment - n, force - f
+    for name in names:
+        for _, n, f in on_frames(model, seen, name):
+            moment, force = found[name]
+            found[name] = moment - n, force - f
+    return found
+
+
+def _inertial(motions: Motions, names: Sequence[str]) -> Wrench:
+    """Rates of momentum of rigid bodies about the kernels' origin, and of momentum, less their weight; by Euler and
+    Newton, (time, body, 3)."""
+    model = motions.model
+    bodies = [body for name in names if isinstance(body := model.scene.body[name], RigidBody)]
+    motion = motions.every_body.taken([motions.moving_bodies.index(name) for name in names])
+    inertia, mass = np.array([body.inertia for body in bodies]), np.array([body.mass for body in bodies])
+    R_BW = np.swapaxes(motion.R, -1, -2)
+    omega, alpha = turned(R_BW, motion.omega), turned(R_BW, motion.alpha)
+    spin = turned(motion.R, turned(inertia, alpha) + cross(omega, turned(inertia, omega)))
+    force = mass[:, None] * (motion.a - model.gravity)
+    return spin + cross(motion.p, force), force
 
 
 def _joined(model: Model, name: str) -> tuple[str, str]:

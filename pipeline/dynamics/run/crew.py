@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from threading import Condition, Event, Lock, Thread
 
@@ -28,19 +28,35 @@ class _Steps:
     back: Event = field(default_factory=Event)
 
 
+@dataclass(frozen=True)
+class Code:
+    """Right-hand sides of one wiring with equal bits (`functions.specialised`).
+
+    abreast: address of what lets steppers run.  alone: that of the evaluation of one state; 0 where there is none.
+    numbers: how many a mechanism of this wiring has in f at most.
+    """
+
+    abreast: int
+    alone: int
+    numbers: int
+
+
 class Crew:
     """A thread that lets steppers run while it is open.
 
-    kept: closure rows that its code solves for.  code: address of that (`functions.specialised`).
+    kept: closure rows that its code solves for.
     """
 
-    def __init__(self, kept: bytes, code: int, lanes: int) -> None:
-        self.kept, self.lanes, self.aboard = kept, lanes, 0
+    def __init__(self, kept: bytes, code: Code, lanes: int) -> None:
+        self.kept, self.lanes = kept, lanes
         self.wait = stacks.addresses()["wait"]
-        self._run = functions.LANES(code)
+        self._run = functions.LANES(code.abreast)
         self._stacks = stacks.Stacks(lanes)
         self._table = np.zeros(stacks.HEAD + lanes, np.int64)
-        self._places = np.zeros(6 * lanes, np.int64)
+        self._table[stacks.ALONE] = code.alone
+        self._places = np.zeros(7 * lanes, np.int64)
+        room = np.zeros((code.numbers + 1) * lanes)
+        self._numbers = room[-room.ctypes.data // 8 % lanes :]  # of all lanes one number, in no two lines of the cache
         self._table[stacks.HEAD :] = [record.ctypes.data for record in self._stacks.records]
         self._waiting, self._news, self._closed = deque[_Steps](), Condition(), False
         self._failed: BaseException | None = None
@@ -54,7 +70,7 @@ class Crew:
             if self._failed is not None:
                 raise self._failed
             self._waiting.append(steps)
-            self._table[0] = 1  # calls the compiled code back, which looks at it between two evaluations
+            self._table[stacks.WANTED] = 1  # calls the compiled code back, which looks at it between two evaluations
             self._news.notify()
         steps.back.wait()
         if self._failed is not None:
@@ -81,7 +97,8 @@ class Crew:
         """What the thread does: let steppers run as long as the crew is open."""
         states = self._stacks.records[:, stacks.STATE]
         while self._take(busy):
-            self._run(self._table.ctypes.data, self._places.ctypes.data, stacks.addresses()["resume"])
+            arrays = (self._table, self._places, self._numbers)
+            self._run(*(array.ctypes.data for array in arrays), stacks.addresses()["resume"])
             for lane in np.flatnonzero(states == stacks.DONE):
                 states[lane] = stacks.IDLE
                 steps, busy[lane] = busy[lane], None
@@ -95,7 +112,8 @@ class Crew:
                 if self._closed:
                     return False
                 self._news.wait()
-            self._table[0] = 0
+            self._table[stacks.WANTED] = 0
+            self._places[6 * self.lanes :] = 0  # where arrays lie others may have lain before
             while self._waiting and None in busy:
                 lane, steps = busy.index(None), self._waiting.popleft()
                 busy[lane] = steps
@@ -104,31 +122,52 @@ class Crew:
 
 
 class Crews:
-    """Some crews for engines of one model."""
+    """Crews for the engines of so many threads, each made when an engine first needs it; of one width."""
 
-    def __init__(self, crews: list[Crew]) -> None:
-        self._crews, self._boarding = crews, Lock()
-        self.lanes = sum(crew.lanes for crew in crews)
+    def __init__(self, lanes: int, threads: int) -> None:
+        self.width, self.lanes = lanes, lanes * threads
+        self._aboard, self._crews = [0] * threads, dict[tuple[int, int], Crew]()
+        self._boarding = Lock()
 
     @contextmanager
-    def place(self) -> Iterator[Crew]:
-        """The crew with the fewest engines; meanwhile it has one more."""
+    def place(self) -> Iterator[Place]:
+        """In the thread with the fewest engines; meanwhile it has one more."""
         with self._boarding:
-            crew = min(self._crews, key=lambda one: one.aboard)
-            crew.aboard += 1
+            thread = self._aboard.index(min(self._aboard))
+            self._aboard[thread] += 1
         try:
-            yield crew
+            yield Place(self, thread)
         finally:
             with self._boarding:
-                crew.aboard -= 1
+                self._aboard[thread] -= 1
+
+    def crew(self, thread: int, kept: bytes, code: Code) -> Crew:
+        """That of a thread which evaluates with this code."""
+        with self._boarding:
+            made = self._crews.get((thread, code.abreast))
+            if made is None:
+                made = self._crews[thread, code.abreast] = Crew(kept, code, self.width)
+            return made
+
+    def close(self) -> None:
+        """End all threads."""
+        for crew in self._crews.values():
+            crew.close()
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an engine may step beside others: of those in a thread the crew that evaluates as it does."""
+
+    crews: Crews
+    thread: int
 
 
 @contextmanager
-def crews(kept: bytes, code: int, lanes: int, number: int) -> Iterator[Crews]:
-    """So many crews, while they are used."""
-    with ExitStack() as stack:
-        made = []
-        for _ in range(number):
-            made.append(Crew(kept, code, lanes))
-            stack.callback(made[-1].close)
-        yield Crews(made)
+def crews(lanes: int, threads: int) -> Iterator[Crews]:
+    """Crews, while they are used."""
+    made = Crews(lanes, threads)
+    try:
+        yield made
+    finally:
+        made.close()

@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.crew import Crew
+from flexclear.pipeline.dynamics.run.crew import Crew, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
@@ -36,7 +36,8 @@ class Straight:
 
     wanted: whether all integrations shall use it.  used: whether the present one does.
     exact: whether it is to give the same bits for one state as for several at once.
-    crew: who takes the steps, for the closure rows that it is for; by default each engine takes its own.
+    place: where it may step beside others; by default each engine takes its own steps.
+    crew: who takes the steps there, for the closure rows that it is for.
     addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     rows: those for which the present integration uses it.  They are its own, since what other integrations of this
     engine have met must not change a bit of this one.
@@ -45,6 +46,7 @@ class Straight:
     wanted: bool = False
     used: bool = False
     exact: bool = False
+    place: Place | None = None
     crew: Crew | None = None
     addresses: dict[bytes, int] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)

@@ -184,9 +184,11 @@ _last: list[tuple[Scene, str]] = []
 
 def _told(scene: Scene) -> str:
     """All that a scene says; remembered of the last one, since studies ask for thousands of pieces of it."""
-    if not _last or _last[0][0] is not scene:
-        _last[:] = [(scene, scene.model_dump_json(exclude={"title", "description", "view", "limits"}))]
-    return _last[0][1]
+    known, text = _last[0] if _last else (None, "")
+    if known is not scene:
+        text = scene.model_dump_json(exclude={"title", "description", "view", "limits"})
+        _last[:] = [(scene, text)]
+    return text
 
 
 def _arrays(left: Any) -> Iterator[np.ndarray]:

@@ -21,12 +21,13 @@ import numpy as np
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions, stacks
+from flexclear.pipeline.dynamics.effects import Parts
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run.crew import Crews, crews
+from flexclear.pipeline.dynamics.run.crew import Code, Crew, Crews, Place, crews
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
-from flexclear.pipeline.dynamics.specialise.wiring import wiring
+from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
 
 #: evaluations of one run after which it goes on so: those that it has taken cost what the code takes to make
 MANY = 1_000_000
@@ -35,6 +36,8 @@ SELECTIONS = 4
 #: states that are evaluated at once: few, or many. Of fewer than `FEW` each is evaluated alone
 FEW, LANES = 2, (4, 8)
 _making = Lock()
+#: addresses by parts, wiring and lanes: many engines of a process share them
+_known: dict[tuple[Parts, Wiring, int], int] = {}
 
 
 def settle(engine: Engine, progress: Progress) -> None:
@@ -62,15 +65,17 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> I
     """
     engine.straight.wanted = engine.straight.exact = True
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
-    code = 0
-    if members >= FEW * threads and stacks.supported() and suited(engine):
-        code = _code(engine, engine.kept.tobytes(), progress, lanes)
-    if code:
-        with crews(engine.kept.tobytes(), code, lanes, threads) as made:
+    if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.kept.tobytes(), progress, lanes):
+        with crews(lanes, threads) as made:
             yield made
     else:
         settle(engine, progress)
         yield None
+
+
+def side_by_side(engine: Engine) -> bool:
+    """Whether its steps can be taken beside those of others here."""
+    return stacks.supported() and suited(engine)
 
 
 def suited(engine: Engine) -> bool:
@@ -83,23 +88,38 @@ def _make(engine: Engine, progress: Progress) -> None:
 
     An integration that goes on in another process needs that of the rows which it has met before, too.
     """
-    known, rows, crew = engine.straight.addresses, engine.straight.rows, engine.straight.crew
+    straight, kept = engine.straight, engine.kept.tobytes()
     if not suited(engine):
         return
-    if engine.kept.tobytes() not in rows and len(rows) < SELECTIONS:
-        rows.append(engine.kept.tobytes())
-    for kept in rows:
-        if kept not in known and not (crew and crew.kept == kept):
-            known[kept] = _code(engine, kept, progress, lanes=int(engine.straight.exact))
+    if straight.place is not None and straight.crew is None:
+        straight.crew = _crew(engine, kept, straight.place, progress)
+    if kept not in straight.rows and len(straight.rows) < SELECTIONS:
+        straight.rows.append(kept)
+    for rows in straight.rows:
+        if rows not in straight.addresses and not (straight.crew and straight.crew.kept == rows):
+            straight.addresses[rows] = _code(engine, rows, progress, lanes=int(straight.exact))
+
+
+def _crew(engine: Engine, kept: bytes, place: Place, progress: Progress) -> Crew | None:
+    """Who takes the steps at a place, with the closure rows that the first integration there begins with."""
+    several = _code(engine, kept, progress, place.crews.width)
+    if not several:
+        return None
+    code = Code(several, _code(engine, kept, progress, lanes=1), len(engine.model.arrays.f))
+    return place.crews.crew(place.thread, kept, code)
 
 
 def _code(engine: Engine, kept: bytes, progress: Progress, lanes: int) -> int:
     """Address of the code for closure rows; 0 where there is none."""
-    h = engine.h.copy()
+    h, parts = engine.h.copy(), engine.model.parts
     selection.write(engine.model, h, np.frombuffer(kept, dtype=bool))
-    try:
-        with _making:  # members of ensembles run side by side
-            wired = wiring(engine.model.arrays, h)
-            return functions.specialised(engine.model.parts, wired, lambda text: progress(None, text), lanes)
-    except UnsuitedError:
-        return 0
+    with _making:  # engines may run side by side
+        wired = wiring(engine.model.arrays, h)
+        known = _known.get((parts, wired, lanes))
+        if known is None:
+            try:
+                known = functions.specialised(parts, wired, lambda text: progress(None, text), lanes)
+            except UnsuitedError:
+                known = 0
+            _known[parts, wired, lanes] = known
+        return known

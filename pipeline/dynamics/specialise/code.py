@@ -9,6 +9,7 @@ says, not those that the compiler likes.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -117,11 +118,21 @@ class Emitter:
     """Writes a program into a function under construction.
 
     where: the place of an array's element: where(array, place as a number or a value of the code, lane) -> pointer.
-    lanes: states at once; f is the same for all of them.  exact: every operation is rounded as it stands.
+    lanes: states at once.  exact: every operation is rounded as it stands.
+    number: of several states, what stands at a place of f, of all of them.
     """
 
-    def __init__(self, builder: ir.IRBuilder, program: Program, where: Any, lanes: int = 1, *, exact: bool = False):
-        self.builder, self.program, self.where, self.lanes = builder, program, where, lanes
+    def __init__(
+        self,
+        builder: ir.IRBuilder,
+        program: Program,
+        where: Any,
+        lanes: int = 1,
+        *,
+        exact: bool = False,
+        number: Callable[[int], Any] | None = None,
+    ):
+        self.builder, self.program, self.where, self.lanes, self.number = builder, program, where, lanes, number
         self.uses = uses(program)
         self.exact, self.flags = exact, () if exact else FLAGS
         self.fused = fused(program.block, self.uses) if exact else {}
@@ -159,14 +170,6 @@ class Emitter:
         for lane, value in enumerate(values):
             found = self.builder.insert_element(found, value, _NUMBER(lane))
         return found
-
-    def _everywhere(self, value: Any) -> Any:
-        """The same in all lanes."""
-        if self.lanes == 1:
-            return value
-        nothing = ir.Constant(ir.VectorType(value.type, self.lanes), ir.Undefined)
-        first = ir.Constant(ir.VectorType(_NUMBER, self.lanes), [0] * self.lanes)
-        return self.builder.shuffle_vector(self.builder.insert_element(nothing, value, _NUMBER(0)), nothing, first)
 
     # Blocks ------------------------------------------------------------------------------------------------------
 
@@ -275,8 +278,8 @@ class Emitter:
 
     def _load(self, array: str, place: Any) -> Any:
         builder = self.builder
-        if array == "f" and not isinstance(place, Symbol):
-            return self._everywhere(builder.load(self.where(array, place, 0)))
+        if array == "f" and self.number is not None and not isinstance(place, Symbol):
+            return self.number(place)
         places = [self.where(array, self._place(place, lane), lane) for lane in range(self.lanes)]
         return self._together([builder.load(found) for found in places])
 

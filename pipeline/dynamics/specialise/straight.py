@@ -7,6 +7,7 @@ far loops are open and how independent their rows are. n[ABRIDGED] says so to wh
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from types import CellType, FunctionType
 from typing import Any
 
@@ -73,23 +74,54 @@ def straight(rates: Callable, wiring: wired.Wiring, *, exact: bool = False) -> A
     return run
 
 
-def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> Any:
-    """The function abreast(places) of compiled code: the same for several states of mechanisms that share f.
+def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
+    """Functions of compiled code: note(h, f, numbers, lane) and abreast(places, numbers).
 
+    The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
+    where they stand side by side: numbers has room for all of f in all lanes.
     places: addresses of all h, then of all f, w and n, then all places y and dy, shape (6 lanes,).
     """
+    made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
 
     @intrinsic
-    def run(typingctx: Any, places: Any) -> Any:
+    def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            found = program(rates, wiring)
-            given = [_arguments(builder, values[0], lane, lanes) for lane in range(lanes)]
-            Emitter(builder, found, _places(builder, found, given), lanes, exact=True).emit()
+            h, f, numbers, lane = values
+            begins = dict[int, Any]()
+            for k, place in enumerate(_numbers(made())):
+                stretch, inside = wired.split(place)
+                if stretch not in begins:
+                    begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
+                value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))
+                builder.store(value, builder.gep(numbers, [builder.add(lane, _INTEGER(k * lanes))]))
             return context.get_dummy_value()
 
-        return types.void(places), generate
+        return types.void(h, f, numbers, lane), generate
 
-    return run
+    @intrinsic
+    def run(typingctx: Any, places: Any, numbers: Any) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+            found, (places, numbers) = made(), values
+            given = [_arguments(builder, places, lane, lanes) for lane in range(lanes)]
+            side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
+            row = {place: k for k, place in enumerate(_numbers(found))}
+
+            def number(place: int) -> Any:
+                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[place])]))
+                loaded.align = 8
+                return loaded
+
+            Emitter(builder, found, _places(builder, found, given), lanes, exact=True, number=number).emit()
+            return context.get_dummy_value()
+
+        return types.void(places, numbers), generate
+
+    return note, run
+
+
+def _numbers(found: Program) -> list[int]:
+    """Places in f of all that a program loads from there."""
+    return sorted({place for array, place in loads(found) if array == "f" and isinstance(place, int)})
 
 
 def exactly(kernel: Any) -> Any:

@@ -124,7 +124,11 @@ def _panel(
     for m in marks:
         if np.isfinite(m.error.get(name, np.nan)):
             ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
-            ax.annotate(m.name, (m.seconds, m.error[name]), xytext=(4, 4), textcoords="offset points", fontsize=6.8)
+            # to the side where the panel goes on
+            side, shift = ("right", -4) if m.seconds > np.nanmedian(seconds) else ("left", 4)
+            ax.annotate(
+                m.name, (m.seconds, m.error[name]), xytext=(shift, 4), textcoords="offset points", fontsize=6.8, ha=side
+            )
     ax.set(xscale="log", yscale="log", title=name)
     plain(ax.xaxis)
     if np.isinf(bound):

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import Any, cast
 
 import matplotlib as mpl
+import numpy as np
 
 mpl.use("Agg")
 
@@ -21,6 +22,8 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 INK, SOFT, GRID = "#222222", "#6b6b6b", "#e3e3e3"
 #: letters per inch of a line of a heading
 TITLE_LETTERS, SUBTITLE_LETTERS = 9.4, 14.0
+#: decades of a logarithmic axis that have room for numbers between the powers of ten
+FEW_DECADES = 2.2
 
 RC: dict[str, Any] = {
     "figure.dpi": 100,
@@ -83,9 +86,18 @@ def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> 
 
 
 def plain(axis: Axis) -> None:
-    """Plain numbers at 1, 2 and 5 of a logarithmic axis: a range of less than a decade has hardly any power of ten."""
+    """Plain numbers at 1, 2 and 5 of a logarithmic axis: a range of less than a decade has hardly any power of ten.
+
+    Of longer ranges only the powers of ten are written, since the others would run into each other.
+    """
+
+    def written(value: float, _: int | None) -> str:
+        low, high = axis.get_view_interval()
+        power = bool(np.isclose(np.log10(value) % 1.0, (0.0, 1.0), atol=1e-6).any())
+        return f"{value:g}" if power or abs(np.log10(high / low)) < FEW_DECADES else ""
+
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter(FuncFormatter(written))
     axis.set_minor_formatter(NullFormatter())
 
 

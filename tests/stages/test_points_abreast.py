@@ -1,0 +1,174 @@
+"""Points of a sweep whose steps are taken side by side: each is what it is alone, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.kept import parse_kept
+from flexclear.pipeline.core.scene.load import load_scene, with_numbers
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow import journal
+from flexclear.pipeline.dynamics.compile import stacks
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.record import point as points_of
+from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.pipeline.dynamics.run import crew
+from flexclear.stages import sweep_engine, sweep_points
+
+SIDE_BY_SIDE = stacks.supported() and not INTERPRETED
+BALL = ("ball.velocity.largest", "contact.peak_force", "contact.impact_times.last", "ball.position.final")
+
+
+def runner(scene: Scene, keep: Sequence[str] = BALL, **asked: Any) -> Runner:
+    return Runner({}, [parse_kept(name, scene.owners()) for name in keep], **asked)
+
+
+def alone(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
+    """Each by a worker that has run nothing else."""
+    return [sweep_points._point(runner(scene, **asked), scene, point, None) for point in points]
+
+
+def abreast(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
+    return sweep_points._abreast(runner(scene, **asked), scene, points, [None] * len(points))
+
+
+def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
+    assert [(p.refused, p.evaluations) for p in found] == [(p.refused, p.evaluations) for p in known]
+    for one, other in zip(found, known, strict=True):
+        for mine, its in ((one.values, other.values), (one.error, other.error), (one.deviation, other.deviation)):
+            assert mine.keys() == its.keys()
+            assert all(np.array_equal(mine[name], its[name]) for name in mine)
+
+
+@pytest.fixture
+def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many engines each crew lets step side by side."""
+    proper, made = crew.Crew, list[int]()
+
+    def noted(kept: bytes, code: crew.Code, lanes: int) -> crew.Crew:
+        made.append(lanes)
+        return proper(kept, code, lanes)
+
+    monkeypatch.setattr(crew, "Crew", noted)
+    return made
+
+
+def test_points_are_the_same_to_the_last_bit_whoever_is_beside_them(root: Path, evaluations_abreast: list[int]) -> None:
+    """More of them than lanes, in each other numbers, also of the laws of time and of the method; of all lengths."""
+    ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.5})
+    points: list[dict[str, Any]] = [{"joint.contact.normal.restitution": e} for e in (0.5, 0.6, 0.7, 0.8)]
+    points += [{"joint.contact.clearance": c, "time.end": 0.3 + 100.0 * c} for c in (1e-3, 1.5e-3, 2e-3)]
+    points += [{"body.ball.mass": mass} for mass in (0.5, 2.0, 3.0)] + [{"solver.rtol": 1e-6}]
+    known = alone(ball, points, error=True)
+    assert len({float(p.values["contact.peak_force.largest"]) for p in known}) == len(points)
+    assert_same(abreast(ball, points, error=True), known)
+    assert_same(abreast(ball, points[::-1], error=True), known[::-1])
+    assert_same(abreast(ball, points[:3], error=True), known[:3])
+    assert evaluations_abreast == ([points_of.ABREAST] * 3 if SIDE_BY_SIDE else [])
+
+
+def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(points_of, "ABREAST", 4)  # as in a test of ensembles, whose code is on disk by then
+    paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "60 ms"})
+    points = [{"joint.A1.clearance": c} for c in (3e-4, 4e-4, 5e-4)] + [{"joint.A1.normal.restitution": 0.7}]
+    keep = ("platform.velocity.largest", "A1.peak_force", "A1.impact_times.count")
+    known = alone(paper, points, keep=keep)
+    assert all(p.values["A1.impact_times.count"] > 5 for p in known)
+    assert_same(abreast(paper, points, keep=keep), known)
+
+
+def test_a_point_that_fails_fails_alone_and_in_the_same_words(root: Path) -> None:
+    """Refused before it is run, out of evaluations in the middle, and when its surfaces have passed each other."""
+    ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.5})
+    points: list[dict[str, Any]] = [{"joint.contact.normal.restitution": 0.5 + 0.1 * k} for k in range(4)]
+    failing = [{"solver.evaluations": 900}, {"joint.contact.clearance": -1.0}, {"joint.contact.normal.stiffness": 1.0}]
+    points[1:1], points[3:3] = failing[:2], failing[2:]
+    known = alone(ball, points)
+    assert [bool(p.refused) for p in known] == [False, True, True, True, False, False, False]
+    assert len({p.refused for p in known}) == 4
+    assert_same(abreast(ball, points), known)
+
+
+def test_sections_and_members_of_points_are_the_same_to_the_last_bit(root: Path) -> None:
+    pendulum = load_scene(
+        root / "scenes/checks/driven_pendulum.toml", override={"sections.transient": 1, "sections.periods": 20}
+    )
+    points = [{"load.torque.force.amplitude": value} for value in (0.9, 1.2, 1.5)]
+    keep = ("bob.angular_velocity.sections",)
+    assert_same(abreast(pendulum, points, keep=keep), alone(pendulum, points, keep=keep))
+    ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
+    points = [{"joint.contact.normal.restitution": e} for e in (0.5, 0.6, 0.7)]
+    known = alone(ball, points, members=2)
+    assert all(p.deviation["contact.peak_force.largest"] > 0.0 for p in known)
+    assert_same(abreast(ball, points, members=2), known)
+
+
+def test_each_point_keeps_its_unfinished_work_in_a_journal_of_its_own(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is done of a batch is kept until all of it is; then nothing is left."""
+    ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
+    points = [{"joint.contact.normal.restitution": 0.5 + 0.1 * k} for k in range(4)]
+    proper, seen, made = Runner.run, dict[float, str](), runner(ball)
+
+    def noted(self: Runner, scene: Scene, *rest: Any) -> Point:
+        own = journal.current()
+        assert own is not None
+        seen[scene.contacts()["contact"].normal.restitution] = own.key
+        return proper(self, scene, *rest)
+
+    monkeypatch.setattr(Runner, "run", noted)
+    monkeypatch.setattr(sweep_points, "_opened", lambda *_: (ball, made))
+    left = list[set[str]]()
+    remove = journal.remove
+    monkeypatch.setattr(
+        journal, "remove", lambda task: (left.append({p.name[:1] for p in tmp_path.glob("*.part")}), remove(task))
+    )
+    places: list[Path | None] = [tmp_path / str(k) for k in range(4)]
+    found, _ = sweep_points.work("key", b"", points, True, places, abreast=True)
+    assert seen == {
+        with_numbers(ball, p).contacts()["contact"].normal.restitution: str(k) for k, p in enumerate(points)
+    }
+    assert left[0] == {"0", "1", "2", "3"}
+    assert list(tmp_path.glob("*.part")) == []
+    monkeypatch.undo()
+    assert_same(found, alone(ball, points))
+
+
+def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() -> None:
+    """Where they take many evaluations and there are many of them; they still end together."""
+
+    def handed_out(evaluations: int, count: int = 200) -> tuple[list[int], list[bool], float]:
+        busy, sizes, told = [0.0, 0.0], list[int](), list[bool]()
+
+        def submit(family: str, packed: bytes, points: list[Any], alone: bool, journals: Any, abreast: bool) -> Any:
+            from concurrent.futures import Future
+
+            seconds = 0.1 * len(points)
+            busy[busy.index(min(busy))] += seconds
+            sizes.append(len(points))
+            told.append(abreast)
+            future: Future[Any] = Future()
+            future.set_result(([Point({}, {}, {}, evaluations) for _ in points], seconds))
+            return future
+
+        jobs = [sweep_engine.Job(str(n), "family", {}, Path(str(n))) for n in range(count)]
+        sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
+        assert sum(sizes) == count
+        return sizes, told, sum(busy) / max(busy)
+
+    sizes, told, together = handed_out(evaluations=100_000)
+    assert told == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
+    assert all(size % sweep_engine.ABREAST == 0 for size in sizes[1:-1])
+    assert max(sizes) >= 4 * sweep_engine.ABREAST
+    assert together >= 1.85  # found 1.93
+    assert not any(handed_out(evaluations=1_000)[1])
+    assert not any(handed_out(evaluations=100_000, count=20)[1])
