@@ -28,7 +28,17 @@ from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import modal_basis, phi_functions
 from flexclear.pipeline.dynamics.integrate.method import Method, slope
-from flexclear.pipeline.dynamics.integrate.modal_basis import count, damping, lift, read, room, square, turn, work_rate
+from flexclear.pipeline.dynamics.integrate.modal_basis import (
+    count,
+    damping,
+    lift,
+    pressed,
+    read,
+    room,
+    square,
+    turn,
+    work_rate,
+)
 from flexclear.pipeline.dynamics.integrate.newton import limit
 from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -51,7 +61,7 @@ FORGETTING = 0.3
 #: steps are so long that corrections fall by this factor per sweep, which goes with their square; no less is aimed at
 SWIFT, LEAST = 0.1, 0.01
 #: where they fall more slowly than this, or after so many steps, the oscillators are made anew
-SLOW, OLD = 0.08, 20.0
+SLOW, OLD = 0.08, 6.0
 
 # Memory between steps -------------------------------------------------------------------------------------------------
 # whether the oscillators serve the present state, whether there are any, step of the phi functions, length of the step
@@ -365,7 +375,7 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         o = h[m.MEMORY]
         w[o + LAST_STEP], w[o + TRIED] = step, 0.0
         w[o + AGE] += 1.0
-        if w[o + SLOWEST] > SLOW or w[o + AGE] >= OLD:
+        if not pressed(h, w, basis(h)) or w[o + SLOWEST] > SLOW or w[o + AGE] >= OLD:
             w[o + BASIS_HOLDS] = 0.0
             if n[m.STATE] == h[m.Y_NEW] and n[m.ABRIDGED] == 0:
                 renew(h, f, w, n)

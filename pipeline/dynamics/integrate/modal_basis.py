@@ -125,6 +125,15 @@ def count(h):
     return modes(h) + h[m.N_SURFACES]
 
 
+@kernel
+def pressed(h, w, o):
+    """Whether some contact is a spring now."""
+    result = False
+    for c in range(h[m.N_SURFACES]):
+        result |= w[root(h, o, modes(h) + c)] > 0.0
+    return result
+
+
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
 def read(h, w, o, state, out):
