@@ -9,8 +9,8 @@ contacts give the mechanism in its present state (`modal_basis`), g is what is l
 the :math:`d_k` are the coefficients of the cubic through g at Lobatto's nodes, minus its start; the nodes' states are
 found by iteration, which converges with h times the slope of g. So steps need not resolve the modes' vibrations, which
 are kept with their phases, and the solution between the nodes is dense output. A needs not be exact, what it lacks is
-in g: it is kept from step to step while the iteration converges fast. Where nothing vibrates the method is Lobatto
-IIIA.
+in g: while contacts are closed, it is kept for some steps, as long as the iteration converges fast. Where nothing
+vibrates the method is Lobatto IIIA.
 
 Source: Hochbruck & Ostermann, Exponential integrators, *Acta Numerica* 19 (2010), sec. 2.2 (collocation);
 Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (Lobatto IIIA) and
