@@ -131,8 +131,11 @@ def converged(here: Mechanism, body: str, horizon: float, sampling: float = SAMP
     return Reference(_regular(_run(finest), body, sampling), horizon, sampling, at)
 
 
-def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
-    """Our runs by all methods at all tolerances, as far as they are not refused and not far dearer than others."""
+def ladder(here: Mechanism, body: str, reference: Reference, enough: Callable[[Error], bool]) -> list[Rung]:
+    """Our runs by all methods at all tolerances, as far as they are not refused and not far dearer than others.
+
+    enough: whether a run is so right that the method need not be tried at tighter tolerances.
+    """
     rungs: list[Rung] = []
     for integrator in OURS:
         if integrator == VIBRATING and not here.scene.flexible():
@@ -144,7 +147,8 @@ def ladder(here: Mechanism, body: str, reference: Reference) -> list[Rung]:
             except SolverError:
                 continue
             rungs.append(_rung(mine, run, body, reference))
-            if any(r.error.within(rungs[-1].error) and DEAR * r.seconds < rungs[-1].seconds for r in rungs):
+            found, seconds = rungs[-1].error, rungs[-1].seconds
+            if enough(found) or any(r.error.within(found) and DEAR * r.seconds < seconds for r in rungs):
                 break
     return rungs
 

@@ -91,13 +91,12 @@ def where(measured: Mapping[str, list[Session]]) -> str:
     """Date and machine of a page's measurements: once, if they are the same, else once for each."""
     told: dict[str, list[str]] = {}
     for name, sessions in measured.items():
+        cases: dict[str, list[str]] = {}
         for session in sessions:
-            part = (
-                name
-                if len(sessions) == 1
-                else f"{name} ({', '.join(dict.fromkeys(r['case'] for r in session.records))})"
-            )
-            told.setdefault(session_words(session), []).append(part)
+            cases.setdefault(session_words(session), []).extend(record["case"] for record in session.records)
+        for words, mine in cases.items():
+            part = name if len(cases) == 1 else f"{name} ({', '.join(dict.fromkeys(mine))})"
+            told.setdefault(words, []).append(part)
     if len(told) == 1:
         return f"Measured {next(iter(told))}."
     return "Measured:\n\n" + "\n".join(f"- {', '.join(parts)}: {session}" for session, parts in told.items())

@@ -54,6 +54,10 @@ def main(arguments: list[str] | None = None) -> int:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
+        if (
+            arguments is None
+        ):  # in a process of its own what is imported stays: neither now nor at its end is it garbage
+            gc.freeze()
         with workers.kept():
             return int(options.command(options) or 0)
     except FlexclearError as error:

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-from flexclear.stages.run import Workplace, check
+from flexclear.stages.workplace import Workplace, check
 
 if TYPE_CHECKING:
     import xarray as xr

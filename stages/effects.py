@@ -10,7 +10,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_effects
-from flexclear.stages.run import Workplace, check
+from flexclear.stages.workplace import Workplace, check
 
 if TYPE_CHECKING:
     import xarray as xr

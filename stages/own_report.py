@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene.ideal import loose
+from flexclear.pipeline.core.scene.origins import assumed
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import compare
+from flexclear.stages import compare, s5_post
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, check, in_file
 
@@ -98,13 +99,13 @@ def _page(
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
-    assumed = by_weight(scene.assumptions(), run)
+    assumptions = by_weight(assumed(s5_post.sources(scene)), run)
     parts: list[Any] = [
         Part("film", "The mechanism moving", _moving(graph, place, records)),
         Part("run", "The run", _media(place, graph.overview, records, FIGURES)),
         *(compare.parts(compared) if compared is not None else []),
         Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
-        Part("assumptions", "Assumptions, the most influential first", listed(assumed, ("value", "assumption"))),
+        Part("assumptions", "Assumptions, the most influential first", listed(assumptions, ("value", "assumption"))),
         Part(
             "effects",
             "Effects present and absent",

@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_plan
 from flexclear.stages.graph import Graph
-from flexclear.stages.run import Workplace, check
+from flexclear.stages.workplace import Workplace, check
 
 if TYPE_CHECKING:
     import xarray as xr

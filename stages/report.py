@@ -1,29 +1,18 @@
-"""``flexclear report``: every figure and table of the paper with all that they need, and the page that shows them.
+"""``flexclear report``: every figure and table of the paper, and the page that shows them (`stages.paper_report`).
 
-With scenes it is the report of these (`stages.own_report`).
+With scenes it is the report of these (`stages.own_report`). What brings either up to date is imported when something
+may have changed.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
-from typing import Any
 
-from flexclear.pipeline.core.artifacts.store import Record
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import kernels, run, s4_simulate, s5_post, s6_render, timing
-from flexclear.stages.figure import FIGURES
-from flexclear.stages.graph import Graph
-from flexclear.stages.run import DATA, Workplace, check
-
-#: the scene whose film and pictures the page shows: the paper's full model
-HEADLINE = "sps4/far_csj_cb"
+from flexclear.pipeline.core.workflow import settled
+from flexclear.pipeline.core.workflow.schedule import Outcome
+from flexclear.pipeline.post.render import gl
+from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -34,74 +23,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
     )
-    run.common_arguments(parser)
+    common_arguments(parser)
 
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
-    place = run.workplace(options)
+    place = workplace(options)
     if not options.scenes:
-        print(run.near(make(place, folder=options.folder)))
+        print(near(make(place, folder=options.folder)))
         return
-    from flexclear.stages import own_report
+    from flexclear.stages import own_report, run
 
     for graph in run.graphs(options.scenes, options.set):
-        print(run.near(own_report.make(graph, place, folder=options.folder)))
-
-
-@dataclass(frozen=True)
-class Scenes:
-    """Graphs of scenes by name, and times by family, each built once, so that all figures share their tasks."""
-
-    graphs: dict[str, Graph] = field(default_factory=dict)
-    times: dict[str, Task] = field(default_factory=dict)
-
-    def graph(self, name: str) -> Graph:
-        """Graph of ``scenes/<name>.toml``."""
-        if name not in self.graphs:
-            self.graphs[name] = Graph(load_scene(scene_file(name)))
-        return self.graphs[name]
-
-    def artifact(self, reference: str) -> Task:
-        """The task behind ``<scene>:<artifact>[/<body>]`` or ``<folder>:timing``."""
-        name, _, artifact = reference.partition(":")
-        return self.timing(name) if artifact == "timing" else self.graph(name).artifact(artifact)
-
-    def timing(self, family: str) -> Task:
-        """Measured times of all scenes that lie directly in a folder below scenes/.
-
-        They are seconds of the processor, and so are measured beside other tasks: alone they would be a third of the
-        whole report's time, with all other cores idle.
-        """
-        if family not in self.times:
-            self.times[family] = self._timing(family)
-        return self.times[family]
-
-    def _timing(self, family: str) -> Task:
-        files = sorted((DATA / "scenes" / family).glob("*.toml"))
-        if not files:
-            raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
-        graphs = [self.graph(f"{family}/{path.stem}") for path in files]
-        return Task(
-            stage="timing",
-            scene=family,
-            run="flexclear.stages.timing:run",
-            params={g.scene.name: s4_simulate.params(g.scene) for g in graphs},
-            inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
-            | _paper_kernels(graphs),
-            modules=tuple(sorted({name for g in graphs for name in s4_simulate.modules(g.scene)})),
-            folder=f"runs/{family}",
-            names={"nc": "timing.nc"},
-        )
-
-
-def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
-    """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
-    found: dict[tuple[str, ...], Task] = {}
-    for graph in graphs:
-        for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
-            found.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
-    return {f"kernels/{k}": task for k, task in enumerate(found.values())}
+        print(near(own_report.make(graph, place, folder=options.folder)))
 
 
 def make(place: Workplace, *, folder: bool = False) -> Path:
@@ -109,16 +43,13 @@ def make(place: Workplace, *, folder: bool = False) -> Path:
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
-    scenes = Scenes()
-    shown = place.bring(report_tasks(place, scenes))
-    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
-    page = place.bring([page_task(place, shown.records, graphs)])
-    check(page)
-    if s6_render.gl_state().endswith("none"):
-        from flexclear.pipeline.post.render import gl
-
+    now, outcome = state(place), None
+    if not settled.again(memo(place), now, place.store):
+        outcome = _bring(place, now)
+    if gl.state().endswith("none"):
         place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
-    check(shown)
+    if outcome is not None:
+        check(outcome)
     target = place.store.root / "report" / "index.html"
     if not folder:
         return target
@@ -127,69 +58,22 @@ def make(place: Workplace, *, folder: bool = False) -> Path:
     return publish_page(target.parent, "folder", target.read_bytes(), folder=True)
 
 
-def report_tasks(place: Workplace, scenes: Scenes) -> list[Task]:
-    """All figures, tables and pictures. What takes longest comes first, with all that it needs: film and times."""
-    figures = figure_tasks(place, scenes)
-    times = [task for task in figures if any(above.stage == "timing" for above in task.inputs.values())]
-    others = [task for task in figures if task not in times]
-    return [*scenes.graph(HEADLINE).of("render").values(), *times, *others]
+def _bring(place: Workplace, now: dict[str, str]) -> Outcome:
+    """Whatever there is to be done; remembered when nothing is left, and all of it was of one state."""
+    from flexclear.stages import paper_report
+
+    seen = [now]
+    tasks, outcome = paper_report.bring(place, lambda: seen.append(state(place)))
+    if not outcome.failures and all(then == now for then in (*seen, state(place))):
+        settled.keep(memo(place), now, tasks, outcome.records, place.store)
+    return outcome
 
 
-def figure_tasks(place: Workplace, scenes: Scenes) -> list[Task]:
-    """One task for each figure and table."""
-    return [_figure_task(name, entry, scenes) for name, entry in figure_index(place).items()]
+def memo(place: Workplace) -> Path:
+    """What remembers a report that was brought up to date."""
+    return place.store.root / "cache" / "report.json"
 
 
-def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
-    """What each figure and table needs, see `stages.figure.index`."""
-    names = list(import_module(FIGURES).NAMES)
-    task = Task(
-        stage="figures",
-        scene="report",
-        part="index",
-        run="flexclear.stages.figure:index",
-        params={"names": names},
-        modules=tuple(f"{FIGURES}.{name}" for name in names),
-        folder="",
-    )
-    outcome = place.bring([task])
-    check(outcome)
-    record = outcome.records[id(task)]
-    found: dict[str, dict[str, Any]] = json.loads(place.store.path(task.stage, record.key, "index.json").read_bytes())
-    return found
-
-
-def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
-    """The page; it is written again when anything that it shows has changed."""
-    return Task(
-        stage="report",
-        scene="report",
-        part="page",
-        run="flexclear.stages.page:run",
-        params={
-            "results": str(place.store.root),
-            "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
-            "origins": {graph.scene.name: s5_post.origins(graph.scene) for graph in graphs},
-            "rendered": HEADLINE,
-            "digests": sorted(record.digest for record in records.values()),
-        },
-        folder="report",
-    )
-
-
-def scene_file(name: str) -> Path:
-    """Where a scene of the project is."""
-    return DATA / "scenes" / f"{name}.toml"
-
-
-def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
-    return Task(
-        stage="figures",
-        scene="report",
-        part=name,
-        run="flexclear.stages.figure:run",
-        params={"figure": name},
-        inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
-        modules=(f"{FIGURES}.{name}",),
-        folder="tables" if name.startswith("table") else "figures",
-    )
+def state(place: Workplace) -> dict[str, str]:
+    """All that decides the report's tasks: beside what `settled.state` finds, where results are, and what can draw."""
+    return settled.state({"results": str(place.store.root), "gl": gl.state()})

@@ -3,34 +3,28 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
-import time
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field
+from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
-from flexclear.pipeline.core.artifacts.paths import DATA, TREE, results_root
-from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
-from flexclear.pipeline.core.errors import FlexclearError, InputError, InputErrors, SolverError
-from flexclear.pipeline.core.log import set_level
+from flexclear.pipeline.core.artifacts.paths import DATA, results_root
+from flexclear.pipeline.core.artifacts.store import PARTIAL, write_dataset
+from flexclear.pipeline.core.errors import InputError, InputErrors, SolverError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
-from flexclear.pipeline.core.workflow import stopping
-from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.progress import WARNING, Monitor
-from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
-from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import limit, owner
+from flexclear.pipeline.core.workflow.progress import WARNING
+from flexclear.pipeline.core.workflow.schedule import Outcome
+from flexclear.stages import owner
 from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.s5_post import origins
+from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -86,22 +80,6 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
     common_arguments(parser)
 
 
-def common_arguments(parser: argparse.ArgumentParser) -> None:
-    """Values to change, processes, and how much is said."""
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
-    )
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
-    limit.argument(parser)
-    said = parser.add_mutually_exclusive_group()
-    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
-    said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
-
-
 def told(folder: Path, files: Mapping[str, str]) -> None:
     """One line on what was written where, of those files that are there."""
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
@@ -114,61 +92,8 @@ def joined(names: Sequence[str]) -> str:
     return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)
 
 
-def near(path: Path) -> str:
-    """A path as seen from the current folder, where it lies below it."""
-    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
-
-
-@dataclass(frozen=True)
-class Workplace:
-    """Where artifacts are kept, where the source lies, and who is told about progress.
-
-    end: when the command is to stop, by the monotonic clock [s], and what is told then.
-    """
-
-    store: Store
-    sources: Sources
-    monitor: Monitor = field(default_factory=Monitor)
-    jobs: int | None = None
-    end: tuple[float, str] = (math.inf, "")
-
-    def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
-        """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
-        with self.limited():
-            return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
-
-    def limited(self) -> AbstractContextManager[None]:
-        """Meanwhile work is to stop when the time is over that the command was given."""
-        end, why = self.end
-        return stopping.until(None if end == math.inf else end - time.monotonic(), why)
-
-
-class FailedTasksError(FlexclearError):
-    """Some tasks failed; each is told, and the first decides the exit code."""
-
-    def __init__(self, failures: tuple[Failure, ...]) -> None:
-        super().__init__("\n".join(failure.message for failure in failures))
-        self.exit_code = failures[0].exit_code
-
-
 class MissedAccuracyError(SolverError):
     """Runs are not as accurate as their scenes ask; what there is is kept, and says so."""
-
-
-def workplace(options: argparse.Namespace | None = None) -> Workplace:
-    """The usual one, with results where `results_root` says.
-
-    options: of a command, with `jobs`, its `limit` and how much is said.
-    """
-    if options is not None:
-        set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
-    monitor = Monitor()
-    jobs = getattr(options, "jobs", None)
-    if jobs is not None and jobs < 1:
-        raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
-    root, (seconds, why) = results_root(), limit.deadline(options)
-    sources = Sources(TREE, root / "cache" / "imports.json")
-    return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (time.monotonic() + seconds, why))
 
 
 def find_scene(name: str) -> Path:
@@ -285,12 +210,6 @@ def linear(
     outcome = place.bring([task], jobs=1)
     check(outcome)
     return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
-
-
-def check(outcome: Outcome) -> None:
-    """Raise FailedTasksError when something failed."""
-    if outcome.failures:
-        raise FailedTasksError(outcome.failures)
 
 
 def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:

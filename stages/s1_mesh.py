@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene import origins
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.limits import Limits, check_cells
 from flexclear.pipeline.core.scene.load import is_file, read_toml
@@ -26,8 +27,9 @@ FILES = ("file", "stiffness", "mass", "unknowns")
 
 
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The recipe's content; its name and folder do not matter. Raises InputError when it cannot be read.
+    """The recipe's content; its name and folder do not matter, nor do its sources, which `sources` tells.
 
+    Raises InputError when it cannot be read, or a source is no text.
     edits: values that take the place of the recipe's; of `elements` a factor, which recipes without them go without.
     """
     table = read_toml(recipe)
@@ -39,7 +41,18 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     for path in _files(table, recipe.parent):
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
-    return {"recipe": table | changes}
+    sources(recipe)
+    return {"recipe": origins.without(table | changes)}
+
+
+def sources(recipe: Path, place: str = "") -> dict[str, str]:
+    """Where the values of a recipe come from: place of the part or value -> text; InputError for what is no text."""
+    table = read_toml(recipe)
+    wrong = origins.mistaken(table)
+    if wrong is not None:
+        problem = "expected text, or a table of texts by key"
+        raise InputError(f"{recipe} [{wrong}]", problem, 'write source = "Table 2"')
+    return origins.told(table, place)
 
 
 def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.scene import origins
 from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.workflow import stopping
@@ -32,17 +33,7 @@ def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> d
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.recipes():
         table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
-    return {"scene": without_origins(table)}
-
-
-def without_origins(node: Any) -> Any:
-    """The same, but for sources, and the names of files that laws were read from, whose numbers are there."""
-    if isinstance(node, dict):
-        read = node.get("type") == "table" and "points" in node
-        return {k: "" if read and k == "file" else without_origins(v) for k, v in node.items() if k != "source"}
-    # most lists are of numbers
-    nested = isinstance(node, list) and any(isinstance(item, (dict, list)) for item in node)
-    return [without_origins(item) for item in node] if nested else node
+    return {"scene": origins.without(table)}
 
 
 def modules(scene: Scene) -> tuple[str, ...]:

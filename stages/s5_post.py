@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flexclear.pipeline.core.scene.origins import assumed
 from flexclear.pipeline.core.workflow.task import given_arrays
+from flexclear.stages import s1_mesh
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
@@ -29,5 +32,14 @@ def params(scene: Scene) -> dict[str, Any]:
 
 def origins(scene: Scene) -> dict[str, str]:
     """Where values come from, as attributes of datasets."""
-    found = {"sources": scene.sources(), "assumptions": scene.assumptions()}
-    return {name: json.dumps(texts, sort_keys=True) for name, texts in found.items()}
+    texts = sources(scene)
+    found = {"sources": texts, "assumptions": assumed(texts)}
+    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in found.items()}
+
+
+def sources(scene: Scene) -> dict[str, str]:
+    """Where values come from, those of mesh recipes included: place -> text."""
+    found = scene.sources()
+    for body, recipe in scene.recipes().items():
+        found |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")
+    return found

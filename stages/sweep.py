@@ -17,8 +17,8 @@ from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import limit, run, sweep_large, sweep_plan
-from flexclear.stages.run import Workplace
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
+from flexclear.stages.workplace import Workplace
 
 if TYPE_CHECKING:
     import xarray as xr

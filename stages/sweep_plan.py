@@ -22,9 +22,9 @@ from flexclear.pipeline.core.workflow.task import Task, facts, key
 from flexclear.pipeline.core.workflow.workers import without_main
 from flexclear.stages import s4_simulate
 from flexclear.stages.graph import Graph
-from flexclear.stages.run import Workplace, check
 from flexclear.stages.sweep_engine import Job
 from flexclear.stages.sweep_points import Family as Work
+from flexclear.stages.workplace import Workplace, check
 
 if TYPE_CHECKING:
     import numpy as np

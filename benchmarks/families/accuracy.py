@@ -42,7 +42,8 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 def show(records: list[Record]) -> str:
     """What to choose for each scene, and its pictures and tables."""
     found = []
-    for scene in dict.fromkeys(r["case"] for r in records):
+    measured = {r["case"] for r in records}
+    for scene in (name for name in SCENES if name in measured):
         mine = [r for r in records if r["case"] == scene]
         tables = tuple(as_markdown(_table(r["table"])) for r in mine if "table" in r)
         pictures = {r["picture"]: r["path"] for r in mine if "picture" in r}

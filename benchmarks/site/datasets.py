@@ -44,9 +44,9 @@ the recipes run as tests.
   of contacts.
 - **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that
   the scene's parts stand for; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
-  `assumptions`, where the scene's values come from, are attributes of post.nc and of what `flexclear.run` returns, so
-  that another sentence there runs nothing again. No file holds the time or the machine of its making: equal inputs
-  give equal bytes.
+  `assumptions`, where the values of the scene and of its recipes come from, are attributes of post.nc and of what
+  `flexclear.run` returns, so that another sentence there runs nothing again. No file holds the time or the machine of
+  its making: equal inputs give equal bytes.
 - **Marked `*`:** variables that are there only when the scene has such a part.
 """
 

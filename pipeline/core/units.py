@@ -246,6 +246,8 @@ def _computable(number: float, written: object) -> float:
 
 
 def _read(value: object, dimension: str) -> float:
+    if type(value) is float and math.isfinite(value):  # nearly all of a scene that is read again
+        return value
     if isinstance(value, bool) or not isinstance(value, (int, float, str)):
         raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
     if isinstance(value, str):

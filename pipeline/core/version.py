@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as installed
 
 DISTRIBUTION = "flexclear"
 
@@ -12,6 +10,9 @@ DISTRIBUTION = "flexclear"
 @cache
 def version() -> str:
     """Such as ``0.1.0``; ``not installed`` where only the sources are there."""
+    from importlib.metadata import PackageNotFoundError  # here, since it brings readers of e-mail
+    from importlib.metadata import version as installed
+
     try:
         return installed(DISTRIBUTION)
     except PackageNotFoundError:

@@ -13,8 +13,8 @@ import pytest
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key
-from flexclear.stages import report
-from flexclear.stages.run import Workplace
+from flexclear.stages import paper_report as report
+from flexclear.stages.workplace import Workplace
 
 #: what such a command may import: its own code, and what checks scenes
 ALLOWED = {"flexclear", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
@@ -71,6 +71,11 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
+def records(results: Path) -> dict[Path, int]:
+    """When each record of an artifact was written."""
+    return {path: path.stat().st_mtime_ns for path in (results / "cache").glob("*/*.json")}
+
+
 @pytest.mark.parametrize(
     "command",
     [
@@ -82,11 +87,19 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ids=lambda command: command[0],
 )
 def test_what_is_fresh_needs_no_library_that_computes_or_draws(fresh: Path, command: tuple[str, ...]) -> None:
-    before = {path: path.stat().st_mtime_ns for path in (fresh / "cache").rglob("*.json")}
+    before = records(fresh)
     found = imported(*command, results=fresh)
-    assert {path: path.stat().st_mtime_ns for path in (fresh / "cache").rglob("*.json")} == before  # nothing was run
+    assert records(fresh) == before  # nothing was run
     assert found & SLOW == set()
     assert found <= ALLOWED
+
+
+def test_a_report_that_is_known_again_reads_no_scene(fresh: Path) -> None:
+    """Nor does it import what checks scenes."""
+    imported("report", results=fresh)
+    before = records(fresh)
+    assert imported("report", results=fresh) == {"flexclear"}
+    assert records(fresh) == before
 
 
 def test_what_needs_a_library_shows_it(fresh: Path) -> None:

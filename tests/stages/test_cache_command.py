@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.pipeline.core.artifacts.disk import checked
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.stages.__main__ import main
 
@@ -41,6 +42,18 @@ def test_damage_is_told_and_removed(store: Store, capsys: pytest.CaptureFixture[
     assert main(["cache", "prune"]) == 0
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*")) == ["c", "c"]
     assert main(["cache", "check"]) == 0
+
+
+def test_what_is_no_record_is_not_taken_for_a_damaged_one(store: Store, capsys: pytest.CaptureFixture[str]):
+    """Memos of commands, and files of artifacts that end alike."""
+    made = store.put("figures", "a" * 32, {"index.json": b"{}"}, {})
+    memo = store.root / "cache" / "imports.json"
+    memo.write_bytes(checked({}))
+    assert main(["cache", "check"]) == 0
+    assert "1 artifacts, 0 faults, 0 files" in capsys.readouterr().out
+    assert main(["cache", "prune"]) == 0
+    assert store.fault(made) is None
+    assert memo.is_file()
 
 
 def test_pruning_keeps_what_is_shown_what_that_was_made_from_and_what_is_young(

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task, in_order
 from flexclear.stages import cost, cost_design, cost_peers
 from flexclear.stages.__main__ import main
-from flexclear.stages.run import Workplace
+from flexclear.stages.workplace import Workplace
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, parents, source_file
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
@@ -196,6 +197,32 @@ def test_another_sentence_about_a_value_runs_nothing_again(root: Path, sources: 
     told = s5_post.origins(after.scene)
     assert json.loads(told["sources"])["body.platform.mass"] == "weighed"
     assert json.loads(told["assumptions"])["joint.A1.clearance"] == "assumed: measured"
+
+
+def test_another_sentence_in_a_recipe_makes_no_mesh_again(root: Path, copy: Path, sources: Sources):
+    """It is told where a scene's own sentences are."""
+    recipe = copy / "meshes" / "actuated_rod.toml"
+    recipe.write_text(
+        recipe.read_text()
+        .replace("[material]\n", "[material]\n# weighed\n")
+        .replace('poisson = 0.33\nsource = "Table 2"', 'poisson = 0.33\nsource = "assumed: aluminium"')
+    )
+    before, after = graph(root, "sps4/far_cb"), graph(copy, "sps4/far_cb")
+    assert changed(keys(before, sources), keys(after, sources)) == {"post"}
+    told = s5_post.origins(after.scene)
+    assert json.loads(told["sources"])["body.rod1.recipe.shape"] == "Table 2"
+    assert json.loads(told["assumptions"])["body.rod1.recipe.material"] == "assumed: aluminium"
+
+
+@pytest.mark.parametrize("source", ["5", "{ density = 3 }", "[1]"])
+def test_a_source_of_a_recipe_that_is_no_text_is_refused(copy: Path, source: str):
+    """What builds the mesh does not see it."""
+    recipe = copy / "meshes" / "actuated_rod.toml"
+    recipe.write_text(
+        recipe.read_text().replace('poisson = 0.33\nsource = "Table 2"', f"poisson = 0.33\nsource = {source}")
+    )
+    with pytest.raises(InputError, match=r"actuated_rod\.toml \[material\.source\]: expected text"):
+        keys(graph(copy, "sps4/far_cb"), Sources(copy))
 
 
 def test_content_of_the_recipe_counts(root: Path, copy: Path, sources: Sources):

@@ -10,8 +10,8 @@ from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
-from flexclear.stages.report import Scenes, figure_tasks
-from flexclear.stages.run import Workplace
+from flexclear.stages.paper_report import Scenes, figure_tasks
+from flexclear.stages.workplace import Workplace
 
 
 def test_every_figure_and_table_of_the_paper_has_its_inputs(root: Path, tmp_path: Path):

@@ -104,8 +104,12 @@ def _same(path: Path, other: Path) -> bool:
 
 
 def _records(store: Store) -> list[Path]:
-    """Of all stages; those of a sweep's points have a folder for each family."""
-    return sorted((store.root / "cache").rglob("*.json"))
+    """Of all stages; those of a sweep's points have a folder for each family.
+
+    A memo of a whole command lies beside the stages, and a file of an artifact may be called ``<key>.index.json``.
+    """
+    cache = store.root / "cache"
+    return sorted(path for path in cache.rglob("*.json") if path.parent != cache and "." not in path.stem)
 
 
 def _shown(store: Store) -> Iterator[Record]:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.pipeline.core import portable
+from flexclear.pipeline.core.scene import origins
 from flexclear.pipeline.core.scene.clearance import (
     CONTACTS,
     BallOnPlane,
@@ -424,21 +425,9 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        found: dict[str, str] = {}
-        _collect_sources(self.model_dump(), "", found)
-        return found
+        found = origins.told(self.model_dump())
+        return {place or "scene": text for place, text in found.items()}
 
     def assumptions(self) -> dict[str, str]:
         """The sources that say ``assumed: why``."""
-        return {k: v for k, v in self.sources().items() if v.startswith("assumed")}
-
-
-def _collect_sources(node: dict[str, object], place: str, found: dict[str, str]) -> None:
-    source = node.get("source")
-    if isinstance(source, str):
-        found[place or "scene"] = source
-    elif isinstance(source, dict):
-        found.update({f"{place}.{key}".lstrip("."): text for key, text in source.items()})
-    for key, value in node.items():
-        if key != "source" and isinstance(value, dict):
-            _collect_sources(value, f"{place}.{key}".lstrip("."), found)
+        return origins.assumed(self.sources())

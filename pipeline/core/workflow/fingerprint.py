@@ -16,7 +16,6 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
@@ -224,6 +223,8 @@ def _required(package: str) -> tuple[str, ...]:
 
 @cache
 def _metadata(package: str) -> str | None:
+    from importlib.metadata import PackageNotFoundError, distribution  # here, since it brings readers of e-mail
+
     try:
         found = distribution(DISTRIBUTIONS.get(package, package))
     except PackageNotFoundError:

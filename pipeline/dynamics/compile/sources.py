@@ -167,12 +167,14 @@ def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
         kinks.append(_import(imports, f"{INTEGRATORS}.friction_kinks", "CONTACT_KINKS"))
     if parts.joint_frictions and chosen:
         kinks.append(_import(imports, f"{INTEGRATORS}.joint_friction_kinks", "BEARING_KINKS"))
+    if parts.load_kinks and chosen:
+        kinks.append(_import(imports, f"{INTEGRATORS}.load_kinks", "LOAD_FRICTION_KINKS"))
     if touching:
         located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
         regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
         return f"{located}({', '.join([regimes, *kinks])})"
     if kinks:
-        return f"{_import(imports, f'{INTEGRATORS}.joint_friction_kinks', 'kinks_alone')}({kinks[0]})"
+        return f"{_import(imports, f'{INTEGRATORS}.friction_kinks', 'kinks_alone')}({', '.join(kinks)})"
     return ""
 
 

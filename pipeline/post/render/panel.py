@@ -65,7 +65,7 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
     if contact:
         number = list(run["contact"].values).index(loose[_first(loose, watch) or 0])
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
-        axes[2].set_title(f"{run['contact'].values[number]}: {centre(run, number)}")
+        axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
         cursors.append((_dot(axes[2], 7), x, y))
     for panel in axes:
         panel.title.set_fontsize(8.2)

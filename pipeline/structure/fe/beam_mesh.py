@@ -19,7 +19,6 @@ from flexclear.pipeline.structure.fe.beam_recipe import (
     segments,
 )
 from flexclear.pipeline.structure.fe.quadrature import POINTS
-from flexclear.pipeline.structure.fe.recipe_sources import sources
 
 #: constants that a taper changes, each with a profile
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
@@ -138,7 +137,6 @@ def _attributes(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[S
         "theory": recipe.theory,
         "torsion": recipe.torsion,
         "extension": recipe.extension,
-        "sources": sources(recipe),
     }
 
 

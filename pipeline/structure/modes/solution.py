@@ -21,7 +21,7 @@ from flexclear.pipeline.structure.modes.select import Wanted
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 REFERENCES = "flexclear.pipeline.structure.modes.reference"
-CARRIED = ("title", "section", "inertia_section", "sources")
+CARRIED = ("title", "section", "inertia_section")
 
 
 def solve(

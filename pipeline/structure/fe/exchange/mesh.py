@@ -16,7 +16,6 @@ from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from flexclear.pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
 from flexclear.pipeline.structure.fe.model import symmetric
-from flexclear.pipeline.structure.fe.recipe_sources import sources
 
 #: length [m], mass [kg] and time [s] of each consistent system
 SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
@@ -55,7 +54,6 @@ def build(recipe: MatricesRecipe, folder: Path, place: str) -> xr.Dataset:
         section="matrices",
         inertia_section="matrices",
         interfaces=" ".join(recipe.interfaces),
-        sources=sources(recipe),
     )
 
 

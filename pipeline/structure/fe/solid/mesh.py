@@ -11,7 +11,6 @@ import xarray as xr
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.artifacts.schema import SOLID, conform
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.structure.fe.recipe_sources import sources
 from flexclear.pipeline.structure.fe.solid import geometry as geometries
 from flexclear.pipeline.structure.fe.solid import imported, ties
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
@@ -48,7 +47,6 @@ def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
         section="solid",
         inertia_section="solid",
         interfaces=" ".join(recipe.interfaces),
-        sources=sources(recipe),
     )
 
 

@@ -1,0 +1,99 @@
+"""Where commands work: arguments that all of them take, the store, the sources, who is told; bringing tasks up to date.
+
+No scene is read here, so that a command that finds all of its results as they were does not import what reads them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import time
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from flexclear.pipeline.core.artifacts.paths import TREE, results_root
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.pipeline.core.log import set_level
+from flexclear.pipeline.core.workflow import stopping
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.progress import Monitor
+from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import limit
+
+
+def common_arguments(parser: argparse.ArgumentParser) -> None:
+    """Values to change, processes, and how much is said."""
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
+    )
+    parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
+    limit.argument(parser)
+    said = parser.add_mutually_exclusive_group()
+    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
+    said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
+
+
+def near(path: Path) -> str:
+    """A path as seen from the current folder, where it lies below it."""
+    return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where artifacts are kept, where the source lies, and who is told about progress.
+
+    end: when the command is to stop, by the monotonic clock [s], and what is told then.
+    """
+
+    store: Store
+    sources: Sources
+    monitor: Monitor = field(default_factory=Monitor)
+    jobs: int | None = None
+    end: tuple[float, str] = (math.inf, "")
+
+    def bring(self, tasks: list[Task], jobs: int | None = None) -> Outcome:
+        """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
+        with self.limited():
+            return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
+
+    def limited(self) -> AbstractContextManager[None]:
+        """Meanwhile work is to stop when the time is over that the command was given."""
+        end, why = self.end
+        return stopping.until(None if end == math.inf else end - time.monotonic(), why)
+
+
+class FailedTasksError(FlexclearError):
+    """Some tasks failed; each is told, and the first decides the exit code."""
+
+    def __init__(self, failures: tuple[Failure, ...]) -> None:
+        super().__init__("\n".join(failure.message for failure in failures))
+        self.exit_code = failures[0].exit_code
+
+
+def workplace(options: argparse.Namespace | None = None) -> Workplace:
+    """The usual one, with results where `results_root` says.
+
+    options: of a command, with `jobs`, its `limit` and how much is said.
+    """
+    if options is not None:
+        set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
+    monitor = Monitor()
+    jobs = getattr(options, "jobs", None)
+    if jobs is not None and jobs < 1:
+        raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
+    root, (seconds, why) = results_root(), limit.deadline(options)
+    sources = Sources(TREE, root / "cache" / "imports.json")
+    return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (time.monotonic() + seconds, why))
+
+
+def check(outcome: Outcome) -> None:
+    """Raise FailedTasksError when something failed."""
+    if outcome.failures:
+        raise FailedTasksError(outcome.failures)
