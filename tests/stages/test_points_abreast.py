@@ -73,11 +73,12 @@ def test_points_are_the_same_to_the_last_bit_whoever_is_beside_them(root: Path, 
     assert evaluations_abreast == ([points_of.ABREAST] * 3 if SIDE_BY_SIDE else [])
 
 
+@pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that evaluates with the kernels now and then
 def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit(
-    root: Path, monkeypatch: pytest.MonkeyPatch
+    root: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:
     monkeypatch.setattr(points_of, "ABREAST", 4)  # as in a test of ensembles, whose code is on disk by then
-    paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "60 ms"})
+    paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "60 ms", "solver.integrator": integrator})
     points = [{"joint.A1.clearance": c} for c in (3e-4, 4e-4, 5e-4)] + [{"joint.A1.normal.restitution": 0.7}]
     keep = ("platform.velocity.largest", "A1.peak_force", "A1.impact_times.count")
     known = alone(paper, points, keep=keep)
