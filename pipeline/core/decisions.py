@@ -53,7 +53,7 @@ class Plan:
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  apart: places of parts that nothing couples to what is asked for.
     meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
-    is not the usual one.
+    is not the usual one.  dearer: in words, why it takes more evaluations than with the scene's own integrator.
     """
 
     decisions: tuple[Decision, ...]
@@ -67,6 +67,7 @@ class Plan:
     apart: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
+    dearer: str = ""
 
     @property
     def gone(self) -> tuple[Effect, ...]:

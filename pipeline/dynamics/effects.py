@@ -33,6 +33,7 @@ class Parts:
     surfaces, forms, frictions: of contacts.  joint_frictions: laws of ideal joints.
     wear: whether that of contacts is counted.  stops: whether joint coordinates have ends.
     couplings: whether they follow each other.      harmonics: whether a law of time has some.
+    load_kinks: whether friction along them bends.
     """
 
     joints: tuple[str, ...]
@@ -48,6 +49,7 @@ class Parts:
     harmonics: bool = False
     joint_frictions: tuple[str, ...] = ()
     wear: bool = False
+    load_kinks: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,12 +102,18 @@ def most_parts(scene: Scene) -> Parts:
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
         joint_frictions=joint_frictions(scene),
         wear=bool(scene.worn()),
+        load_kinks=load_kinks(scene),
     )
 
 
 def joint_frictions(scene: Scene) -> tuple[str, ...]:
     """Friction laws of ideal joints, sorted."""
     return tuple(sorted({joint.friction.law for joint in scene.rubbing().values() if joint.friction is not None}))
+
+
+def load_kinks(scene: Scene) -> bool:
+    """Whether the friction of a load bends."""
+    return any(getattr(load, "bends", False) for load in scene.load.values())
 
 
 def _laws(scene: Scene) -> set[str]:

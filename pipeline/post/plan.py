@@ -63,6 +63,7 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
             "Conventions": "CF-1.11",
             "title": title,
             "planned": json.dumps(planned, sort_keys=True),
+            "dearer": plan.dearer,
             "evaluations": plan.evaluations,
             "runs": plan.runs,
         },
@@ -121,6 +122,8 @@ def table(found: xr.Dataset) -> Table:
     notes += [_of_mesh(found.sel(body=body), units) for body in found["body"].values]
     if told["apart"]:
         notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
+    if found.attrs["dearer"]:
+        notes.append(f"{found.attrs['dearer']}.")
     notes.append(
         f"The planned run is integrated by {told['integrator']} at a relative tolerance of {told['rtol']:.0e}. "
         f"The plan rests on {found.attrs['runs']} short runs, {found.attrs['evaluations']:,} evaluations."
@@ -184,8 +187,14 @@ def verified(found: xr.Dataset) -> Table:
     notes = [
         f"Evaluations of the equations of motion: {int(found.attrs['full_evaluations']):,} in full, "
         f"{int(found.attrs['planned_evaluations']):,} as planned, of all members together.",
+        *_no_gain(int(found.attrs["full_evaluations"]), int(found.attrs["planned_evaluations"])),
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(
         "The plan beside the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
     )
+
+
+def _no_gain(full: int, planned: int) -> list[str]:
+    """That a plan takes more evaluations than the scene as it is, where it does."""
+    return [f"The plan is {planned / full:.2g} times as dear as the scene as it is."] if planned > full else []

@@ -113,6 +113,7 @@ EFFECTS = {
     "harmonics": ("import oscillate", "flexclear.pipeline.dynamics.drives.oscillation"),
     "joint friction": ("make_joint_friction", "flexclear.pipeline.dynamics.equations.joint_friction"),
     "wear": ("import wearing", "flexclear.pipeline.dynamics.contact.wear"),
+    "kinks of loads": ("LOAD_FRICTION_KINKS", "flexclear.pipeline.dynamics.integrate.load_kinks"),
 }
 SPRING = ("spring-damper",)
 SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
@@ -149,6 +150,7 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
             harmonics=True,
             joint_frictions=("ambrosio",),
             wear=True,
+            load_kinks=True,
         ),
         set(EFFECTS),
     ),
@@ -302,12 +304,16 @@ def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(roo
 
 def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
     """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
-    one, other = CASES["clearance"][0], CASES["everything"][0]
+    one, whole = CASES["clearance"][0], CASES["everything"][0]
+    other = replace(whole, load_kinks=False)
     mine, theirs = digests(one, SCHEME), digests(replace(other, joint_frictions=()), SCHEME)
     assert [name for name in mine if mine[name] == theirs[name]] == ["advance"]
     # they end where joints with friction have kinks, whatever the law
     rubbing = digests(replace(one, joint_frictions=("modified-coulomb",)), SCHEME)
     assert rubbing["advance"] == digests(other, SCHEME)["advance"] != mine["advance"]
+    # and where loads have some
+    braked = digests(replace(one, joint_frictions=("modified-coulomb",), load_kinks=True), SCHEME)
+    assert braked["advance"] == digests(whole, SCHEME)["advance"] != rubbing["advance"]
     radau = digests(one, Scheme("radau"))
     assert [name for name in mine if mine[name] != radau[name]] == ["advance"]
     assert digests(CASES["ideal"][0], SCHEME)["advance"] != mine["advance"]  # it has no contacts to watch

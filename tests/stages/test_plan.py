@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.optimize import brentq
 
 import flexclear as fc
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.influence import Influence
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import uncoupled
@@ -18,11 +22,13 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.dynamics.linear.play import RANK, Bounds, bounds, lever_of
-from flexclear.pipeline.dynamics.linear.response import Response, response, vibration
+from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
+from flexclear.pipeline.dynamics.plan.tolerance import no_dearer
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 from flexclear.stages import plan, run, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
@@ -81,6 +87,31 @@ def test_the_response_of_a_rod_under_a_sudden_load_is_twice_that_of_a_bar(tmp_pa
     assert found.influence["platform.position"] == pytest.approx(2.0 * expected, rel=5e-3)
     # the part of the platform's weight that swings, and a twentieth of it more for the mass of the rod
     assert found.influence["ball.force"] == pytest.approx(PLATFORM * GRAVITY, rel=0.05)
+
+
+def test_the_vibration_that_is_told_is_one_that_the_loads_excite(tmp_path: Path):
+    """Loads along an upright leg leave its bending at rounding, which the sudden weight was told to magnify 12 times.
+
+    The bar with a mass at its end has b tan b = (its mass)/(that mass), b = 2 pi f L sqrt(rho/E).
+    """
+    found = _response(_standing_leg(tmp_path), [])
+    beta = brentq(lambda b: b * np.tan(b) - DENSITY * np.pi * RADIUS**2 * LENGTH / PLATFORM, 0.1, 1.0)
+    # the static modes have the end's compliance, and the rod's mass is a fifteenth
+    assert found.excited == pytest.approx(beta * np.sqrt(MODULUS / DENSITY) / (2.0 * np.pi * LENGTH), rel=5e-3)
+    assert found.first < 0.2 * found.excited  # bending
+    # a sudden load doubles what it does at rest, to rounding
+    assert found.amplification == pytest.approx(2.0, rel=1e-9)
+
+
+def test_what_rounding_leaves_excites_nothing():
+    """The first of two shapes is at right angles to all loads, but for the last digits."""
+    turn = np.linalg.qr(np.random.default_rng(3).normal(size=(9, 9)))[0]
+    loads = np.outer(np.linspace(1.0, 4.0, 20), turn[:, 5] + 1e-3 * turn[:, 6])
+    shapes = turn[:, [0, 6, 5]]
+    assert 0.0 < np.abs(loads @ shapes[:, 0]).max() < 1e-14
+    assert first_excited(loads, shapes) == 1
+    assert first_excited(loads, shapes[:, :1]) is None
+    assert first_excited(0.0 * loads, shapes) is None
 
 
 def test_vibrations_about_a_ramp_and_a_step_have_their_closed_form_amplitudes():
@@ -160,6 +191,54 @@ def test_where_joints_leave_a_freedom_there_is_no_bound(tmp_path: Path):
 def _tight(scene: Scene) -> Scene:
     """Without the clearance, which is another matter."""
     return variants.without(scene, [e for e in variants.effects(scene) if e.name.startswith("joint.")])
+
+
+class Priced:
+    """Pilots whose evaluations and errors are known: of dop853 1000 and 0, of the scene's own method as given."""
+
+    def __init__(self, evaluations: int, error: float, *, own: str = "radau") -> None:
+        solver = SimpleNamespace(integrator=own, rtol=1e-3, step=None)
+        self.scene = SimpleNamespace(solver=solver, by_need=lambda: False)
+        self.own, self.error = evaluations, error
+
+    def variant(self, gone: object) -> object:
+        return SimpleNamespace(contacts=dict, stop={})
+
+    def point(self, gone: object, *, integrator: str, evaluations: int = 10**9, **_: object) -> object:
+        taken = 1000 if integrator == "dop853" else self.own
+        return SimpleNamespace(refused="takes long" if taken > evaluations else "", evaluations=taken)
+
+    def between(self, a: object, b: object) -> dict[str, Influence]:
+        return {"bob.position": Influence(self.error)}
+
+
+@pytest.mark.parametrize(
+    "evaluations, error, integrator, told",
+    [
+        (400, 1e-4, "radau", ""),  # does as well in fewer
+        (400, 1.0, "dop853", "With the scene's own radau at 1e-03 the planned run would take 400 evaluations instead"),
+        (2000, 1e-4, "dop853", ""),
+    ],
+)
+def test_a_plan_is_no_dearer_than_with_the_scenes_own_integrator_or_says_so(
+    evaluations: int, error: float, integrator: str, told: str
+):
+    pilots: Any = Priced(evaluations, error)
+    known = Chosen("dop853", 1e-6, {"bob.position": 1e-5})
+    found = no_dearer(Search(pilots, {"bob.position": 1e-2}), known)
+    assert found.integrator == integrator
+    assert found.dearer.startswith(told)
+    assert bool(found.dearer) == bool(told)
+
+
+def test_where_nothing_is_known_of_methods_a_plan_keeps_that_of_the_scene():
+    unknown = Chosen("dop853", 1e-8, {"bob.position": np.nan})
+    for own, expected in (("radau", "radau"), ("dop853", "dop853")):
+        pilots: Any = Priced(400, 1.0, own=own)
+        assert no_dearer(Search(pilots, {"bob.position": 1e-2}), unknown).integrator == expected
+    left_open: Any = Priced(1, 0.0)
+    left_open.scene.by_need = lambda: True
+    assert no_dearer(Search(left_open, {"bob.position": 1e-2}), unknown) is unknown
 
 
 def test_a_plan_keeps_a_rod_that_bends_by_more_than_is_wanted_and_drops_one_that_does_not(tmp_path: Path):

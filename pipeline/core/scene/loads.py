@@ -129,6 +129,11 @@ class JointFriction(Part):
     viscous: Value = 0.0
     coulomb: Coulomb | None = None
 
+    @property
+    def bends(self) -> bool:
+        """Whether it has speeds at which its slope or curvature jumps."""
+        return self.coulomb is not None
+
 
 class Bushing(Part):
     """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second one.

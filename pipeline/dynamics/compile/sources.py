@@ -139,12 +139,14 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     imports: Imports = []
     given = {
-        "evaluate": "calls.evaluate" if integrators.INTEGRATORS[scheme.integrator].reads_all else "calls.rates",
+        "evaluate": "calls.rates",
         "project": _projection(imports, parts),
         "retract": "calls.retract",
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),
         "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
+    if integrators.INTEGRATORS[scheme.integrator].reads_all:
+        given["complete"] = "calls.evaluate"
     events = _events(imports, parts, scheme)
     if events:
         given["events"] = events
@@ -165,12 +167,14 @@ def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
         kinks.append(_import(imports, f"{INTEGRATORS}.friction_kinks", "CONTACT_KINKS"))
     if parts.joint_frictions and chosen:
         kinks.append(_import(imports, f"{INTEGRATORS}.joint_friction_kinks", "BEARING_KINKS"))
+    if parts.load_kinks and chosen:
+        kinks.append(_import(imports, f"{INTEGRATORS}.load_kinks", "LOAD_FRICTION_KINKS"))
     if touching:
         located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
         regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
         return f"{located}({', '.join([regimes, *kinks])})"
     if kinks:
-        return f"{_import(imports, f'{INTEGRATORS}.joint_friction_kinks', 'kinks_alone')}({kinks[0]})"
+        return f"{_import(imports, f'{INTEGRATORS}.friction_kinks', 'kinks_alone')}({', '.join(kinks)})"
     return ""
 
 

@@ -4,7 +4,8 @@ A step over such a kink has less derivatives than its method and its error estim
 chance: at single tolerances ten times and more off the trend. Where an accepted step has passed a kink, it is made
 again with its end there, as near as the tolerance asks; both sides are smooth. Nothing begins afresh.
 
-Here is what all kinks share, and those of contacts; `joint_friction_kinks` has those of ideal joints.
+Here is what all kinks share, and those of contacts; `joint_friction_kinks` has those of ideal joints, `load_kinks`
+those of friction along joint coordinates.
 
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6
 (discontinuous equations).
@@ -14,13 +15,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.stepper import watch_nothing
-from flexclear.pipeline.dynamics.integrate.within_step import make_locate_level
+from flexclear.pipeline.dynamics.integrate.stepper import none_closed, watch_nothing
+from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_locate_level, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: how near to a kink a step ends, as a share of what it is measured by over the root of the tolerance: what a step errs
@@ -61,6 +62,12 @@ def nearness(h, w, size):
 def passes(first, second, near):
     """Whether distances from a level at the ends of a step say that it is passed, while neither end lies on it."""
     return first * second < 0.0 and min(abs(first), abs(second)) > near
+
+
+@kernel
+def sooner(one, other):
+    """Which of two kinks a step passes first."""
+    return one if one[0] <= other[0] else other
 
 
 @kernel
@@ -106,8 +113,7 @@ def _beside(one: Kinks, other: Kinks) -> Kinks:
 
     @kernel
     def first(h, f, w, n):
-        a, b = first_one(h, f, w, n), first_other(h, f, w, n)
-        return a if a[0] <= b[0] else b
+        return sooner(first_one(h, f, w, n), first_other(h, f, w, n))
 
     return Kinks(start, end, accept, first)
 
@@ -180,3 +186,31 @@ def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, 
         return length
 
     return end_on_kink
+
+
+def kinks_alone(*families: Kinks) -> tuple[Callable, Callable, Callable]:
+    """`events` of scenes with kinks and without contacts, as `contact_events.located` gives them."""
+    kinks = reduce(_beside, families)
+    start, end, accept = kinks.start, kinks.end, kinks.accept
+
+    def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
+        evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
+        end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
+
+        @kernel
+        def resolve_events(h, f, w, n, step, t_new, rows, events):
+            end(h, w)
+            length = end_on_kink(h, f, w, n, step, 1.0, False)
+            if length < 0.0:
+                n[m.STATUS] = m.LOST_CLOSURE
+                return -1, False, t_new, step
+            if length == 0.0:
+                accept(h, w)
+                return 0, False, t_new, step
+            end(h, w)
+            accept(h, w)
+            return 0, False, w[h[m.CONTROL] + m.TIME] + length, length
+
+        return resolve_events
+
+    return start, make, none_closed

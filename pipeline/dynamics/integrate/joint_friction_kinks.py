@@ -11,9 +11,6 @@ sliding speeds at both ends are the same. So they are looked for on the straight
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
@@ -21,12 +18,10 @@ from flexclear.pipeline.dynamics.integrate.friction_kinks import (
     NONE,
     SPEEDS,
     Kinks,
-    make_end_on_kink,
     nearness,
     passes,
+    sooner,
 )
-from flexclear.pipeline.dynamics.integrate.stepper import none_closed
-from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: a vector reverses that passes zero within this share of its way: where a mechanism moves in a plane that is rounding
@@ -128,12 +123,6 @@ def reversal(h, w, e, field, size, near):
 
 
 @kernel
-def sooner(one, other):
-    """Which of two kinks a step passes first."""
-    return one if one[0] <= other[0] else other
-
-
-@kernel
 def first_of_bearings(h, f, w, n):
     """The kink that a bearing passes first (`Kinks.first`)."""
     found = NONE
@@ -154,30 +143,3 @@ def first_of_bearings(h, f, w, n):
 
 
 BEARING_KINKS = Kinks(watch_start, watch_end, end_becomes_start, first_of_bearings)
-
-
-def kinks_alone(kinks: Kinks) -> tuple[Callable, Callable, Callable]:
-    """`events` of scenes with kinks and without contacts, as `contact_events.located` gives them."""
-    start, end, accept = kinks.start, kinks.end, kinks.accept
-
-    def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-        evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
-        end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
-
-        @kernel
-        def resolve_events(h, f, w, n, step, t_new, rows, events):
-            end(h, w)
-            length = end_on_kink(h, f, w, n, step, 1.0, False)
-            if length < 0.0:
-                n[m.STATUS] = m.LOST_CLOSURE
-                return -1, False, t_new, step
-            if length == 0.0:
-                accept(h, w)
-                return 0, False, t_new, step
-            end(h, w)
-            accept(h, w)
-            return 0, False, w[h[m.CONTROL] + m.TIME] + length, length
-
-        return resolve_events
-
-    return start, make, none_closed

@@ -41,17 +41,22 @@ PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_veloc
 TURNS = ("orientation", "angular_velocity")
 #: singular values below this share of the largest are none; squared frequencies below this share are of free motions
 FOLLOWED, LIMP = 1e-9, 1e-12
+#: share of the largest force that loads of their size could have on a vibration, from which on they excite it; of loads
+#: along a rod 2e-14 are left across it
+FELT = 1e-10
 
 
 @dataclass(frozen=True)
 class Response:
     """Of all flexible bodies together. first: lowest frequency of the assembled mechanism [Hz].
 
-    amplification: largest share of its quasi-static value that a vibration's coordinate reaches.
+    excited: lowest frequency of a vibration that the motion's loads excite [Hz], nan where they excite none.
+    amplification: largest share of its quasi-static value that the coordinate of this vibration reaches.
     influence: of each quantity, at most [SI]; infinite where it is not known.
     """
 
     first: float
+    excited: float
     amplification: float
     influence: Mapping[str, float]
 
@@ -67,7 +72,7 @@ def response(
     """
     model, time = run.model, run.trajectory.time
     motions = Motions(model, run.observed)
-    unknown = Response(np.nan, np.nan, {q.name: np.inf for q in chosen})
+    unknown = Response(np.nan, np.nan, np.nan, {q.name: np.inf for q in chosen})
     if not bundles or not play.is_whole(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both its sides
@@ -85,7 +90,9 @@ def response(
             return unknown
         found.append(_at(assembled, forces, time, chosen))
     worst = {q.name: max(r.influence[q.name] for r in found) for q in chosen}
-    return Response(min(r.first for r in found), max(r.amplification for r in found), worst)
+    felt = [r for r in found if np.isfinite(r.excited)]
+    excited = min((r.excited for r in felt), default=np.nan)
+    return Response(min(r.first for r in found), excited, max((r.amplification for r in felt), default=np.nan), worst)
 
 
 @dataclass(frozen=True)
@@ -209,10 +216,26 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
             influence[q.name] = float((amplitude @ (size * omega**2)).max())
         else:
             influence[q.name] = np.inf
-    largest = np.abs(still).max(axis=0)
-    felt = largest > 0.0
-    reached = (np.abs(still) + amplitude).max(axis=0)[felt] / largest[felt]
-    return Response(float(omega[0] / (2.0 * np.pi)), float(reached[0] if len(reached) else 1.0), influence)
+    found = first_excited(forces, assembled.modes[-forces.shape[1] :])
+    if found is None:
+        return Response(float(omega[0] / (2.0 * np.pi)), np.nan, np.nan, influence)
+    reached = (np.abs(still) + amplitude)[:, found].max() / np.abs(still[:, found]).max()
+    first, excited = (float(omega[k] / (2.0 * np.pi)) for k in (0, found))
+    return Response(first, excited, float(reached), influence)
+
+
+def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
+    """Number of the first vibration that forces on elastic coordinates excite; None where they excite none.
+
+    forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products; of one at right angles to
+    all forces, as bending across the plane of a planar mechanism is, their rounding is left, and that of the loads: no
+    share of it tells anything.  By Schwarz' inequality the sum is at most the product of both lengths, so that what is
+    below `FELT` of that, over all rows, is nothing.
+    """
+    size = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
+    most = np.abs(forces @ shapes).max(axis=0, initial=0.0)
+    felt = np.flatnonzero(most > FELT * size * np.linalg.norm(shapes, axis=0))
+    return int(felt[0]) if len(felt) else None
 
 
 def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import JointFriction as Declared
 from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -20,7 +21,7 @@ from flexclear.pipeline.dynamics.vectors import scale
 def apply(h, f, w, k):
     """Apply load k."""
     value, rate, moment, force = measure(h, w, k)
-    speed = abs(rate)
+    w[m.LOAD_SPEEDS.row(h, k) + m.LOAD_SPEEDS.now], speed = rate, abs(rate)
     p = (number(h, f, k, 1), number(h, f, k, 2), number(h, f, k, 3), number(h, f, k, 4))
     dry = coefficient(speed, p)
     size = -number(h, f, k, 0) * rate - (dry if rate >= 0.0 else -dry)
@@ -38,11 +39,12 @@ class JointFriction:
         viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
         if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
             raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
-        dry = (0.0, 0.0, 1.0, 2.0)
+        dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
         if load.coulomb is not None:
             speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
             forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
-            dry = (*forces, quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
+            kinks = (quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
+            dry = (*forces, *kinks)
             if not 0.0 <= dry[1] <= dry[0]:
                 raise ValueError(
                     "coulomb: dynamic must not be negative, nor exceed static; "
@@ -53,4 +55,4 @@ class JointFriction:
                     "coulomb: v_static must be positive and below v_dynamic; "
                     f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
                 )
-        return Row(joint=load.joint, numbers=(viscous, *dry))
+        return Row(joint=load.joint, numbers=(viscous, *dry), kinks=kinks)

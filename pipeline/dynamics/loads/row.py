@@ -12,6 +12,8 @@ class Row:
 
     laws: law, dimension and place of each.  numbers: as many as it needs.  follows: whether it turns with
     its frame.  counts_turns: whether it needs its angle beyond half a turn.  states: number of internal states.
+    kinks: speeds along its joint coordinate at which its slope or curvature jumps, or 0; its kernel keeps the speed in
+    LOAD_SPEEDS, and its parameters say by `bends` that steps end there.
     """
 
     frames: tuple[str, ...] = ()
@@ -21,3 +23,4 @@ class Row:
     follows: bool = False
     counts_turns: bool = False
     states: int = 0
+    kinks: tuple[float, float] = (0.0, 0.0)

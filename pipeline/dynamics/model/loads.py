@@ -62,6 +62,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     kinds = tuple(sorted({load.type for load in forces.values()}))
     loads: list[Load] = []
     rows: list[tuple[int, ...]] = []
+    kinks = list[tuple[float, ...]]()
     numbers, laws = list[float](), list[Pieces]()
     for name in names:
         row, coordinate, measured = _describe(scene, name)
@@ -83,12 +84,14 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
             laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
         rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows)))
         numbers += row.numbers
+        kinks.append(row.kinks)
     counts = [sum(forces[n].type == kind for n in names) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     tables = {
         m.LOADS: rows,
         m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
         m.LOAD_NUMBERS: numbers,
+        m.LOAD_KINKS: kinks,
     }
     return Loaded(kinds, tuple(loads), tables, laws)
 

@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import Parts, joint_frictions
+from flexclear.pipeline.dynamics.effects import Parts, joint_frictions, load_kinks
 from flexclear.pipeline.dynamics.model import contacts as contacting
 from flexclear.pipeline.dynamics.model import flexible_bodies, laws, wiring
 from flexclear.pipeline.dynamics.model import loads as loading
@@ -202,6 +202,7 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         harmonics=harmonics,
         joint_frictions=joint_frictions(mechanism.scene),
         wear=bool(mechanism.scene.worn()),
+        load_kinks=load_kinks(mechanism.scene),
     )
 
 

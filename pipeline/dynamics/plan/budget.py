@@ -28,6 +28,7 @@ class Chosen:
     """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
 
     ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
+    dearer: in words, why that takes more evaluations than the scene's own integrator.
     """
 
     integrator: str
@@ -35,6 +36,7 @@ class Chosen:
     error: Mapping[str, float]
     level: int | None = None
     ledger_tolerance: float | None = None
+    dearer: str = ""
 
 
 @dataclass

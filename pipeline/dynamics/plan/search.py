@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Searc
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
 from flexclear.pipeline.dynamics.plan.pilots import BEGINNING, MEMBERS, RTOL, Pilots
-from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, smooth
+from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, no_dearer, smooth
 from flexclear.pipeline.dynamics.plan.wanted import wanted_in
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 
@@ -214,11 +214,13 @@ def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
 
 
 def _vibrating(found: Response) -> str:
-    """The first vibration of the assembled mechanism, and how the loads of the motion excite it."""
-    return (
-        f"the mechanism's first frequency is {found.first:.3g} Hz, and the loads of the ideal motion take that "
-        f"vibration to {found.amplification:.2g} times its quasi-static value"
-    )
+    """The first vibration of the assembled mechanism, and how large loads of the motion make the first they excite."""
+    first = f"the mechanism's first frequency is {found.first:.3g} Hz"
+    if np.isnan(found.excited):
+        return f"{first}, and the loads of the ideal motion excite no vibration"
+    which = "that vibration" if found.excited == found.first else f"the first they excite, of {found.excited:.3g} Hz,"
+    size = f"{found.amplification:.2g} times its quasi-static value"
+    return f"{first}, and the loads of the ideal motion take {which} to {size}"
 
 
 def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
@@ -309,7 +311,7 @@ def _finished(
     meshes: Mapping[str, tuple[int, xr.Dataset]],
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
-    chosen = _chosen(search)
+    chosen = no_dearer(search, _chosen(search))
     left = search.pilots.variant(search.gone).flexible()
     modes = {} if chosen.level is None else search.pilots.modes(chosen.level, left)
     for effect in every:
@@ -329,4 +331,5 @@ def _finished(
         apart,
         _meshes(search, meshes),
         chosen.ledger_tolerance,
+        chosen.dearer,
     )

@@ -1,14 +1,17 @@
-"""The integrator and the tolerance of a planned run: the loosest whose error is a small share of what is wanted."""
+"""The integrator and the tolerance of a planned run: the loosest whose error is a small share of what is wanted, and no
+dearer ones than the scene names itself."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.dynamics.plan.budget import Chosen
-from flexclear.pipeline.dynamics.plan.pilots import RTOL, SMOOTH, SMOOTH_RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
+from flexclear.pipeline.dynamics.plan.pilots import MEMBERS, RTOL, SMOOTH, SMOOTH_RTOL, Pilots
 
 #: share of what is wanted that the integration may err by
 SHARE = 0.15
@@ -28,7 +31,48 @@ def smooth(pilots: Pilots, gone: Sequence[Effect], wanted: Mapping[str, float], 
     found = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
     if found.rtol > SMOOTH_RTOL or _within(found.error, wanted):
         return found
-    return Chosen(DEFAULT, TIGHT, {name: np.nan for name in wanted}, level)
+    unknown, own = dict.fromkeys(wanted, np.nan), own_method(pilots.scene)
+    if own is None:
+        return Chosen(DEFAULT, TIGHT, unknown, level)
+    # nothing was shown to do, and what the full scene itself is run with does for it
+    integrator, rtol = own
+    return Chosen(integrator, max(rtol, TIGHT) if integrator == DEFAULT else rtol, unknown, level)
+
+
+def own_method(scene: Scene) -> tuple[str, float] | None:
+    """The integrator and the tolerance that a scene names itself; None where it leaves them open or steps are fixed."""
+    if scene.by_need() or scene.solver.step is not None:
+        return None
+    return scene.solver.integrator, scene.solver.rtol
+
+
+def no_dearer(search: Search, chosen: Chosen) -> Chosen:
+    """What was chosen; instead the scene's own method, where that takes fewer evaluations and does as well.
+
+    Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.  Where
+    the cheaper one errs by too much, what was chosen says that it is dearer.
+    """
+    pilots, gone, own = search.pilots, search.gone, own_method(search.pilots.scene)
+    if own is None or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
+        return chosen
+    bare = pilots.variant(gone)
+    loose = bool(bare.contacts() or bare.stop)
+    share = pilots.part(gone) if loose else 1.0
+    there = pilots.point(gone, level=chosen.level, share=share, integrator=chosen.integrator, rtol=chosen.rtol)
+    # no more of each member than the other one took
+    most = {} if there.refused else {"evaluations": there.evaluations // (MEMBERS if loose else 1) + 1}
+    mine = pilots.point(gone, level=chosen.level, share=share, integrator=own[0], rtol=own[1], **most)
+    if mine.refused or (not there.refused and mine.evaluations >= there.evaluations):
+        return chosen
+    apart = {name: i.difference for name, i in pilots.between(mine, there).items()}
+    known = all(np.isfinite(error) for error in chosen.error.values())
+    if known and not there.refused and not (search.fits(apart) if loose else _within(apart, search.wanted)):
+        return replace(
+            chosen,
+            dearer=f"With the scene's own {own[0]} at {own[1]:.0e} the planned run would take {mine.evaluations:,} "
+            f"evaluations instead of {there.evaluations:,}, and err by more than the plan allows",
+        )
+    return Chosen(*own, apart if known else chosen.error, chosen.level)
 
 
 def _within(error: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
