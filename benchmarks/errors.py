@@ -68,7 +68,7 @@ class Rung:
     bare: how to time its integration alone [s], whose samples are states.  alike: how to time its integration with the
     body's position and velocity in the samples, as two sensors of another code have them [s]; alike_error: how wrong
     these are.  straight: how to time the whole run by the code for its wiring alone, with which sweeps and ensembles
-    step [s]; None for methods that do not use it.
+    step [s]; None where there is none.
     """
 
     integrator: str
@@ -181,7 +181,7 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
         lambda: once(lambda: integrate(engine, start, silent)),
         lambda: once(alike),
         reference.error(alike()),
-        None if engine.method.traits.reads_all else lambda: whole(straight()),
+        lambda: whole(straight()),
     )
 
 

@@ -62,10 +62,9 @@ def _bring(place: Workplace, now: dict[str, str]) -> Outcome:
     """Whatever there is to be done; remembered when nothing is left, and all of it was of one state."""
     from flexclear.stages import paper_report
 
-    seen = [now]
-    tasks, outcome = paper_report.bring(place, lambda: seen.append(state(place)))
-    if not outcome.failures and all(then == now for then in (*seen, state(place))):
-        settled.keep(memo(place), now, tasks, outcome.records, place.store)
+    tasks, outcome, read = paper_report.bring(place)
+    if not outcome.failures and state(place) == now:
+        settled.keep(memo(place), now, read, tasks, outcome.records, place.store)
     return outcome
 
 

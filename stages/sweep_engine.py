@@ -8,6 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ SHARE, MOST, QUEUED = 0.5, 1000, 2
 LEAST = 0.02
 #: evaluations of a point from which on it is run beside others, and of all that wait, for which code is made
 WORTH, WORTH_CODE = 5_000, 5_000_000
-#: so many at least, and seconds of their work: the more, the less is waited for the last ones
+#: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
 ABREAST, SHARE_ABREAST = 8, 5.0
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
@@ -79,7 +80,8 @@ class Engine:
             width = self.width()
             while waiting and len(running) < (QUEUED * width if pace else 1):
                 left = sum(map(len, waiting))
-                abreast = evaluations >= WORTH and (abreast or left * evaluations >= WORTH_CODE)
+                enough = abreast or (left >= ABREAST * width and left * evaluations >= WORTH_CODE)
+                abreast = evaluations >= WORTH and enough
                 mine = _take(waiting, _portion(left, pace, width, abreast) if pace else 1)
                 keep = self.here and not 0.0 < pace < LONG
                 running[self._given(mine, families, alone=not pace, keep=keep, abreast=abreast)] = mine
@@ -133,6 +135,8 @@ def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
     asking = PER_WORKER * width
     share = SHARE_ABREAST if abreast else SHARE
     seconds = min(max(share, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    if abreast and left < ABREAST * width:  # the last ones
+        return max(ABREAST // 2, ceil(left / width))
     if abreast:
         return ABREAST * min(MOST // ABREAST, max(1, round(seconds / pace / ABREAST)))
     return min(MOST, max(1, int(seconds / pace)))

@@ -38,7 +38,7 @@ class Traits:
     dissipative: it damps by its order, so that energy is lost long before a run is wrong.
     long_steps: they hold many vibrations, whose work on the drives is known less exactly than the motion.
     retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
-    reads_all: it reads more of an evaluation than the rates, so that straight code does not serve it.
+    reads_all: it reads more of some evaluations than the rates, and is given a second way to make these.
     hands_over_to: implicit method that goes on where stability limits the steps that it chooses, and that is named as
         the remedy where steps are given; empty for methods that are stable themselves.
     tolerances, steps: at which `flexclear cost` runs it; steps in s.

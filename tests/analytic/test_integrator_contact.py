@@ -23,6 +23,8 @@ BOUNCES = {
     "dopri5": (solver(integrator="dopri5", rtol=1e-10), 5e-8, 5e-8),
     # third-order dense output is not used where a step is repeated to end on the event
     "radau": (solver(integrator="radau", rtol=1e-10), 1e-7, 1e-7),
+    # the contact's stiffness is followed exactly, its change with the depth by a cubic
+    "exponential": (solver(integrator="exponential", rtol=1e-10), 1e-7, 1e-7),
     # second order: the error per step is rtol, the number of steps goes with its cube root
     "generalized-alpha": (solver(integrator="generalized-alpha", rtol=1e-9), 1e-5, 1e-5),
     # 200 steps a contact of 2 ms, each begun anew: (step / contact time)^4 of a second's flight
@@ -32,7 +34,7 @@ BOUNCES = {
     "radau fixed": (solver(integrator="radau", step=STEP), 1e-7, 1e-7),
     "generalized-alpha fixed": (solver(integrator="generalized-alpha", step=STEP), 1e-4, 1e-4),
 }
-QUICK = ("dopri5", "radau")
+QUICK = ("dopri5", "radau", "exponential")
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BOUNCES])

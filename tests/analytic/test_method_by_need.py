@@ -86,6 +86,16 @@ def test_what_a_run_took_decides_about_the_next() -> None:
     assert known(exponential=(1e-4, 3e4)).best(1e-4) == "dop853"
 
 
+def test_two_runs_tell_how_evaluations_grow_with_the_tolerance() -> None:
+    """Those of contacts hardly do: where they are most of them, the estimate's order says little."""
+    suit = Suit(Rates(6e4, 20.0), 0.18, ("dop853", "exponential", "radau"), touching=True)
+    suit.learn(1e-3, "exponential", xr.Dataset(attrs={"method": "exponential", "evaluations": 20_000}))
+    assert suit.best(1e-6) == "dop853"
+    suit.learn(1e-5, "exponential", xr.Dataset(attrs={"method": "exponential", "evaluations": 21_000}))
+    assert suit.best(1e-6) == "exponential"
+    assert suit.best(1e-14) == "dop853"
+
+
 def test_a_guess_that_runs_correct_is_not_repeated() -> None:
     suit = known()
     suit.learn(1e-4, "exponential", xr.Dataset(attrs={"method": "dop853", "evaluations": 1}))

@@ -101,13 +101,14 @@ def test_every_scene_is_evaluated_alike(path: Path) -> None:
 
 
 @cache
-def engine() -> Engine:
-    return engine_of(load_scene(TREE / "scenes/sps4/csj.toml"), {}, silent)
+def engine(integrator: str = "dop853") -> Engine:
+    return engine_of(load_scene(TREE / "scenes/sps4/csj.toml", {"solver.integrator": integrator}), {}, silent)
 
 
-def test_compiled_code_runs_as_the_kernels_do() -> None:
+@pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
+def test_compiled_code_runs_as_the_kernels_do(integrator: str) -> None:
     """A stroke with impacts, as exactly as its own tolerance tells, with equal events."""
-    one = engine()
+    one = engine(integrator)
     kernels = integrate(one, consistent_start(one), silent)
     specialise(one)
     assert one.h[m.RATES] != one.h[m.EVALUATE]

@@ -68,7 +68,8 @@ def kept(tree: Path, store: Store) -> Path:
     }
     memo = tree / "results" / "cache" / "report.json"
     object.__setattr__(one, "context", {"folder": str(tree / "meshes")})
-    settled.keep(memo, settled.state({}), [other], records, store)
+    read = {"scenes/sps4/csj.toml": opened.digest(str(tree / "scenes" / "sps4" / "csj.toml"))}
+    settled.keep(memo, settled.state({}), read, [other], records, store)
     assert memo.is_file()
     return memo
 
@@ -166,7 +167,16 @@ def test_what_was_edited_while_keys_were_made_is_not_kept(tree: Path, store: Sto
     """A module's digest in the key is another one than before and after."""
     made, memo = task("mesh"), tree / "results" / "cache" / "report.json"
     record = store.put("mesh", "a" * 32, {"nc": b"mesh"}, {"module flexclear.pipeline.part": "1" * 64})
-    settled.keep(memo, settled.state({}), [made], {id(made): record}, store)
+    settled.keep(memo, settled.state({}), {}, [made], {id(made): record}, store)
+    assert not memo.exists()
+
+
+@pytest.mark.parametrize("name, then", [("scenes/sps4/csj.toml", "another"), ("table.csv", "")])
+def test_tasks_built_of_other_files_are_not_kept(tree: Path, store: Store, name: str, then: str):
+    """Of one that was read with another content, and of one that is not in the state, though it has not changed."""
+    made, memo = task("mesh"), tree / "results" / "cache" / "report.json"
+    read = {name: then or opened.digest(str(tree / name))}
+    settled.keep(memo, settled.state({}), read, [made], {id(made): store.put("mesh", "a" * 32, {"nc": b""}, {})}, store)
     assert not memo.exists()
 
 

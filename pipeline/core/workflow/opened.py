@@ -102,6 +102,13 @@ def ordinary_only() -> Iterator[None]:
 
 @contextmanager
 def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]]:
+    """What `noticed` gives of work that may load compiled kernels, which count by their sources."""
+    with noticed(base, (kernel_root(), *outside)) as found:
+        yield found
+
+
+@contextmanager
+def noticed(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]]:
     """Filled at the end: place relative to `base` -> digest, of every file that was opened to be read meanwhile.
 
     outside: folders whose files do not count, beside those of the system, of libraries and of programs' own state.
@@ -109,7 +116,7 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
     """
     global _current
     _listen()
-    places = (*_system(), str(kernel_root()), *(str(folder) for folder in outside))
+    places = (*_system(), *(str(folder) for folder in outside))
     found: dict[str, str] = {}
     before, _current = _current, Opened(tuple(f"{place.rstrip(os.sep)}{os.sep}" for place in places))
     seen = _current

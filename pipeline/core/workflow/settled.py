@@ -65,13 +65,29 @@ def _installed() -> list[str]:
     return found
 
 
-def keep(memo: Path, before: Mapping[str, str], tasks: list[Task], records: Mapping[int, Record], store: Store) -> None:
-    """Remember that these tasks, built in a state, have these artifacts; nothing where that cannot be sure."""
+def keep(
+    memo: Path,
+    before: Mapping[str, str],
+    read: Mapping[str, str],
+    tasks: list[Task],
+    records: Mapping[int, Record],
+    store: Store,
+) -> None:
+    """Remember that these tasks, built in a state, have these artifacts; nothing where that cannot be sure.
+
+    read: digests of the files that were opened to build the tasks, by place relative to the sources.
+    """
     whole = in_order(tasks)
-    if any(_edited(records[id(task)], before) for task in whole):
+    if not _covers(before, read) or any(_edited(records[id(task)], before) for task in whole):
         return
     with contextlib.suppress(OSError):  # it is not there any more, or nothing can be written
         publish(memo, checked(_table(before, whole, records, store)))
+
+
+def _covers(before: Mapping[str, str], read: Mapping[str, str]) -> bool:
+    """Whether files are in a state, as they were read: a scene may be edited to extend one that lies elsewhere."""
+    files = {os.path.realpath(name[5:]): then for name, then in before.items() if name.startswith("file ")}
+    return all(files.get(os.path.realpath(TREE / name)) == then for name, then in read.items())
 
 
 def _edited(record: Record, before: Mapping[str, str]) -> bool:

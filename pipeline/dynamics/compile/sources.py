@@ -139,12 +139,14 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
     imports: Imports = []
     given = {
-        "evaluate": "calls.evaluate" if integrators.INTEGRATORS[scheme.integrator].reads_all else "calls.rates",
+        "evaluate": "calls.rates",
         "project": _projection(imports, parts),
         "retract": "calls.retract",
         "method": _import(imports, f"{INTEGRATORS}.{module}", method),
         "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
+    if integrators.INTEGRATORS[scheme.integrator].reads_all:
+        given["complete"] = "calls.evaluate"
     events = _events(imports, parts, scheme)
     if events:
         given["events"] = events

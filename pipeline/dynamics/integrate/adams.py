@@ -12,6 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import numpy as np
+
 from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite, rk4
@@ -27,9 +29,9 @@ MOST = 3
 ALIKE = 1e-8
 
 
-def memory(nq: int, nv: int, ny: int) -> int:
+def memory(h: np.ndarray) -> int:
     """Floats kept between steps."""
-    return KEPT + MOST * ny
+    return KEPT + MOST * int(h[m.NY])
 
 
 @kernel

@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_con
 from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end_on_kink, together
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event
-from flexclear.pipeline.dynamics.integrate.stepper import RESTART, watch_nothing
+from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, RESTART, watch_nothing
 from flexclear.pipeline.dynamics.integrate.within_step import NEAR, make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import at, dot, sub
@@ -300,6 +300,13 @@ def give_up(n, status, c):
 
 
 @kernel
+def try_again(n, c):
+    """What it returns when the step cannot be made with its end on an event of contact c."""
+    give_up(n, m.LOST_CLOSURE, c)
+    return AGAIN
+
+
+@kernel
 def stepped_over(h, f, w, n, c):
     """Whether contact c, about to change its mode where a step starts, has begun long before."""
     o, gap = h[m.CONTROL], w[m.TOUCH.row(h, c) + m.TOUCH.gap]
@@ -378,7 +385,7 @@ def make_resolve_events(
             which, first, ready = first_change(h, f, w, n, step)
             length = end_on_kink(h, f, w, n, step, first if which >= 0 else 1.0, ready)
             if length < 0.0:
-                return give_up(n, m.LOST_CLOSURE, max(which, 0)), ready, t_new, step
+                return try_again(n, max(which, 0)), ready, t_new, step
             if length > 0.0:
                 n[m.IMMEDIATE] = 0
                 watch_end(h, w)
@@ -394,13 +401,13 @@ def make_resolve_events(
                 return change_at_start(h, f, w, n, which, events), True, t, step
             length, there = end_on_event(h, f, w, n, first * step, which)
             if length < 0.0:
-                return give_up(n, m.LOST_CLOSURE, which), ready, t_new, step
+                return try_again(n, which), ready, t_new, step
             if there or shortened == MOST_SHORTENED:
                 break
             step *= min(0.5, max(SHORTER, 2.0 * first))
             t_new = t + step
             if not repeat(h, f, w, n, step):
-                return give_up(n, m.LOST_CLOSURE, which), ready, t_new, step
+                return try_again(n, which), ready, t_new, step
         n[m.IMMEDIATE] = 0
         watch_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one

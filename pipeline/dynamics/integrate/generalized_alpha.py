@@ -55,8 +55,9 @@ OLD, NEW, RESCALED, DISPLACEMENT, RESIDUAL, CORRECTION, PIVOTS, N_VECTORS = rang
 BY_STATE, BY_POSITION, NEWTON = range(3)
 
 
-def memory(nq: int, nv: int, ny: int) -> int:
+def memory(h: np.ndarray) -> int:
     """Floats kept between steps."""
+    nq, ny = int(h[m.NQ]), int(h[m.NY])
     return VECTORS + N_VECTORS * (ny - nq) + nq + ny + 3 * (ny - nq) ** 2
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from flexclear.pipeline.core.integrators import Traits
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -27,7 +29,7 @@ def keep_nothing(h, f, w, n, step):
     """`keep` of a one-step method, which has nothing to remember."""
 
 
-def no_memory(nq: int, nv: int, ny: int) -> int:
+def no_memory(h: np.ndarray) -> int:
     """`memory` of a method that keeps nothing between steps."""
     return 0
 
@@ -44,7 +46,8 @@ class Method:
     traits: what is known of it elsewhere.
     slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the search for events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
-    make_kernels: (evaluate, retract) -> kernels that count their evaluations themselves:
+    make_kernels: (evaluate, retract) -> kernels, with a third argument of methods that read more than rates
+        (`Traits.reads_all`): an evaluation of which everything is left. They count their evaluations themselves:
         begin(h, f, w, n) after every restart, with the slope and the length of the first step known;
         attempt(h, f, w, n, step) fills Y_NEW, False when it could not;
         error(h, f, w, n, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
@@ -54,7 +57,7 @@ class Method:
     error_order: the error estimate falls with this power of the step plus one; 0 for methods without one.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
-    memory: floats kept between steps, from the numbers of positions, speeds and state variables.
+    memory: floats kept between steps, from the header with the mechanism's sizes.
     parameter: the method's number in the scene's solver table.
     stability: reach of the region of stability along the negative real axis, of an explicit method whose last
         stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
@@ -69,10 +72,10 @@ class Method:
     error_order: int = 0
     ends: bool = False
     steady: float = 1.0
-    memory: Callable[[int, int, int], int] = no_memory
+    memory: Callable[[np.ndarray], int] = no_memory
     parameter: Callable[[Any], float] = no_parameter
     stability: float | None = None
 
-    def room(self, nq: int, nv: int, ny: int) -> m.Room:
-        """What it needs of the work space, from the numbers of positions, speeds and state variables."""
-        return m.Room(self.slopes, self.dense, self.memory(nq, nv, ny))
+    def room(self, h: np.ndarray) -> m.Room:
+        """What it needs of the work space, from the header with the mechanism's sizes."""
+        return m.Room(self.slopes, self.dense, self.memory(h))

@@ -1,10 +1,12 @@
-r"""Vibrations that the modal stiffness alone gives the constrained mechanism, in the pose that has just been evaluated.
+r"""Vibrations that modal stiffness and closed contacts give the constrained mechanism, in the state just evaluated.
 
-With M the mass matrix, J the closures' Jacobian and K the modal stiffness, elastic forces accelerate the coordinates by
-:math:`-P K x`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
-:math:`K^{1/2} P K^{1/2} = Q \Omega^2 Q^T` parts them into oscillators :math:`z = Q^T K^{1/2} x`, each with a shape over
-all coordinates and a share of the modal damping; the positions' rates and the drives' work follow linearly. What this
-leaves out (other forces, coupling by damping, the change of pose) is not stiff.
+With M the mass matrix, J the closures' Jacobian and K the stiffness of springs, which are the modes and the closed
+contacts (`contact_springs`) and of which the rows W give the lengths, springs accelerate the coordinates by
+:math:`-P W^T K W x`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
+:math:`K^{1/2} W P W^T K^{1/2} = Q \Omega^2 Q^T` parts them into oscillators :math:`z = Q^T K^{1/2} W x`, each with a
+shape over all coordinates and a share of the springs' damping; the positions' rates and the drives' work follow
+linearly. What this leaves out (other forces, coupling by damping, the change of pose and depth) is not stiff, friction
+excepted.
 
 A is the matrix of all that: :math:`A y = B \Lambda C y`, where C reads (z, z') off a state, B lifts them to one and
 :math:`C B = 1`, so that functions of A are functions of 2 x 2 matrices.
@@ -22,6 +24,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
+from flexclear.pipeline.dynamics.integrate import contact_springs as springs
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot6
 
@@ -35,9 +38,18 @@ A_LITTLE = 1e-9
 MOST_DAMPING = 0.99
 
 
-def floats(nv: int, ny: int) -> int:
+def most(h):
+    """Room for oscillators: one for each speed and contact, as an array or a kernel asks."""
+    return h[m.NV] + h[m.N_SURFACES]
+
+
+room = kernel(most)
+
+
+def floats(h: np.ndarray) -> int:
     """Floats of the work space that a basis takes."""
-    return 3 * nv + 3 * nv * nv + 2 * nv * ny
+    size = int(most(h))
+    return 3 * size + 3 * size * size + 2 * size * int(h[m.NY]) + springs.floats(h)
 
 
 # Places; o is where the basis begins ----------------------------------------------------------------------------------
@@ -50,31 +62,31 @@ def square(h, o, i):
 @kernel
 def damping(h, o, i):
     """Where w holds the damping of oscillator i [1/s]."""
-    return o + h[m.NV] + i
+    return o + room(h) + i
 
 
 @kernel
 def root(h, o, j):
-    """Where w holds the root of the stiffness of mode j."""
-    return o + 2 * h[m.NV] + j
+    """Where w holds the root of the stiffness of spring j."""
+    return o + 2 * room(h) + j
 
 
 @kernel
 def axes(h, o, i):
     """Where w holds column i of Q."""
-    return o + h[m.NV] * (3 + i)
+    return o + room(h) * (3 + i)
 
 
 @kernel
 def matrix(h, o, i):
     """Where w holds row i of the symmetric matrix."""
-    return o + h[m.NV] * (3 + h[m.NV] + i)
+    return o + room(h) * (3 + room(h) + i)
 
 
 @kernel
 def reading(h, o, i):
-    """Where w holds row i of C: weights of the modes."""
-    return o + h[m.NV] * (3 + 2 * h[m.NV] + i)
+    """Where w holds row i of C: weights of the springs."""
+    return o + room(h) * (3 + 2 * room(h) + i)
 
 
 @kernel
@@ -83,29 +95,51 @@ def lifting(h, o, i):
 
     Oscillating forces do work on drives whose speed changes within a step: the work at the start's speed, and its rate.
     """
-    return o + h[m.NV] * (3 + 3 * h[m.NV]) + h[m.NY] * i
+    return o + room(h) * (3 + 3 * room(h)) + h[m.NY] * i
 
 
 @kernel
 def response(h, o, j):
-    """Where w holds what mode j's root of the stiffness accelerates, the drives' power then, and its rate."""
-    return lifting(h, o, h[m.NV] + j)
+    """Where w holds what the root of spring j's stiffness accelerates, the drives' power then, and its rate."""
+    return lifting(h, o, room(h) + j)
 
 
 @kernel
-def count(h):
-    """Number of modes, which is that of oscillators."""
+def contacts(h, o):
+    """Where w holds the contacts as springs."""
+    return lifting(h, o, 2 * room(h))
+
+
+@kernel
+def modes(h):
+    """Number of modes."""
     total = 0
     for k in range(h[m.N_FLEX]):
         total += m.FLEXES.n_modes(h, k)
     return total
 
 
+@kernel
+def count(h):
+    """Number of oscillators, which is that of springs: modes, then contacts."""
+    return modes(h) + h[m.N_SURFACES]
+
+
+@kernel
+def pressed(h, w, o):
+    """Whether some contact is a spring now."""
+    result = False
+    for c in range(h[m.N_SURFACES]):
+        result |= w[root(h, o, modes(h) + c)] > 0.0
+    return result
+
+
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
 def read(h, w, o, state, out):
-    """C: z, then z', of what w holds for each variable from place `state` on; NV apart."""
-    for i in range(count(h)):
+    """C: z, then z', of what w holds for each variable from place `state` on; `room` apart."""
+    size, first = count(h), modes(h)
+    for i in range(size):
         row, e, z, rate = reading(h, o, i), 0, 0.0, 0.0
         for k in range(h[m.N_FLEX]):
             q, c = state + m.FLEXES.q0(h, k), state + h[m.NQ] + m.FLEXES.c0(h, k)
@@ -113,18 +147,27 @@ def read(h, w, o, state, out):
                 z += w[row + e] * w[q + j]
                 rate += w[row + e] * w[c + j]
                 e += 1
-        w[out + i], w[out + h[m.NV] + i] = z, rate
+        w[out + i], w[out + room(h) + i] = z, rate
+    for c in range(h[m.N_SURFACES]):
+        if w[root(h, o, first + c)] > 0.0:
+            depth, rate = springs.change(h, w, contacts(h, o), c, state)
+            for i in range(size):
+                weight = w[reading(h, o, i) + first + c]
+                w[out + i] += weight * depth
+                w[out + room(h) + i] += weight * rate
 
 
 @kernel
 def lift(h, w, o, pair, t, out):
     """Add B, a time t after the pose, of (z, z') to what w holds for each variable from place `out` on.
 
-    z and z' stand NV apart from place `pair` on.
+    z and z' stand `room` apart from place `pair` on.
     """
     nq, nv = h[m.NQ], h[m.NV]
     for i in range(count(h)):
-        shape, z, rate = lifting(h, o, i), w[pair + i], w[pair + nv + i]
+        if w[square(h, o, i)] == 0.0:
+            continue
+        shape, z, rate = lifting(h, o, i), w[pair + i], w[pair + room(h) + i]
         for c in range(nq):
             w[out + c] += w[shape + c] * z
         for c in range(nq, nq + nv):
@@ -138,7 +181,7 @@ def work_rate(h, w, o, pair):
     """Rate at which the work that belongs to (z, z') changes because the drives' speeds do."""
     total, rates = 0.0, h[m.NQ] + h[m.NV] + 1
     for i in range(count(h)):
-        total += w[lifting(h, o, i) + rates] * (w[pair + h[m.NV] + i] + w[damping(h, o, i)] * w[pair + i])
+        total += w[lifting(h, o, i) + rates] * (w[pair + room(h) + i] + w[damping(h, o, i)] * w[pair + i])
     return total
 
 
@@ -146,9 +189,9 @@ def work_rate(h, w, o, pair):
 def turn(h, w, o, pair):
     """Lambda: (z, z') becomes (z', -omega^2 z - d z'), in place."""
     for i in range(count(h)):
-        z, rate = w[pair + i], w[pair + h[m.NV] + i]
+        z, rate = w[pair + i], w[pair + room(h) + i]
         w[pair + i] = rate
-        w[pair + h[m.NV] + i] = -w[square(h, o, i)] * z - w[damping(h, o, i)] * rate
+        w[pair + room(h) + i] = -w[square(h, o, i)] * z - w[damping(h, o, i)] * rate
 
 
 # Oscillators ----------------------------------------------------------------------------------------------------------
@@ -193,29 +236,64 @@ def drive_power(h, w, b, motion):
 
 
 @kernel
-def responses(h, f, w, o):
-    """What each mode's root of the stiffness does, and the symmetric matrix."""
+def respond(h, f, w, b):
+    """What the forces in w from place b do, in place; and the drives' power then, and its rate, added after it."""
+    nv = h[m.NV]
+    constrained(h, w, b)
+    w[b + nv] += drive_power(h, w, b, h[m.U])
+    w[b + nv + 1] += drive_power(h, w, b, h[m.DU])
+    to_modes(h, f, w, b)
+
+
+@kernel
+def responses(h, f, w, n, o):
+    """What the root of each spring's stiffness does, and the symmetric matrix; contacts with their row."""
     nq, nv, e = h[m.NQ], h[m.NV], 0
+    for i in range(count(h)):
+        for k in range(nq, nq + nv + 2):
+            w[response(h, o, i) + k] = 0.0
     for k in range(h[m.N_FLEX]):
-        n, c0 = m.FLEXES.n_modes(h, k), m.FLEXES.c0(h, k)
-        stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + 12 * n + n * n
-        for j in range(n):
+        size, c0 = m.FLEXES.n_modes(h, k), m.FLEXES.c0(h, k)
+        stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + 12 * size + size * size
+        for j in range(size):
             w[root(h, o, e)] = np.sqrt(max(f[stiffness + j], 0.0))
             b = response(h, o, e) + nq
-            for c in range(nv):
-                w[b + c] = 0.0
             w[b + c0 + j] = w[root(h, o, e)]
             to_interface(h, f, w, b)
-            constrained(h, w, b)
-            w[b + nv], w[b + nv + 1] = drive_power(h, w, b, h[m.U]), drive_power(h, w, b, h[m.DU])
-            to_modes(h, f, w, b)
+            respond(h, f, w, b)
             e += 1
+    for c in range(h[m.N_SURFACES]):
+        b, s = response(h, o, e) + nq, contacts(h, o)
+        stiffness, loss = springs.stiffen(h, f, w, n, s, c)
+        w[root(h, o, e)], w[damping(h, o, e)] = np.sqrt(stiffness), loss
+        if stiffness > 0.0:
+            springs.find_row(h, f, w, s, c)
+            for k in range(nv):
+                w[b + k] = w[root(h, o, e)] * w[springs.row(h, s, c) + k]
+            w[b + nv] = w[root(h, o, e)] * springs.direct_power(h, w, s, c, h[m.U])
+            w[b + nv + 1] = w[root(h, o, e)] * springs.direct_power(h, w, s, c, h[m.DU])
+            to_interface(h, f, w, b)
+            respond(h, f, w, b)
+        e += 1
     for i in range(e):
-        j, b = 0, response(h, o, i) + nq
-        for k in range(h[m.N_FLEX]):
-            for c in range(m.FLEXES.c0(h, k), m.FLEXES.c0(h, k) + m.FLEXES.n_modes(h, k)):
-                w[matrix(h, o, i) + j] = w[root(h, o, j)] * w[b + c]
-                j += 1
+        couple(h, w, o, i)
+
+
+@kernel
+def couple(h, w, o, i):
+    """Row i of the symmetric matrix: what the response of spring i does along all springs."""
+    nv, j, b = h[m.NV], 0, response(h, o, i) + h[m.NQ]
+    for k in range(h[m.N_FLEX]):
+        for c in range(m.FLEXES.c0(h, k), m.FLEXES.c0(h, k) + m.FLEXES.n_modes(h, k)):
+            w[matrix(h, o, i) + j] = w[root(h, o, j)] * w[b + c]
+            j += 1
+    for c in range(h[m.N_SURFACES]):
+        total, along = 0.0, springs.row(h, contacts(h, o), c)
+        if w[root(h, o, j)] > 0.0:
+            for k in range(nv):
+                total += w[along + k] * w[b + k]
+        w[matrix(h, o, i) + j] = w[root(h, o, j)] * total
+        j += 1
 
 
 @kernel
@@ -272,22 +350,30 @@ def diagonalise(h, w, o, n):
 
 
 @kernel
-def damp(h, f, w, o, i):
-    """Damping of oscillator i by the modal damping, the share that does not couple it to others."""
-    total, e = 0.0, 0
+def losses(h, f, w, o, out):
+    """Damping over stiffness [s] of each mode into w from place `out` on; 0 of modes without stiffness."""
+    e = 0
     for k in range(h[m.N_FLEX]):
         n = m.FLEXES.n_modes(h, k)
         stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + 12 * n + n * n
         for j in range(n):
-            if f[stiffness + j] > 0.0:
-                total += w[axes(h, o, i) + e] ** 2 * f[stiffness + n + j] / f[stiffness + j]
+            stiff = f[stiffness + j] > 0.0
+            w[out + e] = f[stiffness + n + j] / f[stiffness + j] if stiff else 0.0
             e += 1
-    omega2 = w[square(h, o, i)]
+
+
+@kernel
+def damp(h, w, o, i, loss):
+    """Damping of oscillator i by the springs', whose shares stand from place `loss` on: what couples it to no other."""
+    total, omega2 = 0.0, w[square(h, o, i)]
+    for e in range(count(h)):
+        total += w[axes(h, o, i) + e] ** 2 * w[loss + e]
     return min(omega2 * total, 2.0 * MOST_DAMPING * np.sqrt(omega2))
 
 
 def make_find_oscillators(retract: Callable) -> Callable:
     """The kernel find_oscillators(h, f, w, n, o, known), at the state in Y or Y_NEW that has just been evaluated."""
+    find_measures, find_gradient = springs.make_gradients(retract)
 
     @kernel
     def shapes(h, w, o, state, n):
@@ -324,8 +410,8 @@ def make_find_oscillators(retract: Callable) -> Callable:
     @kernel
     def find_oscillators(h, f, w, n, o, known):
         """Fill the basis; known: whether it holds the axes of another pose."""
-        size = count(h)
-        responses(h, f, w, o)
+        size, touching = count(h), contacts(h, o)
+        responses(h, f, w, n, o)
         if known:
             into_axes(h, w, o, size)
         else:
@@ -334,7 +420,16 @@ def make_find_oscillators(retract: Callable) -> Callable:
                     w[axes(h, o, i) + j] = 1.0 if i == j else 0.0
         diagonalise(h, w, o, size)
         shapes(h, w, o, n[m.STATE], size)
+        if h[m.N_SURFACES] > 0 and not known:
+            find_measures(h, w, touching, n[m.STATE])
+        for c in range(h[m.N_SURFACES]):
+            if w[root(h, o, modes(h) + c)] > 0.0:
+                find_gradient(h, w, touching, c, n[m.STATE])
+        loss = response(h, o, 0)  # used up
+        losses(h, f, w, o, loss)
+        for c in range(h[m.N_SURFACES]):
+            w[loss + modes(h) + c] = w[damping(h, o, modes(h) + c)]
         for i in range(size):
-            w[damping(h, o, i)] = damp(h, f, w, o, i)
+            w[damping(h, o, i)] = damp(h, w, o, i, loss)
 
     return find_oscillators

@@ -76,8 +76,9 @@ N_VECTORS = 13
 REAL, COMPLEX = range(2)
 
 
-def memory(nq: int, nv: int, ny: int) -> int:
+def memory(h: np.ndarray) -> int:
     """Floats kept between steps."""
+    ny = int(h[m.NY])
     return VECTORS + N_VECTORS * ny + 4 * ny * ny + 2 * ny
 
 

@@ -28,8 +28,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 #: what resolve_events returns for an event after which integration starts afresh; another positive number only
 #: records it
 RESTART = 1
+#: for a step of chosen length that cannot be made with its end on the event found in it; other negative numbers end the
+#: run
+AGAIN = -2
 #: share of the planned step below which a step has been cut short
 CUT = 0.9
+#: such a step is tried again with this share of its length
+SHORTER = 0.3
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
@@ -79,13 +84,16 @@ def make_advance(
     stepping: Any,
     events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
     poses: Poses = NO_POSES,
+    complete: Callable | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
 
+    complete: evaluates like `evaluate`, and leaves all of the evaluation; given to methods that read more than rates.
     stepping: the module `adaptive` or `fixed`.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
-    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(evaluate, retract)
+    given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
+    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(*given)
     attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
     last, ends = method.last, method.ends
     watch_start, make_resolve_events, any_closed = events
@@ -244,6 +252,10 @@ def make_advance(
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
             happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
+            if happened == AGAIN and w[c + m.FIXED] == 0.0:
+                n[m.REJECTED] += 1
+                w[c + m.STEP], w[c + m.REJECTED_STEP] = SHORTER * step, 0.0
+                continue
             if happened < 0:
                 return
             n[m.STEPS] += 1

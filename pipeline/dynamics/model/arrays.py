@@ -48,10 +48,10 @@ class Arrays:
         stretch = self.table(table)
         return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
 
-    def work_space(self, room: Callable[[int, int, int], m.Room]) -> WorkSpace:
+    def work_space(self, room: Callable[[np.ndarray], m.Room]) -> WorkSpace:
         """A work space with a copy of h, the ground in place and all else zero.
 
-        room: room(NQ, NV, NY) that the integration method needs.
+        room: what the integration method needs, from the header.
         """
         h, end = self.h.copy(), 0
         lengths = _work_lengths(h, room, self.columns)
@@ -143,11 +143,11 @@ def envelope_size(envelope: np.ndarray) -> int:
     return int(envelope["start"][last] + last - envelope["first"][last] + 1)
 
 
-def _work_lengths(h: np.ndarray, room: Callable[[int, int, int], m.Room], columns: int) -> dict[int, int]:
+def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: int) -> dict[int, int]:
     known, contacts, ny, nv = (int(h[place]) for place in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
     closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
     coordinates, positions = nv + known, nq + known
-    wanted, bearings = room(nq, nv, ny), int(h[m.N_BEARINGS])
+    wanted, bearings = room(h), int(h[m.N_BEARINGS])
     tables = {
         m.LINK_FRAMES: links,
         m.SITE_FRAMES: int(h[m.N_SITES]),

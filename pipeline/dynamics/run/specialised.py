@@ -80,7 +80,7 @@ def side_by_side(engine: Engine) -> bool:
 
 def suited(engine: Engine) -> bool:
     """Whether there can be straight code."""
-    return not (INTERPRETED or engine.model.parts.joint_frictions or engine.method.traits.reads_all)
+    return not (INTERPRETED or engine.model.parts.joint_frictions)
 
 
 def _make(engine: Engine, progress: Progress) -> None:

@@ -49,7 +49,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             "Figure 10: contacts end steps where they begin and end; "
             "the paper looks at them at the ends of steps of 10 µs",
-            f"numbers: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {told['steps']} steps, "
+            f"beside the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {told['steps']} steps, "
             f"{told['evaluations']} evaluations, {told['projections']} projections",
         )
         return style.files("fig10", figure)
@@ -65,7 +65,8 @@ def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], color: str) -> None:
             bbox={"boxstyle": "round,pad=0.55", "fc": "white", "ec": color, "lw": 1.5},
         )  # fmt: skip
         if step:
-            axes.text(0.01, y + 0.075, step, ha="left", va="center", fontsize=8.2, color=color, fontweight="bold")
+            told = f"step {step}" if step.isdigit() else f"steps {step}"
+            axes.text(0.0, y, told, ha="left", va="center", fontsize=7.2, color=color, fontweight="bold")
         if k + 1 < len(boxes):
             axes.annotate(
                 "", (0.47, y - height + 0.062), (0.47, y - 0.062),
