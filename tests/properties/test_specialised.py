@@ -72,7 +72,7 @@ def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
 def test_every_scene_is_evaluated_alike(path: Path) -> None:
     """Both without a compiler: kernels on numbers, and what they wrote on the tape; contacts open and closed."""
     model = tabulate(build(load_scene(path), {}))
-    space, f = model.arrays.work_space(lambda nq, nv, ny: m.Room(2, 0, 0)), model.arrays.f
+    space, f = model.arrays.work_space(lambda _: m.Room(2, 0, 0)), model.arrays.f
     h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
     kernel, start = rates_kernel(model), initial.start_state(model)
     space.w[y : y + model.ny] = start
