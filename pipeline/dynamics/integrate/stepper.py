@@ -252,7 +252,7 @@ def make_advance(
             following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
             hold_modes(h, w, n)
             happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
-            if happened == AGAIN and w[c + m.FIXED] == 0.0:
+            if happened == AGAIN and w[c + m.FIXED] == 0.0 and not along:  # a polynomial would be the same again
                 n[m.REJECTED] += 1
                 w[c + m.STEP], w[c + m.REJECTED_STEP] = SHORTER * step, 0.0
                 continue
