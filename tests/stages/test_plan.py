@@ -34,6 +34,7 @@ from flexclear.stages import plan, run, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
 from flexclear.stages.new import write
+from flexclear.stages.workplace import FailedTasksError
 
 #: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
 LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0
@@ -289,7 +290,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
-    with pytest.raises((InputError, run.FailedTasksError), match="leave out everything") as refused:
+    with pytest.raises((InputError, FailedTasksError), match="leave out everything") as refused:
         plan.bring(scene, run.workplace())
     assert refused.value.exit_code == 2
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
@@ -375,7 +376,7 @@ def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, res
             "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
         },
     )
-    with pytest.raises(run.FailedTasksError, match="cannot be run as it stands") as refused:
+    with pytest.raises(FailedTasksError, match="cannot be run as it stands") as refused:
         plan.bring(wild, run.workplace())
     assert refused.value.exit_code == 3
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
