@@ -50,7 +50,7 @@ def main(arguments: list[str] | None = None) -> int:
     own = arguments is None  # whether this process is the command's
     if own:
         # at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short
-        # command, half a second where something was compiled; nobody has anything of it, since the system takes all back
+        # command, half a second where something was compiled; nobody gains by it, since the system takes all back
         atexit.register(gc.freeze)
     # pydantic would look through all that is installed for plugins of its own
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
