@@ -20,9 +20,6 @@ from flexclear.pipeline.core.workflow import workers
 CLOSED_PIPE = 141
 #: new objects before Python looks for garbage: a short command makes hardly any, and spent a tenth of its time looking
 GARBAGE = 200_000
-# at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short command, of
-# which nobody has anything, since the system takes all of it
-atexit.register(gc.freeze)
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
     "new": "a commented scene of one's own to start from",
@@ -50,16 +47,16 @@ def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; mistakes of the user are told without a traceback."""
     plain_output()
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
-    # the system takes all memory back when this ends: to look through it for garbage first took half a second where
-    # something had been compiled
-    atexit.register(gc.freeze)
+    own = arguments is None  # whether this process is the command's
+    if own:
+        # at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short
+        # command, half a second where something was compiled; nobody gains by it, since the system takes all back
+        atexit.register(gc.freeze)
     # pydantic would look through all that is installed for plugins of its own
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
-        if (
-            arguments is None
-        ):  # in a process of its own what is imported stays: neither now nor at its end is it garbage
+        if own:  # what is imported stays: neither now nor at the end is it garbage
             gc.freeze()
         with workers.kept():
             return int(options.command(options) or 0)

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages import bundle
-from flexclear.stages.run import workplace
+from flexclear.stages.workplace import workplace
 
 LIBRARIES = (
     "numpy",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
+
+#: limits of a scene that is made again without being told its own: what it asks for was judged when it was read
+JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
@@ -100,7 +104,7 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None =
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = s3_rigid.filled(table["body"], inputs or {})
-    told = {"body": body, "title": name, "limits": params.get("limits", {})}
+    told = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
     scene = Scene.model_validate({**table, **told})
     scene._name = name
     return scene

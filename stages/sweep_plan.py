@@ -302,7 +302,8 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
         found = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
         inputs = {name: place.store.load(record) for name, record in records.items()}
         keep = tuple(one.name for one in wanted.kept)
-        work = Work(key(found), simulate, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
+        limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
+        work = Work(key(found), limited, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
         families[text] = Family(work, found)
     jobs = []
     for point in points:

@@ -71,6 +71,9 @@ def test_rows_and_members_are_limits_that_a_scene_may_raise(
             load_scene(path, {place: value})
     limits = {"limits.rows": 10**15, "limits.members": 10**6}
     load_scene(path, limits | {"output.interval": "1e-12 s", "ensemble.members": 200_000})
+    raised = load_scene(path, limits | {"output.interval": "1e-12 s"})
+    for told in ({}, {"limits": raised.limits.written()}):  # made again by a stage, which may not be told them
+        assert s4_simulate.rebuild(s4_simulate.params(raised) | told).output.interval == 1e-12
     with pytest.raises(ResourceError, match=r"limits\.rows"):
         with_numbers(load_scene(path), {"output.interval": 1e-12})
     (tmp_path / "many.toml").write_text(

@@ -17,7 +17,7 @@ from scipy.special import ellipk
 from flexclear import pipeline
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts.points import unit
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
@@ -164,6 +164,17 @@ def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fr
         assert found["reason"].values[1] == ""
         assert np.isnan(found["bob.velocity.final"].values[0]).all()
         assert np.isfinite(found["bob.velocity.final"].values[1]).all()
+
+
+def test_limits_of_a_scene_hold_for_the_points_of_its_sweep(root: Path, fresh: Path):
+    """Only the combination of both values asks for more; what a scene allows is not kept with any point."""
+    vary = {"time.end": [0.1, 2.0], "output.interval": [1e-2, 1e-3]}
+    table = {"vary": vary, "keep": ["bob.velocity.final"]}
+    pendulum = root / "scenes/checks/pendulum.toml"
+    with pytest.raises(ResourceError, match=r"2e\+03 rows, more than the 1000 that limits\.rows allows"):
+        sweep.of_scene(load_scene(pendulum, override={"limits.rows": 1000}), table, workers=1)
+    found = sweep.of_scene(load_scene(pendulum, override={"limits.rows": 2000}), table, workers=1)
+    assert found["status"].values.tolist() == [[0, 0], [0, 0]]
 
 
 def test_a_sweep_of_refusals_only_is_no_success(tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]):
