@@ -77,7 +77,7 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     known, made = six(), list[int]()
     proper = crew.Crew
 
-    def noted(kept: bytes, code: int, width: int) -> crew.Crew:
+    def noted(kept: bytes, code: crew.Code, width: int) -> crew.Crew:
         made.append(width)
         return proper(kept, code, width)
 

@@ -57,4 +57,5 @@ def test_its_steps_are_not_those_of_the_vibrations() -> None:
     made, explicit = run("exponential", 1e-5), run("dop853", 1e-5)
     assert error("exponential", 1e-5) < 3.0 * error("dop853", 1e-5)
     assert made.evaluations < explicit.evaluations
-    assert made.jacobians < 0.6 * made.steps  # oscillators serve several steps
+    # in contact oscillators serve several steps: 0.55 times as many here, more than steps if each made its own
+    assert made.jacobians < 0.8 * made.steps
