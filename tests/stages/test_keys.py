@@ -289,7 +289,8 @@ def test_a_scene_survives_the_way_through_its_parameters(root: Path):
         if path.parent.name == "sweeps":
             continue
         scene = load_scene(path)
-        again = s4_simulate.rebuild({"name": scene.name, **s4_simulate.params(scene, ensemble=True)}, {})
+        told = {"name": scene.name, "limits": scene.limits.written()}  # the context of its task
+        again = s4_simulate.rebuild({**told, **s4_simulate.params(scene, ensemble=True)}, {})
         assert again.name == scene.name
         left_out = {"title", "description", "accuracy", "sections", "view"}
         one, other = scene.model_dump(exclude=left_out), again.model_dump(exclude=left_out)
