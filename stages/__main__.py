@@ -46,9 +46,9 @@ COMMANDS = {
 def main(arguments: list[str] | None = None) -> int:
     """Run the command and return its exit code; mistakes of the user are told without a traceback."""
     plain_output()
-    gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     own = arguments is None  # whether this process is the command's
     if own:
+        gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
         # at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short
         # command, half a second where something was compiled; nobody gains by it, since the system takes all back
         atexit.register(gc.freeze)

@@ -8,7 +8,7 @@ from pathlib import Path
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.errors import InputError, ResourceError, shown
-from flexclear.stages import run
+from flexclear.stages.workplace import workplace
 
 ACTIONS = {
     "size": "how much is kept, by stage",
@@ -40,7 +40,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _size(options: argparse.Namespace) -> None:
-    store = run.workplace().store
+    store = workplace().store
     found = upkeep.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}
     for artifact in found.artifacts:
@@ -55,7 +55,7 @@ def _size(options: argparse.Namespace) -> None:
 
 
 def _check(options: argparse.Namespace) -> None:
-    store = run.workplace().store
+    store = workplace().store
     found = upkeep.inventory(store, whole=True)
     # one without a sum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
@@ -79,7 +79,7 @@ def _kernel_whole(path: Path) -> bool:
 
 
 def _explain(options: argparse.Namespace) -> None:
-    store = run.workplace().store
+    store = workplace().store
     record = upkeep.find(store, options.what)
     if record is None:
         raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
@@ -93,7 +93,7 @@ def _explain(options: argparse.Namespace) -> None:
 def _prune(options: argparse.Namespace) -> None:
     if not options.days >= 0.0:
         raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
-    store = run.workplace().store
+    store = workplace().store
     found = upkeep.inventory(store, whole=True)
     chosen = upkeep.prunable(store, found, options.days * upkeep.DAY)
     broken = [a for a in found.artifacts if store.fault(a.record) is not None]

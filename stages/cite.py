@@ -18,6 +18,7 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, pare
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import workplace
 
 INTEGRATE, COMPILE = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.compile"
 
@@ -30,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Print them."""
     (graph,) = run.graphs([options.scene])
-    print(text(graph, run.workplace().sources), end="")
+    print(text(graph, workplace().sources), end="")
 
 
 def text(graph: Graph, sources: Sources) -> str:

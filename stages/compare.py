@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check
+from flexclear.stages.workplace import Workplace, check, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and say where it is."""
-    place = run.workplace(options)
+    place = workplace(options)
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
     found = bring(scenes, place, options.ideal)
     print(*(found.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")

@@ -14,6 +14,7 @@ from flexclear.stages import as_json, cost_design, cost_peers, kernels, run, s4_
 from flexclear.stages.cost_peers import Track
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, bundles, check
+from flexclear.stages.workplace import workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,7 +50,7 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         run.check_target(options.page, "--page")
     peers = {} if options.peer is None else cost_peers.read(options.peer)
-    place, studies = run.workplace(options), {}
+    place, studies = workplace(options), {}
     for graph in run.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
         if not options.integrators and not options.json:

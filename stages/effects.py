@@ -10,7 +10,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_effects
-from flexclear.stages.workplace import Workplace, check
+from flexclear.stages.workplace import Workplace, check, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and say where they are."""
-    place = run.workplace(options)
+    place = workplace(options)
     for graph in run.graphs(options.scenes, options.set):
         done, record = bring(graph.scene, place, options.members)
         folder = place.store.root / done.folder

@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_plan
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check
+from flexclear.stages.workplace import Workplace, check, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,7 +41,7 @@ def command(options: argparse.Namespace) -> None:
         if len(options.scenes) > 1:
             raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
         run.check_target(options.out)
-    place = run.workplace(options)
+    place = workplace(options)
     missed = list[str]()
     for graph in run.graphs(options.scenes, options.set):
         found = bring(graph.scene, place)

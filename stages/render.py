@@ -12,6 +12,7 @@ from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
+from flexclear.stages.workplace import Workplace, check, near, workplace
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -48,7 +49,7 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    graphs, place = run.graphs(options.scenes, options.set), run.workplace(options)
+    graphs, place = run.graphs(options.scenes, options.set), workplace(options)
     tasks = {graph.scene.name: _tasks(graph, wanted, options.what is not None, time) for graph in graphs}
     made = [task for found in tasks.values() for task in found]
     if len(graphs) > 1 and wanted == [("modes", "html")]:
@@ -58,7 +59,7 @@ def command(options: argparse.Namespace) -> None:
         record = outcome.records.get(id(task))
         if record is not None:
             _tell(place, task.folder, list(record.files))
-    run.check(outcome)
+    check(outcome)
 
 
 def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
@@ -97,15 +98,15 @@ def _beside(graphs: list[Graph]) -> Task:
     )
 
 
-def _tell(place: run.Workplace, folder: str, files: list[str]) -> None:
+def _tell(place: Workplace, folder: str, files: list[str]) -> None:
     shown = [name for name in sorted(files) if not name.endswith(".vtp")]
     rest = len(files) - len(shown)
-    print(f"{run.near(place.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
+    print(f"{near(place.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
 
 
-def rendered(scene: Scene, place: run.Workplace | None = None) -> Path:
+def rendered(scene: Scene, place: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, wanted = place or run.workplace(), Graph(scene)
+    place, wanted = place or workplace(), Graph(scene)
     run.require_names(scene)
-    run.check(place.bring(list(wanted.render.values()), jobs=1))
+    check(place.bring(list(wanted.render.values()), jobs=1))
     return place.store.root / wanted.simulate.folder

@@ -11,6 +11,7 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages import as_json, limit, run
 from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace, check, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,11 +38,11 @@ def command(options: argparse.Namespace) -> None:
     asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
         run.check_target(options.page, "--page")
-    place = run.workplace(options)
+    place = workplace(options)
     scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     outcome = place.bring([graph.verdict for graph in tasks.values()])
-    run.check(outcome)
+    check(outcome)
     kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
     judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
     verdicts = {name: place.store.load(record) for name, record in judged.items()}
@@ -75,12 +76,12 @@ def write_page(
         publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
 
 
-def judge(scene: Scene, place: run.Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
+def judge(scene: Scene, place: Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
     """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
-    place = place or run.workplace()
+    place = place or workplace()
     graph = Graph(scene, shown=run.as_in_its_file(scene))
     outcome = place.bring([graph.sections, graph.verdict], jobs=1)
-    run.check(outcome)
+    check(outcome)
     made = [place.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]
     kept, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
     return kept, judged

@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import limit, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
-from flexclear.stages.workplace import Workplace
+from flexclear.stages.workplace import Workplace, near, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,7 @@ def command(options: argparse.Namespace) -> None:
             sweep_large.require_zarr(f"--out {options.out}")
         else:
             run.check_target(options.out)
-    place = run.workplace(options)
+    place = workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
     wanted = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
     if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(wanted[0]):
@@ -89,7 +89,7 @@ def of_scene(
 
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
     with engine(width(workers), scheduler) as found:
-        return bring(plan, found, run.workplace())
+        return bring(plan, found, workplace())
 
 
 @dataclass
@@ -221,7 +221,7 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
 def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:
     """Points, refusals by their reason, and where the dataset is."""
     refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
-    shown = [run.near(path) for path in (file, file.with_suffix(".png")) if path.exists()]
+    shown = [near(path) for path in (file, file.with_suffix(".png")) if path.exists()]
     yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {', '.join(shown)}"
     kinds: dict[str, list[str]] = {}
     for reason in refused:

@@ -9,6 +9,7 @@ from flexclear.pipeline.core.errors import shown
 from flexclear.pipeline.core.workflow.execute import states
 from flexclear.stages import as_json, run
 from flexclear.stages.graph import STAGES
+from flexclear.stages.workplace import workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,7 +21,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    place, found = run.workplace(options), dict[str, dict[str, list[str]]]()
+    place, found = workplace(options), dict[str, dict[str, list[str]]]()
     for graph in run.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), place.store, place.sources)
         found[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
