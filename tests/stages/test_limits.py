@@ -99,7 +99,7 @@ def test_more_parts_than_can_be_worked_on_are_refused_before_they_are_checked(tm
     with pytest.raises(ResourceError, match=rf"\[{family}\]: there are 200\d, more than the 2000") as caught:
         load_scene(written(tmp_path, text))
     assert caught.value.exit_code == 4
-    assert time.monotonic() - begun < 20.0  # reading the text takes 0.3 s here
+    assert time.monotonic() - begun < 60.0  # endless work takes minutes; reading the text takes 0.3 s here
     with pytest.raises(InputError):  # allowed, and then wrong
         load_scene(written(tmp_path, text.replace("[time]", "[limits]\nparts = 3000\n[time]")))
 
