@@ -13,7 +13,9 @@ Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the pla
 table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by what they hold (`record`).
 
-Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them share memory,
+and the compiler knows: what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes is
+never given one of them twice.
 
 Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
