@@ -151,9 +151,13 @@ MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
-ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
-#: coupling: that this closure is, or -1
-CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept coupling")
+#: rows of the mass matrix. first: column; origin: place of column 0, which may lie before that of the first
+ENVELOPE = wiring("first origin")
+#: threes: of rows that are solved for, which stand side by side in JACOBIAN and SPREAD and are worked on together; the
+#: last of them may end with zeros.  coupling: that this closure is, or -1
+CLOSURES = wiring(
+    "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling"
+)
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
 ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
@@ -161,7 +165,7 @@ KNOWN_ENTRIES = wiring("closure drive column sign part")
 COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
-CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
+CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
 #: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
 CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
