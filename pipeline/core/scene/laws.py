@@ -281,9 +281,6 @@ def _bare(law: Any) -> Any:
 
 
 Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
-for _composed in (Sum, Section, Piecewise, Repeated):
-    _composed.model_rebuild()
-
 
 def _count(law: Any) -> int:
     """Pieces that a law becomes at most; at each, integration stops."""
