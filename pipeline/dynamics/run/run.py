@@ -23,7 +23,6 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
-from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
@@ -34,6 +33,7 @@ from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.dynamics.run.collocation import Collocation
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,15 +15,16 @@ from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run import refusal, singular
-from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.pace import Judge, crawls
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.reach import require_shallow
-from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
-from flexclear.pipeline.dynamics.run.singular_start import start_motion
 from flexclear.pipeline.dynamics.run.specialised import settle
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_pass import Pass
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -250,6 +252,8 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
 
 def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
+    from flexclear.pipeline.dynamics.run.singular_start import start_motion  # which few mechanisms need
+
     first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
     way = start_motion(engine, first.copy())
@@ -345,6 +349,8 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and singular.improve(engine, t, singular.CLEARLY):
         tape.selections.append((t, engine.kept.copy()))
         return True
+    from flexclear.pipeline.dynamics.run.singular_pass import SAME, lay_over
+
     made, passes = lay_over(engine)
     if made is not None:
         tape.collocations.append(made)
@@ -358,6 +364,8 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
+    from flexclear.pipeline.dynamics.run.singular_pass import foresee_at_start
+
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
     return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
 
