@@ -240,4 +240,5 @@ def _metadata(package: str) -> str | None:
     except PackageNotFoundError:
         return None
     # in a checkout that is on the path itself, the program's own stands under its older name
-    return found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    return text.partition("\n\n")[0]  # the rest describes the library

@@ -24,7 +24,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.workflow.fingerprint import TREE, imported, library_version, sources_of
+from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version, sources_of
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
@@ -262,7 +262,7 @@ def reached(source: str) -> dict[str, str]:
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
     found: dict[str, str] = {}
-    waiting = sorted(imported(source.encode(), "entry", package=False)[0])
+    waiting = sorted(sources.imported(source))
     while waiting:
         name = waiting.pop()
         module = SOURCES.module(name) if name.startswith(CODE) and name not in found else None
