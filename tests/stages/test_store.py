@@ -330,6 +330,21 @@ def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, monkeypatc
     assert forced[1:] == [str(tmp_path)]
 
 
+def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+):
+    """Each takes milliseconds of a disk, and an artifact is what has a record."""
+    forced: list[Path] = []
+    real = os.fsync
+    monkeypatch.setattr(
+        os, "fsync", lambda handle: (forced.append(Path(os.readlink(f"/proc/self/fd/{handle}"))), real(handle))
+    )
+    store.put("simulate", KEY, {"nc": dataset()}, {})
+    folder = store.path("simulate", KEY, "nc").parent
+    assert [path.parent for path in forced[:2]] == [folder, folder]
+    assert forced[2:] == [folder]
+
+
 def test_what_was_just_stored_is_not_parsed_and_given_once(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever loads it may change it: the next one gets it from the file."""
     record = put(store)

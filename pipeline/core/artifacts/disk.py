@@ -75,13 +75,15 @@ def publish(path: Path, content: bytes) -> str:
         made.write_bytes(content)
         if made.read_bytes() != content:
             raise OSError(errno.EIO, "what was written does not read back", str(path))
-        return settle(made, path)
+        digest = settle(made, path)
+    system.sync_folder(path.parent)
+    return digest
 
 
 def settle(made: Path, path: Path) -> str:
-    """Force the bytes of a file to the disk, give it its name, and force that to the disk; returns its sha256.
+    """Force the bytes of a file to the disk and give it its name; returns its sha256, taken while the disk writes.
 
-    The digest is taken while the disk writes.
+    The name is on the disk after `system.sync_folder`, together with all others of its folder.
     """
     failed = list[OSError]()
 
@@ -100,7 +102,6 @@ def settle(made: Path, path: Path) -> str:
     if failed:
         raise failed[0]
     system.replace(made, path)
-    system.sync_folder(path.parent)
     return digest
 
 

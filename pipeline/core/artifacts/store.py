@@ -315,10 +315,16 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
     Equal datasets give equal bytes: no times or names of this machine.
     """
-    from flexclear.pipeline.core.artifacts import netcdf  # here, since what finds everything fresh writes nothing
-    from flexclear.pipeline.core.artifacts.labelled import of
+    from flexclear.pipeline.core.artifacts.labelled import of  # here, since what finds everything fresh writes nothing
 
-    data = of(dataset)
+    digest = _written(path, of(dataset))
+    system.sync_folder(path.parent)
+    return digest
+
+
+def _written(path: Path, data: LabelledArrays) -> str:
+    from flexclear.pipeline.core.artifacts import netcdf
+
     with temporary(path) as made:
         try:
             netcdf.write(made, data)
@@ -330,13 +336,16 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
 
 def _store(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
-    """Write a dataset, and keep its arrays for `Store.arrays` until the next one is stored."""
+    """Write a dataset, and keep its arrays for `Store.arrays` until the next one is stored.
+
+    Its name is forced to the disk with that of its record.
+    """
     from flexclear.pipeline.core.artifacts import netcdf
     from flexclear.pipeline.core.artifacts.labelled import of
 
     data = of(dataset)
     _STORED.clear()
-    digest = write_dataset(path, data)
+    digest = _written(path, data)
     if data.nbytes < netcdf.COMPRESSED:
         _STORED[digest] = _identity(path), netcdf.as_read(data)
     return digest
