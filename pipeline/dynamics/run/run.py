@@ -75,12 +75,15 @@ def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     return actuated(scene, bundles, progress)
 
 
-def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Scene:
-    """The scene with the poses and velocities of where it says that the run begins, instead of its own."""
+def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
+    """The scene with the poses and velocities of where it says that the run begins, instead of its own.
+
+    With it which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
+    """
     if scene.start is None or scene.start.at is None:
-        return scene
+        return scene, ""
     begin = lookup(STARTS, scene.start.at, where="[start.at]")
-    found: Scene = begin(scene, bundles, progress)
+    found: tuple[Scene, str] = begin(scene, bundles, progress)
     return found
 
 
@@ -94,11 +97,15 @@ def engines(
 
 def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str], Engine]:
     """What makes the engine of a run by an integrator's name; that of the scene's own by none."""
-    moved, given = driven(begun(scene, bundles, progress), bundles, progress)
+    posed, choice = begun(scene, bundles, progress)
+    moved, given = driven(posed, bundles, progress)
 
     def made(name: str) -> Engine:
         wanted = edited(moved, {"solver.integrator": name}) if name else moved
-        return prepare(tabulate(build(wanted, bundles), given), progress)
+        model = tabulate(build(wanted, bundles), given)
+        if choice:  # the poses found no longer tell of it
+            model = replace(model, mechanism=replace(model.mechanism, choice=choice))
+        return prepare(model, progress)
 
     return made
 
