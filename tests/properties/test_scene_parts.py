@@ -11,13 +11,16 @@ import pytest
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.stages import s4_simulate
+
+TREE = Path(__file__).resolve().parents[2]
 
 SCENE = """
 title = "wrong"
@@ -215,3 +218,13 @@ def test_the_schema_names_every_part() -> None:
     text = str(Scene.model_json_schema())
     known: Any = ("universal", "planar", "harmonic", "spline", "point-force", "joint-friction", "actuators")
     assert [word for word in known if word not in text] == []
+
+
+def test_an_edit_takes_parts_and_keys_away_and_refuses_those_that_are_not_there() -> None:
+    scene = load_scene(TREE / "scenes" / "checks" / "clearance_pendulum.toml")
+    assert edited(scene, {"joint.hinge": None, "ensemble": None}).joint == {}
+    joint = edited(scene, {"joint.hinge.friction": None}).joint["hinge"]
+    assert isinstance(joint, ClearanceRevolute)
+    assert joint.friction is None
+    with pytest.raises(InputError, match=r"there is no 'joint\.hing'"):
+        edited(scene, {"joint.hing": None})

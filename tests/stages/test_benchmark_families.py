@@ -41,6 +41,12 @@ def test_every_module_of_the_families_is_one(root: Path):
     assert {f"{name}.jsonl" for name in FAMILIES} == {path.name for path in log.FOLDER.iterdir()}
 
 
+def test_make_bench_measures_all_that_stands_on_the_page_of_benchmarks(root: Path):
+    recipe = (root / "Makefile").read_text().partition("\nbench:")[2].partition("\n\n")[0]
+    named = recipe.partition("-m benchmarks ")[2].split()
+    assert sorted(named) == sorted(name for name, family in FAMILIES.items() if family.page == "benchmarks.md")
+
+
 @pytest.mark.parametrize("name", PAGES)
 def test_a_page_is_that_of_the_log_to_the_byte(root: Path, name: str):
     assert page.text(name).encode() == (root / "docs" / name).read_bytes()
