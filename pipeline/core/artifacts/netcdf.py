@@ -31,8 +31,8 @@ _COORDINATES, _BOOL, _FILL = "coordinates", {"dtype": "bool"}, "_FillValue"
 def write(path: Path, data: LabelledArrays) -> None:
     """Write a file; OSError or RuntimeError of the library where it cannot.
 
-    Numeric arrays lie in the file as they do in memory: pieces with fletcher32 sums, as they were once kept, took a
-    third more to write and twice as long to read, and what is written has a sha256 beside it.  From `COMPRESSED` bytes
+    Numeric arrays lie in the file as they do in memory: in pieces with fletcher32 sums they take a third
+    more time to write and half as much again to read, and what is written has a sha256 beside it.  From `COMPRESSED` bytes
     on they are deflated, in pieces with sums; below that it takes longer than making them, since what a run records
     has few digits to spare.  They are written when all are defined: each change between the two lets the library
     write all that it has so far, which took as long as the rest.
