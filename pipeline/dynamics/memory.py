@@ -145,9 +145,10 @@ SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
 #: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
 #: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled n_held basis0 n_basis moving0 interface0")
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0")
 BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
-MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
+MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
+MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: place in MOMENTS after its last one
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")

@@ -167,7 +167,19 @@ def filled(
 
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
-    *(m.LINKS, m.SITES, m.SITE_NUMBERS, m.FLEXES, m.BASIS, m.MOMENTS, m.PORTS, m.PAIRS, m.KNOWN_PAIRS, m.ENVELOPE),
+    *(
+        m.LINKS,
+        m.SITES,
+        m.SITE_NUMBERS,
+        m.FLEXES,
+        m.BASIS,
+        m.MOMENTS,
+        m.MOMENT_ROWS,
+        m.PORTS,
+        m.PAIRS,
+        m.KNOWN_PAIRS,
+        m.ENVELOPE,
+    ),
     *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
     *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
     *(m.BASIS_VALUES, m.INTERFACE_DATA),
