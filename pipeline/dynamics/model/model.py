@@ -137,6 +137,7 @@ def filled(
             **coupling_tables,
             **rubbing,
             m.WORN: contacting.worn(mechanism),
+            **_recorded(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
             m.GROUPS: groups,
@@ -163,6 +164,20 @@ def filled(
         numbering.nv,
         len(groups),
     )
+
+
+def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
+    """Tables of what is recorded by its name: moving bodies as the scene lists them, and frames."""
+    bodies, frames, links = mechanism.moving_bodies, mechanism.frames.values(), mechanism.links
+    carrying, holding = ([mechanism.link_of[name] for name in names] for names in (bodies, [f.body for f in frames]))
+    bodies_there = [links[i].places[name] for i, name in zip(carrying, bodies, strict=True)]
+    coms = [np.array(getattr(mechanism.scene.body[name], "com", (0.0, 0.0, 0.0))) for name in bodies]
+    return {
+        m.BODIES: carrying,
+        m.BODY_NUMBERS: [_pose_row(Placement(here.point(c), here.R)) for here, c in zip(bodies_there, coms, strict=True)],
+        m.FRAMES: holding,
+        m.NAMED_FRAME_NUMBERS: [links[i].places[f.body].point(f.place.p) for i, f in zip(holding, frames, strict=True)],
+    }
 
 
 #: tables that follow from links, joints, frames and flexible bodies alone
