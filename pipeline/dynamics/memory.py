@@ -210,7 +210,9 @@ LOAD_NUMBERS = numbers("value")  # see `loads`
 LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
 GRAVITY = numbers("acceleration:3")
 FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
-BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("com:3 axes:3x3"), numbers("origin:3")  # in the link, undeformed
+#: of bodies and named frames in their link, undeformed. mass, com, inertia: as of LINK_NUMBERS; mass and inertia are 0
+#: where nothing but the body itself is in its link
+BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")
 
 # Work space in w -----------------------------------------------------------------------------------------------------
 #: a frame in world axes; the velocity is that of its origin

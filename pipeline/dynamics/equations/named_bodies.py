@@ -8,11 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add, at, at9, cross, product, put, turn
 
 #: what is written of every body, in this order, and how many numbers each is; together
-OF_BODIES = {"position": 3, "quaternion": 4, "velocity": 3, "omega": 3, "acceleration": 3, "alpha": 3}
+OF_BODIES = {"position": 3, "quaternion": 4, "velocity": 3, "omega": 3, "acceleration": 3, "alpha": 3, "demand": 6}
 SIZE = sum(OF_BODIES.values())
 
 
@@ -56,6 +57,10 @@ def put_bodies(h, f, w, out, first, every, r):
         put(out, here + 10 * size, omega)
         put(out, here + 13 * size, add(a, gravity))
         put(out, here + 16 * size, alpha)
+        if f[numbers + m.BODY_NUMBERS.mass] > 0.0:
+            _, _, moment, force = rigid.demand(f, w, o, numbers)
+            put(out, here + 19 * size + 3 * (bodies * r + k), moment)
+            put(out, here + 19 * size + 3 * (bodies * r + k) + 3, force)
 
 
 @kernel

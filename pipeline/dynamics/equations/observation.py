@@ -35,6 +35,8 @@ class Observed:
     links, sites: their frames (LINK_FRAMES), of which accelerations are true ones less gravity; (rows, links or sites).
     body_position, ...: of the moving bodies' centres of mass and axes, (rows, bodies, 3); quaternions w x y z, w >= 0,
     (rows, bodies, 4).  frame_position: of all named frames, (rows, frames, 3).  Of flexible bodies as if undeformed.
+    body_demand: what rigid bodies need to move as they do, less their weight, where others share their link: moment
+    about the kernels' origin, force; (rows, bodies, 6), 0 of all others.
     link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
     about the kernels' origin (WRENCH).  touch, loads, bearings: what contacts, loads and bearings with friction do
     (TOUCH, LOAD, BEARING).
@@ -55,6 +57,7 @@ class Observed:
     body_omega: np.ndarray
     body_acceleration: np.ndarray
     body_alpha: np.ndarray
+    body_demand: np.ndarray
     frame_position: np.ndarray
     link_wrenches: np.ndarray
     closure_wrenches: np.ndarray

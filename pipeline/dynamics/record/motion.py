@@ -123,7 +123,7 @@ class Motions:
     def several(self, names: Sequence[str]) -> Bodies:
         """The same of some bodies."""
         places, every = [self.moving_bodies.index(name) for name in names], self.every_body
-        return Bodies(**{field.name: getattr(every, field.name)[:, places] for field in fields(Bodies)})
+        return Bodies(**{field.name: np.take(getattr(every, field.name), places, axis=1) for field in fields(Bodies)})
 
     def body(self, name: str) -> Motion:
         """Motion of one moving body's centre of mass and axes."""
@@ -143,7 +143,7 @@ class Motions:
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
         """Origins of named frames, kernels' origin, shape (time, frame, 3)."""
-        found = self.seen.frame_position[:, [self._frames[name] for name in names]]
+        found = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
         self._bend(found, names)
         return found
 

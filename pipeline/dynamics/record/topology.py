@@ -60,7 +60,7 @@ def _singular_values(
         engine.keep(kept)
         J = selection.dense(engine.model, engine.h, seen.jacobian[part])
         parts.append(scale(engine.model, engine.h, J))
-    J = np.concatenate(parts)
+    J = parts[0] if len(parts) == 1 else np.concatenate(parts)
     if not J.size:
         return np.zeros((len(J), 0))
     squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]

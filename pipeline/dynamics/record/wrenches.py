@@ -7,12 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import cross, turned
+from flexclear.pipeline.core.algebra import cross
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.couplings import Coupling
-from flexclear.pipeline.dynamics.model.merge import rigid_inertia
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
@@ -44,7 +43,8 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     for k, name in enumerate(names):
         moments[:, k], forces[:, k] = known[name]
     arms = motions.positions([model.scene.joint[name].between[1] for name in names])
-    moments -= cross(arms, forces)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        moments[..., i] -= arms[..., j] * forces[..., k] - arms[..., k] * forces[..., j]
     return moments, forces
 
 
@@ -72,10 +72,9 @@ def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
 
 
 class _Beyond(NamedTuple):
-    """Bodies of link `link` on the far side of a fixed joint within it; sign: +1 where they are its second body's."""
+    """Bodies on the far side of a fixed joint within a link; sign: +1 where they are its second body's."""
 
     joint: str
-    link: int
     bodies: list[str]
     sign: float
 
@@ -83,7 +82,7 @@ class _Beyond(NamedTuple):
 def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, Wrench]:
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
     model, rows, beyond, inside = motions.model, len(motions.seen.state), list[_Beyond](), dict[str, Wrench]()
-    for i, link in enumerate(model.links):
+    for link in model.links:
         every = model.scene.joint.items()
         inner = [n for n, j in every if n not in known and _is_inside(model, j.between, link.places)]
         # a second path between bodies that are joined already carries nothing here
@@ -92,11 +91,12 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
         for name in tree:
             side, sign = _far_side(model, name, tree)
             bodies = [body for body in link.places if body in side and body in model.mechanism.moving_bodies]
-            beyond += [_Beyond(name, i, bodies, sign)] if bodies else []
+            beyond += [_Beyond(name, bodies, sign)] if bodies else []
     acting = [(_joined(model, joint), wrench) for joint, wrench in known.items()]
-    moments, forces = _inertial(motions, beyond)
-    for k, part in enumerate(beyond):
-        moment, force = moments[:, k], forces[:, k]
+    places = {name: k for k, name in enumerate(motions.moving_bodies)}
+    for part in beyond:
+        demand = sum(motions.seen.body_demand[:, places[body]] for body in part.bodies)
+        moment, force = demand[:, :3], demand[:, 3:]
         for (first, second), (n, f) in acting:
             out, into = first in part.bodies, second in part.bodies
             if out != into:
@@ -110,27 +110,6 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
 
 def _is_inside(model: Model, between: tuple[str, str], places: Mapping[str, object]) -> bool:
     return all(model.mechanism.frames[f].body in places for f in between)
-
-
-def _inertial(motions: Motions, parts: Sequence[_Beyond]) -> Wrench:
-    """Rates of momentum of rigid parts of links about the kernels' origin, and of momentum, less their weight; by Euler
-    and Newton in the links' axes, (time, part, 3), in Fortran's order."""
-    model, frames = motions.model, motions.seen.links
-    places = [{body: model.links[part.link].places[body] for body in part.bodies} for part in parts]
-    weighed = [rigid_inertia(model.scene, there) for there in places]
-    mass, com, inertia = (np.array([getattr(one, field) for one in weighed]) for field in ("mass", "com", "moments"))
-    links = sorted({part.link for part in parts})
-    p, R, omega, alpha, a = (
-        np.asfortranarray(frames[field][:, links]) for field in ("origin", "axes", "omega", "alpha", "acceleration")
-    )
-    R_LW = np.swapaxes(R, -1, -2)
-    turning = (turned(R_LW, omega), turned(R_LW, alpha), turned(R_LW, a))
-    carried = [links.index(part.link) for part in parts]
-    p, R, omega, alpha, a = (values.T[..., carried, :].T for values in (p, R, *turning))
-    force = mass[:, None] * (a + cross(alpha, com) + cross(omega, cross(omega, com)))
-    spin = turned(inertia, alpha) + cross(omega, turned(inertia, omega)) + cross(com, force)
-    force = turned(R, force)
-    return turned(R, spin) + cross(p, force), force
 
 
 def _joined(model: Model, name: str) -> tuple[str, str]:
