@@ -35,33 +35,25 @@ def spatial(w, o, mass, c, J):
 
 
 @kernel
-def demand(f, w, frame, numbers):
-    """Of a rigid body that moves with a frame in w: its centre and inertia about it, and the wrench that it needs.
-
-    numbers: place in f of its mass, centre and inertia, in the order of LINK_NUMBERS.
-    """
-    R = at9(w, frame + m.FRAME.axes)
-    omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
-    arm = turn(R, at(f, numbers + m.LINK_NUMBERS.com))
-    c = add(at(w, frame + m.FRAME.origin), arm)
-    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
-    a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
-    force = scale(f[numbers + m.LINK_NUMBERS.mass], a)
-    moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
-    return c, J, add(moment, cross(c, force)), force
-
-
-@kernel
 def inertia(h, f, w, i):
     """Spatial inertia of link i (OWN) and the wrench on it (moment about the origin, force).
 
     The wrench is what the accelerations now in its frame need, gravity being an acceleration of
     the ground.
     """
-    numbers, o = m.LINK_NUMBERS.row(h, i), m.WRENCH.row(h, i)
-    c, J, moment, force = demand(f, w, m.LINK_FRAMES.row(h, i), numbers)
-    spatial(w, m.OWN.row(h, i), f[numbers + m.LINK_NUMBERS.mass], c, J)
-    put(w, o, moment)
+    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
+    R = at9(w, frame + m.FRAME.axes)
+    omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
+    arm = turn(R, at(f, numbers + m.LINK_NUMBERS.com))
+    c = add(at(w, frame + m.FRAME.origin), arm)
+    mass = f[numbers + m.LINK_NUMBERS.mass]
+    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
+    spatial(w, m.OWN.row(h, i), mass, c, J)
+    a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+    force = scale(mass, a)
+    moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
+    o = m.WRENCH.row(h, i)
+    put(w, o, add(moment, cross(c, force)))
     put(w, o + 3, force)
 
 

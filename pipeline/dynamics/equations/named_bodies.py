@@ -8,9 +8,20 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import add, at, at9, cross, product, put, turn
+from flexclear.pipeline.dynamics.vectors import (
+    add,
+    at,
+    at6,
+    at9,
+    cross,
+    product,
+    put,
+    scale,
+    turn,
+    turn_back,
+    turn_symmetric,
+)
 
 #: what is written of every body, in this order, and how many numbers each is; together
 OF_BODIES = {"position": 3, "quaternion": 4, "velocity": 3, "omega": 3, "acceleration": 3, "alpha": 3, "demand": 6}
@@ -48,19 +59,22 @@ def put_bodies(h, f, w, out, first, every, r):
         R = at9(w, o + m.FRAME.axes)
         omega, alpha = at(w, o + m.FRAME.omega), at(w, o + m.FRAME.alpha)
         arm = turn(R, at(f, numbers + m.BODY_NUMBERS.com))
-        swing = cross(omega, arm)
+        swing, p = cross(omega, arm), add(at(w, o + m.FRAME.origin), arm)
         a = add(at(w, o + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, swing)))
         here, size = first + 3 * (bodies * r + k), every * bodies
-        put(out, here, add(at(w, o + m.FRAME.origin), arm))
+        put(out, here, p)
         put_quaternion(out, here + 3 * size + bodies * r + k, product(R, at9(f, numbers + m.BODY_NUMBERS.axes)))
         put(out, here + 7 * size, add(at(w, o + m.FRAME.velocity), swing))
         put(out, here + 10 * size, omega)
         put(out, here + 13 * size, add(a, gravity))
         put(out, here + 16 * size, alpha)
-        if f[numbers + m.BODY_NUMBERS.mass] > 0.0:
-            _, _, moment, force = rigid.demand(f, w, o, numbers)
-            put(out, here + 19 * size + 3 * (bodies * r + k), moment)
-            put(out, here + 19 * size + 3 * (bodies * r + k) + 3, force)
+        mass = f[numbers + m.BODY_NUMBERS.mass]
+        if mass > 0.0:
+            J, turning, force = at6(f, numbers + m.BODY_NUMBERS.inertia), turn_back(R, omega), scale(mass, a)
+            spin = add(turn_symmetric(J, turn_back(R, alpha)), cross(turning, turn_symmetric(J, turning)))
+            here += 19 * size + 3 * (bodies * r + k)
+            put(out, here, add(turn(R, spin), cross(p, force)))
+            put(out, here + 3, force)
 
 
 @kernel

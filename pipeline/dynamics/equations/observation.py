@@ -78,23 +78,24 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
     """
     drives = size(m.N_DRIVES)
     return {
+        "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
+        **{f"body_{name}": (numbers, size(m.N_BODIES)) for name, numbers in OF_BODIES.items()},
+        "frame_position": (3, size(m.N_FRAMES)),
+        "energy": (ENERGY, 1),
+        "residual": (None, 1),
+        "status": (None, 1),
+        **_frames(size),
         "state": (None, size(m.NY)),
         "positions": (None, size(m.NQ) + drives),
         "speeds": (None, size(m.NV) + drives),
-        "accelerations": (None, size(m.NV) + drives),
-        **_frames(size),
-        **{f"body_{name}": (numbers, size(m.N_BODIES)) for name, numbers in OF_BODIES.items()},
-        "frame_position": (3, size(m.N_FRAMES)),
+        "free_accelerations": (None, size(m.NV)),
+        "driven_accelerations": (None, drives),
         "link_wrenches": (m.WRENCH, size(m.N_LINKS)),
-        "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
         "touch": (m.TOUCH, size(m.N_CONTACTS)),
         "loads": (m.LOAD, size(m.N_LOADS)),
         "bearings": (m.BEARING, size(m.N_BEARINGS)),
         "drive_force": (None, drives),
-        "energy": (ENERGY, 1),
         "jacobian": (None, size(m.JACOBIAN_SIZE)),
-        "residual": (None, 1),
-        "status": (None, 1),
     }
 
 
@@ -139,8 +140,9 @@ def frames_by_name(blocks: Blocks, size: Callable[[int], int]) -> Frames:
 def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
     """Views of what `observe` has written."""
     fields = {name: _named(kind, count, blocks[name]) for name, (kind, count) in _columns(size).items()}
+    accelerations = np.concatenate([fields.pop("free_accelerations"), fields.pop("driven_accelerations")], axis=1)
     single = {name: fields[name][:, 0] for name in ("energy", "residual", "status")}
-    return Observed(**fields | single)
+    return Observed(**fields | single, accelerations=accelerations)
 
 
 def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
@@ -166,13 +168,10 @@ def no_friction(h, w, out, column):
 
 
 @kernel
-def _copy(w, first, count, out, column, line):
-    """Copy a stretch to row `line` of the rows' block that begins after so many columns; the columns after it."""
-    every, r = line
-    o = every * column + count * r
-    for k in range(count):
-        out[o + k] = w[first + k]
-    return column + count
+def columns_before_state(h):
+    """Columns of what is worked out, and of the frames of links and sites."""
+    worked_out = m.WRENCH.size * h[m.N_CLOSURES] + SIZE * h[m.N_BODIES] + 3 * h[m.N_FRAMES] + ENERGY.size + 2
+    return worked_out + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES])
 
 
 @kernel
@@ -186,10 +185,10 @@ def place_of(k, count):
 def even(rows, first, last):
     """Whether the rows from the first to the last follow at equal distances in time."""
     step = (rows[last, 0] - rows[first, 0]) / (last - first)
+    most = 0.0
     for r in range(first, last):
-        if not abs(rows[r + 1, 0] - rows[r, 0] - step) < EVEN * step:
-            return False
-    return True
+        most = max(most, abs(rows[r + 1, 0] - rows[r, 0] - step))
+    return most < EVEN * step
 
 
 @kernel
@@ -199,11 +198,11 @@ def open_by(h, w):
 
 
 @kernel
-def foresee(h, w, rows, r, state, closed):
+def foresee(h, w, rows, r, state, closed, states):
     """Add to Y, which is as recorded, what closing the loops is to change there; whether that is anything.
 
     By how much loops are open grows and falls within a step as smoothly as the motion: the cubic through the changes
-    of two rows before and two after that have been closed.  closed: states with loops closed, row after row.
+    of two rows before and two after that have been closed.  states: place of their states, row after row, in closed.
     """
     before, most = r - r % APART, 0.0
     s = (r - before) / APART
@@ -214,7 +213,7 @@ def foresee(h, w, rows, r, state, closed):
             row = before + APART * j
             # of Lagrange's interpolation between -1, 0, 1 and 2
             weight = inner * (1.0 - s if j == 0 else s) if 0 <= j <= 1 else outer * (2.0 - s if j < 0 else 1.0 + s)
-            change += weight * (closed[h[m.NY] * row + k] - rows[row, state + k])
+            change += weight * (closed[states + h[m.NY] * row + k] - rows[row, state + k])
         w[h[m.Y] + k] += change
         most = max(most, abs(change))
     return most > 0.0
@@ -262,18 +261,18 @@ def make_observation(
         rub(h, w, out, o)
 
     @kernel
-    def joint_wrenches(h, f, w, n, out, column, line):
-        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler)."""
+    def joint_wrenches(h, f, w, n, out, o):
+        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler).
+
+        Wrenches of closures are stored from out[o] on.
+        """
         forces(h, f, w, n)
         modal_inertia(h, f, w, n)
-        (every, r), closures = line, column + 6 * h[m.N_LINKS]
-        closure_wrenches(h, w, out, every * closures + 6 * h[m.N_CLOSURES] * r)
+        closure_wrenches(h, w, out, o)
         for i in range(h[m.N_LINKS] - 1, 0, -1):
             up = m.WRENCH.row(h, m.LINKS.parent(h, i))
             accumulate(w, up, at(w, m.WRENCH.row(h, i)))
             accumulate(w, up + 3, at(w, m.WRENCH.row(h, i) + 3))
-        _copy(w, h[m.WRENCH.place], 6 * h[m.N_LINKS], out, column, line)
-        return closures + 6 * h[m.N_CLOSURES]
 
     @kernel
     def energies(h, f, w, out, o):
@@ -291,14 +290,6 @@ def make_observation(
         out[o], out[o + 1], out[o + 2] = kinetic, potential, elastic
 
     @kernel
-    def close(h, f, w, n, t, tolerance):
-        """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
-        if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
-            n[m.EVALUATION] = m.NOT_CLOSED
-        if n[m.EVALUATION] == m.OK and h[m.N_KEPT_ROWS] > 0 and w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
-            n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
-
-    @kernel
     def place(h, f, w, n, t):
         """Positions and speeds of the state in Y."""
         laws(h, f, w, n, t)
@@ -306,34 +297,48 @@ def make_observation(
         prescribe(h, w)
 
     @kernel
-    def copy_frames(h, w, out, column, line):
-        """Copy the frames of links and sites."""
-        column = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], out, column, line)
-        return _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], out, column, line)
+    def copy(h, w, out, every, r, column, frames):
+        """Copy the stretches of w that are recorded as they are, each to its row in its block.
+
+        column: number of columns before them.  frames: whether only those of links and sites.
+        """
+        known = h[m.N_DRIVES]
+        stretches = (
+            (h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS]),
+            (h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES]),
+            (h[m.Y], h[m.NY]),
+            (h[m.X], h[m.NQ] + known),
+            (h[m.U], h[m.NV] + known),
+            (h[m.SLOPES] + h[m.NQ], h[m.NV]),
+            (h[m.DU] + h[m.NV], known),
+            (h[m.WRENCH.place], m.WRENCH.size * h[m.N_LINKS]),
+            (h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS]),
+            (h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS]),
+            (h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS]),
+            (h[m.DRIVE_FORCE], known),
+            (h[m.JACOBIAN], h[m.JACOBIAN_SIZE]),
+        )
+        for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
+            first, count = stretches[s]
+            o = every * column + count * r
+            for k in range(count):
+                out[o + k] = w[first + k]
+            column += count
 
     @kernel
-    def copy_all(h, f, w, n, out, line):
-        """Copy what is observed of a row, each quantity to its row in its block."""
+    def store(h, f, w, n, out, every, r):
+        """Store what is worked out of a row that has been evaluated; the number of columns that it takes."""
         status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
-        every, r = line
-        c = _copy(w, h[m.Y], h[m.NY], out, 0, line)
-        c = _copy(w, h[m.X], h[m.NQ] + h[m.N_DRIVES], out, c, line)
-        c = _copy(w, h[m.U], h[m.NV] + h[m.N_DRIVES], out, c, line)
-        o, known = every * c + (h[m.NV] + h[m.N_DRIVES]) * r, h[m.NV]
-        for k in range(known + h[m.N_DRIVES]):
-            out[o + k] = w[(h[m.SLOPES] + h[m.NQ] if k < known else h[m.DU]) + k]
-        c = copy_frames(h, w, out, c + known + h[m.N_DRIVES], line)
-        put_bodies(h, f, w, out, every * c, every, r)
-        c += SIZE * h[m.N_BODIES]
-        put_frames(h, f, w, out, every * c + 3 * h[m.N_FRAMES] * r)
-        c = joint_wrenches(h, f, w, n, out, c + 3 * h[m.N_FRAMES], line)
-        c = _copy(w, h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS], out, c, line)
-        c = _copy(w, h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS], out, c, line)
-        c = _copy(w, h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS], out, c, line)
-        c = _copy(w, h[m.DRIVE_FORCE], h[m.N_DRIVES], out, c, line)
-        energies(h, f, w, out, every * c + ENERGY.size * r)
-        c = _copy(w, h[m.JACOBIAN], h[m.JACOBIAN_SIZE], out, c + ENERGY.size, line)
-        out[every * c + r], out[every * (c + 1) + r] = residual, status
+        column = m.WRENCH.size * h[m.N_CLOSURES]
+        joint_wrenches(h, f, w, n, out, column * r)
+        put_bodies(h, f, w, out, every * column, every, r)
+        column += SIZE * h[m.N_BODIES]
+        put_frames(h, f, w, out, every * column + 3 * h[m.N_FRAMES] * r)
+        column += 3 * h[m.N_FRAMES]
+        energies(h, f, w, out, every * column + ENERGY.size * r)
+        column += ENERGY.size
+        out[every * column + r], out[every * (column + 1) + r] = residual, status
+        return column + 2
 
     @kernel
     def select(h, w, n, row, pieces):
@@ -349,31 +354,38 @@ def make_observation(
         return state
 
     @kernel
+    def close(h, f, w, n, t, tolerance):
+        """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
+        if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
+            n[m.EVALUATION] = m.NOT_CLOSED
+        if n[m.EVALUATION] == m.OK and h[m.N_KEPT_ROWS] > 0 and w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
+            n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
+        if n[m.EVALUATION] == m.OK:
+            keep_scales(h, w)
+
+    @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):
-        count, uneven = rows.shape[0], -1
-        for turn in range(count):
-            r = place_of(turn, count)
-            t, line = rows[r, 0], (count, r)
-            state = select(h, w, n, rows[r], pieces[r])
+        every, uneven, states = rows.shape[0], -1, rows.shape[0] * columns_before_state(h)
+        for turn in range(every):
+            r = place_of(turn, every)
+            first, last = r - r % APART - APART, r - r % APART + 2 * APART
+            foreseen = tolerance != AS_RECORDED and r % APART > 0 and first >= 0 and last < every and first != uneven
+            foreseen = foreseen and even(rows, first, last)
+            while True:
+                state = select(h, w, n, rows[r], pieces[r])
+                if tolerance == AS_RECORDED:
+                    place(h, f, w, n, rows[r, 0])
+                    break
+                foreseen = foreseen and foresee(h, w, rows, r, state, out, states)
+                evaluate(h, f, w, n, rows[r, 0], h[m.Y], h[m.SLOPES])
+                if not foreseen or open_by(h, w) <= tolerance:
+                    close(h, f, w, n, rows[r, 0], tolerance)
+                    break
+                uneven, foreseen = first, False  # as where a step ends
+            kinematics(h, f, w)  # at the accelerations in DU
             if tolerance == AS_RECORDED:
-                place(h, f, w, n, t)
+                copy(h, w, out, every, r, 0, True)
             else:
-                first, last = r - r % APART - APART, r - r % APART + 2 * APART
-                foreseen = r % APART > 0 and first >= 0 and last < count and first != uneven and even(rows, first, last)
-                foreseen = foreseen and foresee(h, w, rows, r, state, out)
-                evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
-                if foreseen and not open_by(h, w) <= tolerance:
-                    uneven = first  # as where a step ends
-                    select(h, w, n, rows[r], pieces[r])
-                    evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
-                close(h, f, w, n, t, tolerance)
-                if n[m.EVALUATION] == m.OK:
-                    keep_scales(h, w)
-            # at the accelerations in DU; written once, since twice would be compiled twice
-            kinematics(h, f, w)
-            if tolerance == AS_RECORDED:
-                copy_frames(h, w, out, 0, line)
-            else:
-                copy_all(h, f, w, n, out, line)
+                copy(h, w, out, every, r, store(h, f, w, n, out, every, r), False)
 
     return observe

@@ -36,9 +36,7 @@ class Motion:
         r = turned(self.R, arm)
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing)
-        return Motion(
-            self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha
-        )
+        return Motion(self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha)
 
     def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
         """Motion of a point that moves in the body: its place, rate and second rate there, (time, 3)."""

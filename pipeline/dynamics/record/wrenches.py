@@ -95,7 +95,7 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     acting = [(_joined(model, joint), wrench) for joint, wrench in known.items()]
     places = {name: k for k, name in enumerate(motions.moving_bodies)}
     for part in beyond:
-        demand = sum(motions.seen.body_demand[:, places[body]] for body in part.bodies)
+        demand = np.sum([motions.seen.body_demand[:, places[body]] for body in part.bodies], axis=0)
         moment, force = demand[:, :3], demand[:, 3:]
         for (first, second), (n, f) in acting:
             out, into = first in part.bodies, second in part.bodies

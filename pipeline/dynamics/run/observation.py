@@ -99,5 +99,8 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -
             if not np.any(seen["status"]):
                 turned = seen["body_quaternion"].reshape(len(SIDES), -1, 4)
                 seen["body_quaternion"] = continued(turned).reshape(len(SIDES), -1)
-                return {name: WEIGHTS @ block for name, block in seen.items()}
+                limit = {name: WEIGHTS @ block for name, block in seen.items()}
+                mean = limit["body_quaternion"].reshape(-1, 4)
+                limit["body_quaternion"] = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).ravel()
+                return limit
     return None

@@ -1,8 +1,8 @@
 """The wiring of a mechanism as its specialised code depends on it, and what the code keeps apart from it.
 
-Sizes and tables of h, without those that only laws of time, error norms and the record read. Where w and f keep what is none of it:
-stretches of arrays are known by their place in the header, so that one code serves every integrator and any number of
-pieces of laws.
+Sizes and tables of h, without those that only laws of time, error norms and the record read. Where w and f keep what
+is none of it: stretches of arrays are known by their place in the header, so that one code serves every integrator and
+any number of pieces of laws.
 """
 
 from __future__ import annotations
