@@ -238,6 +238,7 @@ def report(scene: Scene | str | Path) -> Path:
 def open(scene: Scene | str | Path) -> xr.DataTree:
     """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
 
+    `post` is left out while it is derived from another run than `run`, which `fc.run` of a changed scene makes alone.
     The path of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that one, under the file's name.
     Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of a scene.
     """

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores, journal, stopping
-from flexclear.pipeline.dynamics.run import pace, sensitivity, trajectory
+from flexclear.pipeline.dynamics.run import pace, sensitivity, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.run import engine_of, follow
 from flexclear.pipeline.dynamics.run.sensitivity import Pair, Twin
@@ -106,10 +106,12 @@ def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: 
 
 
 @pytest.mark.usefixtures("two")
+@pytest.mark.parametrize("straight_from", [specialised.MANY, 500], ids=["kernels", "straight code"])
 def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
-    root: Path, monkeypatch: pytest.MonkeyPatch
+    straight_from: int, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact.  Only one thread tells of it."""
+    monkeypatch.setattr(specialised, "MANY", straight_from)
     monkeypatch.setattr(pace, "TRIAL", 1000)
     monkeypatch.setattr(pace, "HOPELESS", 1100)
     monkeypatch.setattr(trajectory, "SLICE", 100)

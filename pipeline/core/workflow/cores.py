@@ -15,6 +15,8 @@ from flexclear.pipeline.core.system import cores
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
 
 Result = TypeVar("Result")
+#: how long a thread is waited for before this one listens to the keyboard [s]: some systems interrupt no wait
+TICK = 0.1
 #: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
 BESIDE = 4
 
@@ -97,8 +99,12 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
         except BaseException as error:
             errors.append(error)
 
+    def ended() -> None:
+        while thread.is_alive():
+            thread.join(TICK)
+
     def result() -> Result:
-        thread.join()
+        ended()
         if errors:
             raise errors[0]
         return results[0]
@@ -112,4 +118,4 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
             given_up.set()
         raise
     finally:
-        thread.join()
+        ended()
