@@ -149,12 +149,13 @@ def follow(
 ) -> tuple[Engine, Trajectory, str]:
     """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
 
-    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`.
+    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`;
+    none looks at an integrator that a run comes back to.
     """
-    left, reasons = None, list[str]()
+    left, reasons, judges = None, list[str](), dict(judges or {})
     while True:
         traits = engine.method.traits
-        judge, heir = (judges or {}).get(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
+        judge, heir = judges.pop(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
         try:
             return engine, stepping.integrate(engine, y, progress, left=left, judge=judge), "\n".join(reasons)
         except StiffError as stiff:
