@@ -41,14 +41,16 @@ LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 APART = 4.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
-CHEAP, WORTH, CRAWLING = 300.0, 2000.0, 300_000.0
+CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
 #: what the stiff method is taken to cost where nothing is known of it
 UNKNOWN = 100_000.0
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
 #: is only tried
 CLEARLY, TRIED = 3.0, 1.5
-#: least evaluations between two looks
-LEAST_LOOK = 200
+#: evaluations between two looks, as a share of those foreseen, and at least
+LOOK, LEAST_LOOK = 0.02, 200
+#: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
+AGAIN = 10.0
 #: relative step of the differences
 PERTURBATION = 1e-7
 
@@ -108,11 +110,10 @@ class Suit:
 
     def open(self, rtol: float) -> list[str]:
         """Integrators that can be taken at a tolerance, the first of equally cheap ones first."""
-        # what stability limits is dear at all tolerances, what accuracy limits at tighter ones
         left = [
             name
             for name in (VIBRATING, DEFAULT, STIFF)
-            if name in self.names and not (name in self.missed and (name == DEFAULT or rtol <= self.missed[name]))
+            if name in self.names and not self._dropped(name, rtol)
         ]
         if VIBRATING in left and VIBRATING not in self.seen and not self._vibrates():
             left.remove(VIBRATING)
@@ -122,6 +123,10 @@ class Suit:
             if not tried:
                 left.remove(STIFF)
         return left or [STIFF]
+
+    def _dropped(self, name: str, rtol: float) -> bool:
+        """What stability limits is dear at all tolerances, what accuracy limits at tighter ones."""
+        return name in self.missed and (name == DEFAULT or rtol < AGAIN * self.missed[name])
 
     def _vibrates(self) -> bool:
         """Whether the modes' vibrations alone make the default method dear."""
@@ -133,7 +138,11 @@ class Suit:
 
     def heir(self, name: str, rtol: float) -> tuple[str, float]:
         """What goes on where an integrator is too dear, if any, and what that one is foreseen to take."""
-        others = [one for one in (DEFAULT, STIFF) if one != name and one not in self.missed]
+        others = [
+            one
+            for one in self.names
+            if one != name and not self._dropped(one, rtol) and (one != VIBRATING or one in self.seen)
+        ]
         foreseen = {one: self.cost(one, rtol) or UNKNOWN for one in others}
         best = min(foreseen, key=foreseen.__getitem__, default="")
         return best, foreseen.get(best, 0.0)
@@ -173,7 +182,7 @@ class Suit:
             heir, most = self.heir(name, rtol)
             if not heir:
                 continue
-            every = max(int(0.1 * most), LEAST_LOOK)
+            every = max(int(LOOK * most), LEAST_LOOK)
             found[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
         return found
 
