@@ -42,8 +42,8 @@ APART = 4.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
 CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
-#: what the stiff method is taken to cost where nothing is known of it
-UNKNOWN = 100_000.0
+#: what the stiff method is taken to cost where nothing is known of it, at a tolerance and at looser ones
+UNKNOWN, AT = 20_000.0, 1e-4
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
 #: is only tried
 CLEARLY, TRIED = 3.0, 1.5
@@ -68,7 +68,8 @@ class Suit:
     """What is known of a scene's costs.
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
-    loosest tolerance at which a run with it has been handed on.  touching: whether there are contacts.
+    loosest tolerance at which a run with it has been handed on.  told: by integrator, what the present run was foreseen
+    to take when it was handed on from it.  touching: whether there are contacts.
     """
 
     rates: Rates
@@ -76,6 +77,7 @@ class Suit:
     names: tuple[str, ...]
     seen: dict[str, dict[float, float]] = field(default_factory=dict)
     missed: dict[str, float] = field(default_factory=dict)
+    told: dict[str, float] = field(default_factory=dict)
     touching: bool = False
 
     @property
@@ -110,19 +112,19 @@ class Suit:
 
     def open(self, rtol: float) -> list[str]:
         """Integrators that can be taken at a tolerance, the first of equally cheap ones first."""
-        left = [
-            name
-            for name in (VIBRATING, DEFAULT, STIFF)
-            if name in self.names and not self._dropped(name, rtol)
-        ]
+        left = [name for name in (VIBRATING, DEFAULT, STIFF) if name in self.names and not self._dropped(name, rtol)]
         if VIBRATING in left and VIBRATING not in self.seen and not self._vibrates():
             left.remove(VIBRATING)
-        known = [self.cost(name, rtol) for name in left if name in self.seen]
-        if STIFF not in self.seen and DEFAULT in left:
-            tried = min(known) > WORTH if known else VIBRATING not in left and self.least > CRAWLING
-            if not tried:
+        others = [self.cost(name, rtol) for name in left if name != STIFF]
+        if STIFF in left and STIFF not in self.seen and others:
+            enough = WORTH * self._growth(rtol) if DEFAULT in self.seen else CRAWLING
+            if not min(others) > enough:
                 left.remove(STIFF)
         return left or [STIFF]
+
+    def _growth(self, rtol: float) -> float:
+        """By how much more evaluations the stiff method takes than at a loose tolerance, by its order."""
+        return float(max(AT / rtol, 1.0) ** (1.0 / (ORDERS[STIFF] + 1.0)))
 
     def _dropped(self, name: str, rtol: float) -> bool:
         """What stability limits is dear at all tolerances, what accuracy limits at tighter ones."""
@@ -143,7 +145,7 @@ class Suit:
             for one in self.names
             if one != name and not self._dropped(one, rtol) and (one != VIBRATING or one in self.seen)
         ]
-        foreseen = {one: self.cost(one, rtol) or UNKNOWN for one in others}
+        foreseen = {one: self.cost(one, rtol) or UNKNOWN * self._growth(rtol) for one in others}
         best = min(foreseen, key=foreseen.__getitem__, default="")
         return best, foreseen.get(best, 0.0)
 
@@ -151,15 +153,17 @@ class Suit:
         """The reason in words."""
         name, most = self.best(rtol), f"{self.by_stability:.2g} evaluations for {DEFAULT} to be stable"
         known = [
-            f"{other} took {n:.0f} at {at:.1e}"
+            f"{other} takes {n:.0f} at {at:.1e}"
             for other, runs in self.seen.items()
             if other != name
             for at, n in [min(runs.items(), key=lambda run: abs(np.log(run[0] / rtol)))]
         ]
-        if name in self.seen and known:
-            return f"{name}: at a relative tolerance of {rtol:.1e} it is foreseen to be the cheapest; {', '.join(known)}"
         if name == STIFF and DEFAULT in self.missed:
             return f"{STIFF}: stability limited the steps of {DEFAULT} in a run before"
+        if name in self.seen and known:
+            return (
+                f"{name}: at a relative tolerance of {rtol:.1e} it is foreseen to be the cheapest; {', '.join(known)}"
+            )
         if name == STIFF and known:
             return f"{STIFF}: tried, as {', '.join(known)} evaluations"
         if name == STIFF:
@@ -170,14 +174,13 @@ class Suit:
                 f"with them followed exactly, the fastest rate is {self.rates.held:.3g} 1/s"
             )
         if VIBRATING in self.missed:
-            return (
-                f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed over to it"
-            )
+            return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self, rtol: float) -> dict[str, tuple[Judge, str]]:
         """By integrator, who looks whether its run goes as foreseen, and which one goes on if not."""
         found = {}
+        self.told.clear()
         for name in self.names:
             heir, most = self.heir(name, rtol)
             if not heir:
@@ -193,10 +196,12 @@ class Suit:
         def verdict(engine: Engine, looks: Sequence[Look]) -> str:
             if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
                 return ""
-            enough = most / DEARER[name]
+            # what has been handed on from in this run already was seen to take more than was foreseen
+            enough = max(most, DEARER[heir] * self.told.get(heir, 0.0)) / DEARER[name]
             whole = pace(looks, CLEARLY * enough) * self.span
             if whole < (TRIED if tried else CLEARLY) * enough:
                 return ""
+            self.told[name] = whole
             if name == DEFAULT:
                 return refusal.stiffness(engine.n, engine.control)
             return (
@@ -208,10 +213,11 @@ class Suit:
 
     def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
         """Remember what a run that began with an integrator took."""
-        if run.attrs["method"] != name:
+        if DEFAULT in self.told:  # where stability sets the pace, it tells what the whole run would have taken
+            self.seen.setdefault(DEFAULT, {})[rtol] = self.told[DEFAULT]
+        if run.attrs["method"] != name and not (name == DEFAULT and name in self.told):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))
-        else:
-            self.seen.setdefault(name, {})[rtol] = float(run.attrs["evaluations"])
+        self.seen.setdefault(run.attrs["method"], {})[rtol] = float(run.attrs["evaluations"])
 
 
 #: powers of the step with which the error estimates fall
@@ -250,4 +256,3 @@ def rates(engine: Engine, y: np.ndarray) -> Rates:
 
 def _fastest(J: np.ndarray) -> float:
     return float(np.abs(np.linalg.eigvals(J)).max(initial=0.0))
-
