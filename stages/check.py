@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -161,9 +162,12 @@ def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
 def _assembled(scene: Scene) -> None:
     """Build the mechanism of a scene: poses, axes and loads are then checked against the joints.
 
+    Where the scene begins at a state that is looked for, that is the mechanism whose joints place the bodies there.
     Of bodies from recipes of beams, which are meshed in no time, mass and frames are known without their modes; of
     flexible ones it is looked whether the joints fit where nothing is deformed.
     """
+    from flexclear.pipeline.core.registry import module_of
+    from flexclear.pipeline.dynamics.effects import STARTS
     from flexclear.pipeline.dynamics.model.assembly import assembled
     from flexclear.pipeline.dynamics.model.mechanism import build
     from flexclear.pipeline.dynamics.model.model import tabulate
@@ -174,6 +178,8 @@ def _assembled(scene: Scene) -> None:
         table = scene.model_dump(mode="python", exclude_none=True)
         table["body"] = s3_rigid.filled(table["body"], meshed)
         scene = type(scene).model_validate(table)
+    if scene.start is not None and scene.start.at is not None:
+        scene = import_module(module_of(STARTS, scene.start.at)).placed(scene)
     if scene.flexible():
         assembled(build(scene, {name: bodies[name] for name in scene.flexible()}))
     else:

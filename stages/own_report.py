@@ -48,7 +48,12 @@ STABILITY = {
     "redundant_closure_rows": "conditions of closed loops that follow from the others",
     "accuracy_verdict": "accuracy asked for",
 }
-PROVENANCE = {"scene": "scene", "versions": "versions of the libraries", "Conventions": "conventions of the datasets"}
+PROVENANCE = {
+    "scene": "scene",
+    "source": "made by",
+    "versions": "versions of the libraries",
+    "Conventions": "conventions of the datasets",
+}
 
 
 def make(graph: Graph, place: Workplace, *, folder: bool = False) -> Path:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
-from flexclear.pipeline.core.artifacts.store import PARTIAL, write_dataset
+from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
 from flexclear.pipeline.core.errors import InputError, InputErrors, SolverError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.demand import check_run
@@ -161,9 +161,18 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
+    if _of_another_run(folder):
+        files = [path for path in files if path != folder / "post.nc"]
     # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
     tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.load_dataset(path) for path in files}
     return xr.DataTree.from_dict(tree, name=folder.name)
+
+
+def _of_another_run(folder: Path) -> bool:
+    """Whether the shown post.nc was derived from another run than is shown, as after `fc.run` of a changed scene."""
+    store, where = Store(results_root()), folder.relative_to(results_root()).as_posix()
+    post, made = store.last(where, "post"), store.last(where, "simulate")
+    return post is not None and made is not None and post.facts.get("input run") != made.digest
 
 
 def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:

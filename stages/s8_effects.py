@@ -30,6 +30,8 @@ def task(
     scene: Scene, effects: Sequence[Effect], chosen: Sequence[Quantity], watched: Mapping[Names, Task], members: int
 ) -> Task:
     """The task of all differences."""
+    from flexclear.pipeline.dynamics.model.driving import unit_of
+
     return Task(
         stage="effects",
         scene=scene.name,
@@ -39,6 +41,7 @@ def task(
             "title": scene.title,
             "effects": [[effect.name, effect.kind, effect.within] for effect in effects],
             "quantities": [[q.owner, q.kind] for q in chosen],
+            "units": [unit_of(scene, q) for q in chosen],
             "variants": [sorted(gone) for gone in watched],
             "owners": [{k: list(v) for k, v in _variant(scene, effects, gone).owners().items()} for gone in watched],
             "members": members,
@@ -68,7 +71,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         kept = influence.kept(params["owners"][k], chosen)
         points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], kept)["point"]
     progress(None, "comparing")
-    found = influences.assemble(effects, chosen, points, params["members"])
+    found = influences.assemble(effects, chosen, points, params["members"], params["units"])
     title = f"What each effect does: {params['title']}"
     result: dict[str, Any] = {"nc": found} | files("effects", influences.table(found))
     return result | influences.chart("effects", found, title)

@@ -33,6 +33,8 @@ PAIR, LEAST_HALVED = 2, 4
 
 def task(scene: Scene) -> Task:
     """The plan of a scene; shown as ``plan.nc``."""
+    from flexclear.pipeline.dynamics.model.driving import unit_of
+
     rigid = edited(
         variants.without(scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]),
         {"accuracy": None},
@@ -51,7 +53,12 @@ def task(scene: Scene) -> Task:
         stage="plan",
         scene=scene.name,
         run="flexclear.stages.s8_plan:run",
-        params={"simulate": simulate, "title": scene.title, "elements": counts},
+        params={
+            "simulate": simulate,
+            "title": scene.title,
+            "elements": counts,
+            "units": {q.name: unit_of(scene, q) for q in scene.wanted()},
+        },
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
         modules=s4_simulate.modules(scene),
@@ -101,7 +108,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline.post.influences import chart
     from flexclear.pipeline.post.plotting.table import files
 
-    found = shown.dataset(decided(params, inputs, progress), params["title"])
+    found = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     progress(None, "chart")
     wanted = dict(zip(found["quantity"].values.tolist(), found["wanted"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": found} | files("plan", shown.table(found))

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core import integrators
 from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -145,8 +146,8 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(LOADS, load.type, f"[load.{name}]")
     if scene.start is not None and scene.start.at is not None:
         yield Named(STARTS, scene.start.at, "[start.at]")
-        for name, contact in contacts.items():
-            yield Named(JOINTS, contact.type.removeprefix("clearance-"), f"[joint.{name}]")
+        for name, contact in loose(scene).items():
+            yield Named(JOINTS, WITHOUT_CLEARANCE[contact.type], f"[joint.{name}]")
     for name in scene.output.requests():
         yield Named(RECORDS, name, "[output]")
 

@@ -13,7 +13,9 @@ Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the pla
 table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by what they hold (`record`).
 
-Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them share memory,
+and the compiler knows: what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes is
+never given one of them twice.
 
 Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
@@ -149,9 +151,13 @@ MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
-ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
-#: coupling: that this closure is, or -1
-CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept coupling")
+#: rows of the mass matrix. first: column; origin: place of column 0, which may lie before that of the first
+ENVELOPE = wiring("first origin")
+#: threes: of rows that are solved for, which stand side by side in JACOBIAN and SPREAD and are worked on together; the
+#: last of them may end with zeros.  coupling: that this closure is, or -1
+CLOSURES = wiring(
+    "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling"
+)
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
 ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
@@ -159,7 +165,7 @@ KNOWN_ENTRIES = wiring("closure drive column sign part")
 COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
-CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
+CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
 #: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
 CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first

@@ -52,12 +52,16 @@ def closed_up(effects: Sequence[Effect], there: Names) -> Names:
 
 
 def assemble(
-    effects: Sequence[Effect], chosen: Sequence[Quantity], points: Mapping[Names, Point], members: int
+    effects: Sequence[Effect],
+    chosen: Sequence[Quantity],
+    points: Mapping[Names, Point],
+    members: int,
+    units: Sequence[str],
 ) -> xr.Dataset:
     """Influences over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
 
     On the diagonal of (effect, other) stands what one effect does alone.  points: by the effects that a variant lacks.
-    nan where a variant was refused; infinite where the quantity goes with the effect.
+    units: of the chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
     shape = (n, n, len(chosen))
@@ -87,7 +91,7 @@ def assemble(
             "other": [effect.name for effect in effects],
             "words": ("effect", [effect.words for effect in effects]),
             "quantity": [quantity.name for quantity in chosen],
-            "unit": ("quantity", [quantity.unit for quantity in chosen]),
+            "unit": ("quantity", list(units)),
         },
         attrs={"Conventions": "CF-1.11", "members": members},
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 
 import numpy as np
 import xarray as xr
@@ -12,13 +13,13 @@ from flexclear.pipeline.post.influences import written
 from flexclear.pipeline.post.plotting.table import Table
 
 
-def dataset(plan: Plan, title: str) -> xr.Dataset:
+def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     """Influences over (effect, quantity), decisions and evidence over effects, what is wanted over quantities; SI.
 
-    nan where nothing was estimated, infinite where nothing bounds it or the events differ.
+    units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
+    differ.
     """
     names = list(plan.wanted)
-    units = {name: _unit(name) for name in names}
     shape = (len(plan.decisions), len(names))
     estimate, doubt = (np.full(shape, np.nan) for _ in range(2))
     for i, decision in enumerate(plan.decisions):
@@ -85,12 +86,6 @@ def dataset(plan: Plan, title: str) -> xr.Dataset:
     for name, text in meanings.items():
         found[name].attrs = {"long_name": text}
     return found
-
-
-def _unit(name: str) -> str:
-    from flexclear.pipeline.core.scene.wanted import KINDS
-
-    return KINDS[name.rpartition(".")[2]].unit
 
 
 def drawn(found: xr.Dataset) -> xr.Dataset:

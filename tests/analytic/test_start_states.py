@@ -11,8 +11,10 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.starts import ideal
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.test_assembly import loose
 from tests.properties.test_dynamics_start import angles
@@ -163,3 +165,37 @@ def test_a_bar_on_a_loose_pin_that_begins_at_its_equilibrium_hangs_there() -> No
     run = simulate(load_scene(CHECKS / "clearance_pendulum.toml", changes))
     assert run.contact_normal_force.values[:, 0] == pytest.approx(1.0 * G, rel=1e-6)
     assert np.abs(run.velocity.values).max() < 1e-8
+
+
+def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_back_by_a_stop() -> None:
+    """The rod of the slider-crank begins as straight as that of its twin; a compressed one would hit its pin at once.
+
+    Pin and journal touch as deep as carries the force of the twin's joint. Of the two ways in which the twin can be
+    assembled where only the drive says how its crank stands, one is taken, and both are told.
+    """
+    template = TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml"
+    stop = {"joint": "guide", "upper": "0.4 m", "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1e8}}
+    unplaced = {f"body.{name}.pose": None for name in ("crank", "rod", "slider")}
+    law = {"type": "polynomial", "coefficients": ["20 deg", "100 rpm"]}
+    wanted = {**unplaced, "start": {"at": "ideal"}, "drive.motor.law": law, "stop": {"end": stop}}
+    scene = edited(load_scene(template), wanted)
+    begun, choice = ideal.begin(scene, bundles(scene), lambda share, text: None)
+    assert "assembled in 2 ways" in choice
+    assert begun.start is not None
+    # the twin's own are zero; pressing bends the rod by rounding of its length
+    assert np.abs(begun.start.modal["rod"].coordinate).max() < 1e-12
+    crank, rod = (begun.body[name].pose for name in ("crank", "rod"))
+    assert crank is not None
+    assert rod is not None
+    joint = begun.joint["pin"]
+    assert isinstance(joint, ClearanceRevolute)
+    pin = np.array(crank.position) + 0.05 * np.array([np.cos(np.radians(20.0)), np.sin(np.radians(20.0)), 0.0])
+    apart = np.linalg.norm(pin - rod.position)
+    assert joint.clearance < apart < 1.01 * joint.clearance
+    assert joint.initial_approach_speed == 0.0
+
+
+def test_a_start_as_without_clearance_needs_a_joint_that_has_an_ideal_counterpart() -> None:
+    scene = load_scene(CHECKS / "scotch_yoke.toml", {"start.at": "ideal"})
+    with pytest.raises(InputError, match=r"\[start.at\].*slot, free none has an ideal counterpart"):
+        ideal.placed(scene)

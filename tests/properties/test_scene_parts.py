@@ -11,13 +11,18 @@ import pytest
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
+from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.wanted import parse
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.model.driving import unit_of
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.stages import s4_simulate
+
+TREE = Path(__file__).resolve().parents[2]
 
 SCENE = """
 title = "wrong"
@@ -215,3 +220,32 @@ def test_the_schema_names_every_part() -> None:
     text = str(Scene.model_json_schema())
     known: Any = ("universal", "planar", "harmonic", "spline", "point-force", "joint-friction", "actuators")
     assert [word for word in known if word not in text] == []
+
+
+def test_an_edit_takes_parts_and_keys_away_and_refuses_those_that_are_not_there() -> None:
+    scene = load_scene(TREE / "scenes" / "checks" / "clearance_pendulum.toml")
+    assert edited(scene, {"joint.hinge": None, "ensemble": None}).joint == {}
+    joint = edited(scene, {"joint.hinge.friction": None}).joint["hinge"]
+    assert isinstance(joint, ClearanceRevolute)
+    assert joint.friction is None
+    with pytest.raises(InputError, match=r"there is no 'joint\.hing'"):
+        edited(scene, {"joint.hing": None})
+
+
+def test_forces_along_angles_have_the_unit_of_torques_before_anything_is_run() -> None:
+    scene = load_scene(TREE / "stages" / "templates" / "slider_crank" / "slider_crank.toml")
+    law = {"law": "flores", "restitution": 0.5, "stiffness": 1e8}
+    stops = {
+        "way": {"joint": "guide", "upper": 0.4, "normal": law},
+        "turn": {"joint": "main", "upper": 7.0, "normal": law},
+    }
+    scene = edited(scene, {"stop": stops})
+    names = (
+        "motor.drive_force",
+        "turn.upper.peak_force",
+        "turn.upper.impulse",
+        "way.upper.peak_force",
+        "slider.velocity",
+    )
+    units = [unit_of(scene, parse(name, scene.owners())) for name in names]
+    assert units == ["N m", "N m", "N m s", "N", "m/s"]

@@ -169,3 +169,16 @@ def test_a_dataset_is_opened_by_its_path(root: Path, tmp_path: Path) -> None:
 def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
     assert set(fc.__all__) == set(fc.pipeline.__all__) <= set(dir(fc))
     assert all(getattr(fc, name) is getattr(fc.pipeline, name) for name in fc.__all__)
+
+
+def test_a_tree_leaves_out_what_is_derived_from_another_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    scene, *_ = write("pendulum", tmp_path)
+    scene.write_text(re.sub('(?m)^end = "2 s"', 'end = "4 ms"', scene.read_text()))
+    assert main(["run", "-q", str(scene)]) == 0
+    assert "post" in fc.open("pendulum")
+    scene.write_text(scene.read_text().replace('end = "4 ms"', 'end = "6 ms"'))
+    fc.run(fc.load_scene(scene))
+    assert "post" not in fc.open("pendulum")
+    assert float(fc.open("pendulum")["run"]["time"][-1]) == 6e-3

@@ -77,13 +77,19 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
 
 
 def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted places changed, as in `load_scene`; None takes a setting or a part away."""
+    """A copy of a scene with dotted places changed, as in `load_scene`; None takes a setting, a part or a key away.
+
+    Raises InputError for a part or key that is not there; a setting may be missing already.
+    """
     table = scene.model_dump(mode="json", exclude_none=True)
     for place, value in override.items():
         if value is not None:
             _put(table, place, value, f"edit of {scene.name}")
-        elif place in table:
-            del table[place]
+        elif "." in place:
+            owner, last = _find(table, place, f"edit of {scene.name}")
+            del owner[last]
+        else:
+            table.pop(place, None)
     _absolute_files(table, scene._path or Path.cwd() / "scene")
     result = _read(table, Path(scene.name))
     result._name, result._path = scene._name, scene._path

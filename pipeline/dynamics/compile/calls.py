@@ -55,9 +55,10 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
-    if not INTERPRETED and looked_at():
-        import_module("flexclear.pipeline.dynamics.lowering")  # before anything is compiled: it spares Numba an import
-    return compiles(cfunc(SIGNATURES[name], error_model="numpy"))
+    options: dict[str, Any] = {"error_model": "numpy"}
+    if not INTERPRETED and looked_at():  # before anything is compiled: it spares Numba an import
+        options["pipeline_class"] = import_module("flexclear.pipeline.dynamics.lowering").WholeCompiler
+    return compiles(cfunc(SIGNATURES[name], **options))
 
 
 if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for places

@@ -24,7 +24,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported, library_version
+from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version, sources_of
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
@@ -34,7 +34,7 @@ from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
-SOURCES = Sources(TREE)
+SOURCES = sources_of(TREE)
 #: what the functions are to who waits for them
 WORDS = {
     "evaluate": "equations of motion",
@@ -262,14 +262,11 @@ def reached(source: str) -> dict[str, str]:
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
     found: dict[str, str] = {}
-    waiting = sorted(imported(source.encode(), "entry", package=False)[0])
+    waiting = sorted(sources.imported(source))
     while waiting:
         name = waiting.pop()
-        module = SOURCES.module(name)
-        package = (SOURCES.root / Path(*name.split("."))).is_dir()
-        if module is None or name in found or not name.startswith(CODE):
-            continue
-        if not package:
+        module = SOURCES.module(name) if name.startswith(CODE) and name not in found else None
+        if module is not None and not module.package:
             found[name] = module.digest
             waiting.extend(module.own)
     return found

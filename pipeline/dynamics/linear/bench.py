@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import observation, singular
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
-from flexclear.pipeline.dynamics.run.run import driven
+from flexclear.pipeline.dynamics.run.run import begun, driven
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT
 
 #: drives reach the wanted pose in strides of this share of the mechanism's size, or this angle
@@ -84,7 +84,7 @@ def hold(
     moving: whether the drives keep the speed they have at that time.
     Raises InputError for unknown drives, SolverError when the loops cannot be closed there.
     """
-    moved, given = driven(scene, bundles, progress)
+    moved, given = driven(begun(scene, bundles, progress)[0], bundles, progress)
     model = tabulate(build(moved, bundles), given)
     arrays = replace(model.arrays, h=model.arrays.h.copy(), f=model.arrays.f.copy())
     engine = prepare(replace(model, arrays=arrays), progress)

@@ -132,7 +132,7 @@ def misfit(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
 
 
 def _centre(link: Link) -> np.ndarray:
-    return link.inertia.com if link.inertia is not None else np.zeros(3)
+    return link.undeformed.com if link.undeformed is not None else np.zeros(3)
 
 
 def _mobilities(mechanism: Mechanism, poses: Sequence[Placement], still: Collection[int]) -> np.ndarray:
@@ -140,10 +140,10 @@ def _mobilities(mechanism: Mechanism, poses: Sequence[Placement], still: Collect
     L, result = mechanism.length, []
     largest = max((link.mass for link in mechanism.links[1:]), default=1.0)
     for i, link in enumerate(mechanism.links[1:], start=1):
-        if link.massless or i in still:
+        if link.undeformed is None or i in still:
             result += [0.0] * 6
             continue
-        moment = float(np.linalg.eigvalsh(link.inertia.moments)[0]) if link.inertia is not None else 0.0
+        moment = float(np.linalg.eigvalsh(link.undeformed.moments)[0])
         result += [largest / max(moment / L**2, link.mass * LEAST_GYRATION**2)] * 3 + [largest / link.mass] * 3
     return np.array(result)
 

@@ -99,6 +99,12 @@ def turns(scene: Scene, quantity: Quantity) -> bool:
     return False
 
 
+def unit_of(scene: Scene, quantity: Quantity) -> str:
+    """The SI unit of a quantity, forces along angles being torques; `core.quantities.unit` tells it of a run."""
+    force = "N m" if turns(scene, quantity) else "N"
+    return {"drive_force": force, "peak_force": force, "impulse": f"{force} s"}.get(quantity.kind, quantity.unit)
+
+
 def joint_drives(scene: Scene) -> dict[str, tuple[str | None, ...]]:
     """Driven joint -> the drive of each of its coordinates, or None."""
     driven: dict[str, tuple[str | None, ...]] = {}

@@ -121,6 +121,17 @@ class Link:
             return float(self.bundle["mass"])
         return 0.0 if self.inertia is None else self.inertia.mass
 
+    @cached_property
+    def undeformed(self) -> RigidInertia | None:
+        """Mass, centre of mass and inertia about it in the link's frame where nothing is deformed; None if massless."""
+        if self.bundle is None:
+            return self.inertia
+        if "inertia" in self.bundle:  # no modes are known, only what is rigid
+            return RigidInertia(self.mass, self.bundle["com"].values, self.bundle["inertia"].values)
+        com = self.bundle["first_moment"].values / self.mass
+        second = self.bundle["second_moment"].values - self.mass * np.outer(com, com)
+        return RigidInertia(self.mass, com, np.trace(second) * np.eye(3) - second)
+
     @property
     def massless(self) -> bool:
         """Whether it only stands between two freedoms of a joint, or is the ground."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import moved
@@ -129,6 +130,8 @@ def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
         if isinstance(joint, End):
             unit = "rad" if joint.coordinate.turning else "m"
             found, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+        elif contact.name in loose(engine.model.scene):
+            remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
         raise InputError(
             f"[{contact.place}]",
             found,

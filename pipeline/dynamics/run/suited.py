@@ -47,6 +47,9 @@ UNKNOWN, AT = 20_000.0, 1e-4
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
 #: is only tried
 CLEARLY, TRIED = 3.0, 1.5
+#: where a method has used this share of what the other one is foreseen to take, it must be twice as many times dearer,
+#: earlier still more: starts may be hasty
+EARLY = 0.1
 #: evaluations between two looks, as a share of those foreseen, and at least
 LOOK, LEAST_LOOK = 0.02, 200
 #: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
@@ -199,7 +202,8 @@ class Suit:
             # what has been handed on from in this run already was seen to take more than was foreseen
             enough = max(most, DEARER[heir] * self.told.get(heir, 0.0)) / DEARER[name]
             whole = pace(looks, CLEARLY * enough) * self.span
-            if whole < (TRIED if tried else CLEARLY) * enough:
+            used = max(looks[-1].evaluations - looks[0].evaluations, 1)
+            if whole < (TRIED if tried else CLEARLY) * (1.0 + EARLY * enough / used) * enough:
                 return ""
             self.told[name] = whole
             if name == DEFAULT:

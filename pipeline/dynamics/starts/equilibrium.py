@@ -19,17 +19,18 @@ from flexclear.pipeline.dynamics.model.start_table import given_coordinates
 from flexclear.pipeline.dynamics.starts.snapshot import posed, resting
 
 
-def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Scene:
-    """The scene at its equilibrium; velocities stay as the scene gives them.
+def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
+    """The scene at its equilibrium, and how it was assembled; velocities stay as the scene gives them.
 
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium near its poses.
     """
-    bench, rest = equilibrium(_held(scene), bundles, progress, None, None, False)
+    bench, rest = equilibrium(placed(scene), bundles, progress, None, None, False)
     progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
-    return resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time))
+    found = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
+    return found, bench.engine.model.mechanism.choice
 
 
-def _held(scene: Scene) -> Scene:
+def placed(scene: Scene) -> Scene:
     """The scene with the joint coordinates whose position it gives held by drives, and nothing else of its start but
     hints.
     """

@@ -1,7 +1,8 @@
 """A run with clearance that begins as its ideal twin does: its pose and velocities, pins at rest in their sockets.
 
-The twin has ideal joints in the place of those with clearance. The force that such a joint carries at the start presses
-the pin onto one side of its socket, and so deep into it that the contact carries that force.
+The twin has ideal joints in the place of pins and balls with clearance. The force that such a joint carries at the
+start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Slots and
+planes have no ideal joint in their place: they stay as they are, and what touches them where the poses put it.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import Start
@@ -25,38 +26,48 @@ from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.run import driven
-from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian
+from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
 #: a pin is in its place when it is this share of the clearance from it; passes in which that is reached, at most
 THERE, PASSES = 1e-9, 20
 #: forces below this share of the weight press nothing: the pin stays in the middle
 NOTHING = 1e-9
+#: singular values below this share of the largest are rounding
+RANK = 1e-9
 
 
-def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Scene:
-    """The scene as its ideal twin starts; one without clearance is its own twin.
+def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
+    """The scene as its ideal twin starts, and how that was assembled; one without clearance is its own twin.
 
     Raises InputError for a twin that cannot be built, SolverError when the pins cannot be put where they are pressed.
     """
-    twin, t = _ideal(scene), scene.time.start
+    twin, t = placed(scene), scene.time.start
     engine, y = _started(twin, bundles, progress)
     forces = _forces(scene, engine, y)
-    concentric = moving(scene, engine, y, t)
+    concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
     if not scene.contacts():
-        return concentric
-    loose, y = _started(concentric, bundles, progress)
-    y = _pressed(loose, y, forces)
-    return resting(moving(concentric, loose, y, t))
+        return concentric, choice
+    engine, y = _started(concentric, bundles, progress)
+    y = _pressed(engine, y, forces)
+    return resting(moving(concentric, engine, y, t), loose(scene)), choice
 
 
-def _ideal(scene: Scene) -> Scene:
-    """The scene with ideal joints only."""
-    kinds = {name: joint.type.removeprefix("clearance-") for name, joint in scene.contacts().items()}
+def placed(scene: Scene) -> Scene:
+    """The scene with ideal joints in the place of those that have such a counterpart.
+
+    Raises InputError where it has contacts, and none of them has one.
+    """
+    if scene.contacts() and not loose(scene):
+        raise InputError(
+            "[start.at]",
+            f"is 'ideal', but of {', '.join(scene.contacts())} none has an ideal counterpart, as pins and balls do",
+            "leave it out, and place the bodies by poses or [start.joint]",
+        )
     joints = scene.joint | {
-        name: IdealJoint.model_validate({"type": kind, "between": scene.joint[name].between})
-        for name, kind in kinds.items()
+        name: IdealJoint.model_validate({"type": WITHOUT_CLEARANCE[joint.type], "between": joint.between})
+        for name, joint in loose(scene).items()
     }
     start = (scene.start or Start()).model_copy(update={"at": None})
     return scene.model_copy(update={"joint": joints, "start": start})
@@ -82,13 +93,14 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
     """The state nearby in which every pin is where the force on it presses it."""
     model, contacts = engine.model, engine.model.arrays.table(m.CONTACTS)
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
+    pins = [contact.name in loose(model.scene) for contact in model.contacts]
+    bent = y[_modes(engine)]
     for _ in range(PASSES):
         engine.evaluate(y, engine.start)
         sites, missing = engine.table(m.SITE_FRAMES), []
-        for row, contact, law in zip(contacts, model.contacts, model.laws, strict=True):
-            if not isinstance(contact.joint, Clearance):
-                missing.append(np.zeros(3))  # the end of a stop
-                continue
+        for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
+            if not pin:
+                continue  # the end of a stop may move, too: asked to stay, it would hold the pins back
             outer, inner = sites[row["outer"]], sites[row["inner"]]
             force, offset = forces[contact.name], inner["origin"] - outer["origin"]
             if contact.joint.type == "clearance-revolute":
@@ -98,11 +110,37 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
             depth = (size / law.numbers[0]) ** (1.0 / law.exponent)
             there = -force / size * (contact.joint.clearance + depth) if size > NOTHING * weight else 0.0 * force
             missing.append(there - offset)
-        least = min(c.joint.clearance for c in model.contacts if isinstance(c.joint, Clearance))
+        least = min(joint.clearance for joint in loose(model.scene).values())
         if np.max(np.abs(missing)) <= THERE * least:
             return y
-        y = perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(missing))
+        y = _moved(engine, y, pins, np.concatenate(missing), bent)
     raise SolverError(
         f"at t = {engine.start:.6g} s: the pins cannot be put where their joints' forces press them; "
         "give poses and velocities instead of [start] at = 'ideal'"
     )
+
+
+def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, bent: np.ndarray) -> np.ndarray:
+    """The state with the pins moved by `offsets` (3 each) [m], and modal coordinates as near to `bent` as that allows.
+
+    The least motion alone would bend rods by some of the clearance, and the run begin with the blow of their springing
+    back: a stiff one is under kilonewtons then.
+    """
+    engine.select_pieces_after(engine.start)
+    nq, nv, modes = engine.model.nq, engine.model.nv, _modes(engine)
+    still = rates_at_speeds(engine, y, np.zeros(nv))[:nq]
+    ways = np.array([rates_at_speeds(engine, y, unit)[:nq] - still for unit in np.eye(nv)]).T
+    jacobian = offset_jacobian(engine, y)[np.repeat(pins, 3)]
+    speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=RANK)
+    if modes:
+        free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that leave the pins where they are
+        bending = bent - y[modes] - ways[modes] @ speeds
+        speeds += free @ np.linalg.lstsq(ways[modes] @ free, bending, rcond=RANK)[0]
+    moved = y.copy()
+    moved[:nq] += ways @ speeds
+    return project(engine, moved)
+
+
+def _modes(engine: Engine) -> list[int]:
+    """Where in the state the modal coordinates of flexible bodies are."""
+    return [k for mine in engine.model.numbering.modal_positions.values() for k in mine]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -60,15 +61,14 @@ def moving(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
     return still.model_copy(update={"body": bodies, "start": start})
 
 
-def resting(scene: Scene) -> Scene:
-    """The scene with its contacts at rest, where they are closed at the start."""
-    joints = {
+def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
+    """The scene with these contacts at rest, where they are closed at the start."""
+    at_rest = {
         name: joint.model_copy(update={"initial_approach_speed": 0.0})
-        if isinstance(joint, Clearance) and joint.initial_approach_speed is None
-        else joint
-        for name, joint in scene.joint.items()
+        for name, joint in contacts.items()
+        if joint.initial_approach_speed is None
     }
-    return scene.model_copy(update={"joint": joints})
+    return scene.model_copy(update={"joint": scene.joint | at_rest})
 
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:

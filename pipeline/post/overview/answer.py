@@ -9,15 +9,20 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.overview.curves import measured, rounded
+from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters
 
 #: a difference is told from none where it is so many times larger than both runs' own errors
 TOLD_APART = 2.0
 #: below this share of the largest value an effect is called slight
 SLIGHT = 0.01
+#: below this share, both runs' own errors included, there is none, as of a body that a drive leads
+NOTHING = 1e-6
 #: an energy that the ledger misses counts from this share of the largest energy on
 LEDGER = 1e-3
+NEITHER = "The scene has neither clearance nor flexible bodies"
 
 
 def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence[str]) -> str:
@@ -26,13 +31,12 @@ def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence
     compared: of `overview.comparison`, the ideal twin first and the scene last; None where there is none.
     run: schema RUN of the scene.  doubts: warnings of the run.
     """
-    said = [] if compared is None else [*_effects(compared), *_impacts(compared), *_horizon(compared)]
+    said = [] if compared is None else _effects(compared)
     if compared is None and run is not None:
-        said.append(
-            "The scene has neither clearance nor flexible bodies, so there is no idealised run to compare it with."
-        )
+        lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
+        said.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
-        said += _trust(run)
+        said += [*_impacts(run), *_horizon(run), *_trust(run)]
     if doubts:
         many = "one warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
         said.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
@@ -56,7 +60,9 @@ def _effects(compared: xr.Dataset) -> list[str]:
         value = measured(difference, error, unit)
         known = np.isfinite(share) and share < 100.0
         part = f", which is {rounded(100.0 * share, 2)} % of its largest value in the ideal run" if known else ""
-        if np.isfinite(error) and difference < TOLD_APART * error:
+        if np.isfinite(error) and difference + error < NOTHING * size:
+            told = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
+        elif np.isfinite(error) and difference < TOLD_APART * error:
             told = (
                 f"the runs are not exact enough to tell an effect: their difference ({value}) is less "
                 f"than {TOLD_APART:g} times their errors together"
@@ -69,26 +75,27 @@ def _effects(compared: xr.Dataset) -> list[str]:
     return found
 
 
-def _impacts(compared: xr.Dataset) -> list[str]:
+def _impacts(run: xr.Dataset) -> list[str]:
+    """A sentence for each contact of the scene, ends of stops among them."""
     found = []
-    last = compared.isel(run=compared.sizes["run"] - 1)
-    for k, name in enumerate(str(c) for c in last["contact"].values) if "contact" in last.coords else ():
-        count, peak = float(last["impact_count"][k]), float(last["peak_force"][k])
-        unit = str(last["peak_force_unit"].values[k])
-        if not np.isfinite(count):
-            continue
-        many = "No impact" if not count else "One impact" if count == 1 else f"{count:.0f} impacts"
+    for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
+        unit = quantities.unit(run, Quantity(name, "peak_force"))
+        count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
         found.append(
-            f"<b>{html.escape(name)}</b>: {many}; the contact {'force' if unit == 'N' else 'torque'} reaches "
-            f"<b class='n'>{measured(peak, np.nan, unit)}</b>."
+            f"<b>{html.escape(name)}</b>: {impacts(len(count)).capitalize()}; the contact "
+            f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
         )
     return found
 
 
-def _horizon(compared: xr.Dataset) -> list[str]:
-    end, horizon = float(compared["time"].values[-1]), float(compared["horizon"].values[-1])
+def _horizon(run: xr.Dataset) -> list[str]:
+    if "horizon" not in run:
+        return []
+    end, horizon = float(run["time"].values[-1]), float(run["horizon"])
     if horizon >= end:
-        return ["Runs that start almost equally stay together to the end, so every value of this run can be used."]
+        return [
+            "Runs that start almost equally stay together to the end: only its own error limits what this run says."
+        ]
     return [
         f"Runs that start almost equally differ visibly from <span class='n'>{1e3 * horizon:.4g} ms</span> on (the run "
         f"lasts <span class='n'>{1e3 * end:.4g} ms</span>). Later values are those of this one run; use averages over "

@@ -19,6 +19,7 @@ PREFIXES = {
     "m/s": ((1.0, "m/s"), (1e3, "mm/s"), (1e6, "µm/s")),
     "rad": ((180.0 / np.pi, "°"), (1e3, "mrad"), (1e6, "µrad")),
     "N": ((1e-3, "kN"), (1.0, "N"), (1e3, "mN")),
+    "s": ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")),
     "J": ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ"), (1e6, "µJ")),
 }
 #: kinds of which one component is drawn, that with the largest range
@@ -148,6 +149,11 @@ def measured(value: float, error: float, unit: str) -> str:
         return f"{rounded(value, 4)} ± {rounded(error, 2)} {written}"
     shown = max(places, 0)
     return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f} {written}"
+
+
+def impacts(count: int) -> str:
+    """How many impacts, in words."""
+    return "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
 
 
 def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:

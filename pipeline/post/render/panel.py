@@ -21,6 +21,8 @@ from flexclear.pipeline.post.render import joint_view
 
 #: a body that turns by less does not turn [degrees]
 STILL = 1e-3
+#: beside titles [pixels]
+MARGIN = 6.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,14 +69,25 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
         axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
         cursors.append((_dot(axes[2], 7), x, y))
-    for panel in axes:
-        panel.title.set_fontsize(8.2)
+    titles = [panel.set_title(panel.get_title(loc="left"), loc="left", fontsize=8.2) for panel in axes]
     figure.suptitle(" ", fontsize=13)  # keeps the place of the clock
     clock = figure.text(
         0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
     )
     canvas.draw()
+    for panel, title in zip(axes, titles, strict=True):
+        _fit(title, panel, canvas)
+    canvas.draw()
     return Panel(canvas, canvas.copy_from_bbox(figure.bbox), tuple(cursors), clock, run.time.values)
+
+
+def _fit(title: Any, axes: style.Axes, canvas: FigureCanvasAgg) -> None:
+    """Let a title that would be cut off at the right begin further left, and be smaller where it is wider than all."""
+    width, most = title.get_window_extent(canvas.get_renderer()).width, canvas.figure.bbox.width - 2.0 * MARGIN
+    if width > most:
+        title.set_fontsize(title.get_fontsize() * most / width)
+    left = min(axes.bbox.x0, MARGIN + max(most - width, 0.0))
+    title.set_x((left - axes.bbox.x0) / axes.bbox.width)
 
 
 def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
@@ -131,6 +144,7 @@ def _curve(
     time = 1e3 * run.time.values
     axes.plot(time, values, color=color, lw=width)
     axes.set(xlabel="time (ms)", xlim=(time[0], time[-1]))
+    axes.locator_params(axis="x", nbins=5)  # free, they change with the width that the layout leaves for their labels
     return _dot(axes, 6), time, values
 
 
