@@ -127,6 +127,15 @@ def test_where_the_explicit_method_is_dear_the_stiff_one_is_tried() -> None:
     assert dear.best(1e-14) == "dop853"
 
 
+def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
+    early, late = known(exponential=(1e-4, 5e4)), known(exponential=(1e-4, 5e4))
+    for suit, left in ((early, (4e4, 0.2)), (late, (4e4, 0.97))):
+        suit.told["exponential"], suit.left = 9e4, left
+        suit.learn(1e-5, "exponential", xr.Dataset(attrs={"method": "radau", "evaluations": 44_000}))
+    assert early.seen["radau"] == {1e-5: pytest.approx(5000.0)}
+    assert "radau" not in late.seen
+
+
 def looks(*pairs: tuple[float, int], stiff: float = 0.0) -> list[Look]:
     """Of a run that was at times [s] after so many evaluations, twelve a step, a share of the steps being stiff."""
     return [Look(time, used, used // 12, int(stiff * used / 12)) for time, used in pairs]

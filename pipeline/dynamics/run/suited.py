@@ -38,7 +38,7 @@ TOUCHING = 1.5
 #: least and largest power of the tolerance with which evaluations grow, as two runs tell
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
-APART = 4.0
+APART = 2.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
 CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
@@ -50,6 +50,8 @@ CLEARLY, TRIED = 3.0, 1.5
 #: where a method has used this share of what the other one is foreseen to take, it must be twice as many times dearer,
 #: earlier still more: starts may be hasty
 EARLY = 0.1
+#: what a method takes for the rest of a motion tells of it where that is more than half
+ENOUGH = 0.5
 #: evaluations between two looks, as a share of those foreseen, and at least
 LOOK, LEAST_LOOK = 0.02, 200
 #: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
@@ -72,7 +74,8 @@ class Suit:
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
     loosest tolerance at which a run with it has been handed on.  told: by integrator, what the present run was foreseen
-    to take when it was handed on from it.  touching: whether there are contacts.
+    to take when it was handed on from it.  left: evaluations and share of the motion when that happened last.
+    touching: whether there are contacts.
     """
 
     rates: Rates
@@ -81,6 +84,7 @@ class Suit:
     seen: dict[str, dict[float, float]] = field(default_factory=dict)
     missed: dict[str, float] = field(default_factory=dict)
     told: dict[str, float] = field(default_factory=dict)
+    left: tuple[float, float] = (0.0, 0.0)
     touching: bool = False
 
     @property
@@ -206,6 +210,7 @@ class Suit:
             if whole < (TRIED if tried else CLEARLY) * (1.0 + EARLY * enough / used) * enough:
                 return ""
             self.told[name] = whole
+            self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
             if name == DEFAULT:
                 return refusal.stiffness(engine.n, engine.control)
             return (
@@ -221,7 +226,10 @@ class Suit:
             self.seen.setdefault(DEFAULT, {})[rtol] = self.told[DEFAULT]
         if run.attrs["method"] != name and not (name == DEFAULT and name in self.told):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))
-        self.seen.setdefault(run.attrs["method"], {})[rtol] = float(run.attrs["evaluations"])
+        used, done = self.left if self.told else (0.0, 0.0)
+        if done < ENOUGH:
+            rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
+            self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)
 
 
 #: powers of the step with which the error estimates fall
