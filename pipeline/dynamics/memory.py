@@ -131,8 +131,8 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT,
-) = _places(32)
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES,
+) = _places(34)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
@@ -145,9 +145,10 @@ SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
 #: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
 #: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled n_held basis0 n_basis moving0 interface0")
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0")
 BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
-MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
+MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
+MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: place in MOMENTS after its last one
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
@@ -189,6 +190,7 @@ RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; pres
 REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels
 REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
 WORN = wiring("contact")  # contacts whose wear is counted
+BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: what is recorded, which no step reads
 GROUPS = wiring("group")  # error group of each state variable
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
@@ -215,6 +217,9 @@ LOAD_NUMBERS = numbers("value")  # see `loads`
 LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
 GRAVITY = numbers("acceleration:3")
 FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
+#: of bodies and named frames in their link, undeformed. mass, com, inertia: as of LINK_NUMBERS; mass and inertia are 0
+#: where nothing but the body itself is in its link
+BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")
 
 # Work space in w -----------------------------------------------------------------------------------------------------
 #: a frame in world axes; the velocity is that of its origin

@@ -48,8 +48,10 @@ def everything() -> xr.Dataset:
 
 
 def by_xarray(path: Path, data: xr.Dataset) -> bytes:
-    """The file that xarray writes: as it does when nothing is said, or, when large, deflated and with sums."""
-    packed = {"zlib": True, "complevel": 1, "fletcher32": True} if data.nbytes >= netcdf.COMPRESSED else {}
+    """The file that xarray writes when it is asked for sums and, when large, for deflated arrays."""
+    packed: dict[str, object] = {"fletcher32": True}
+    if data.nbytes >= netcdf.COMPRESSED:
+        packed |= {"zlib": True, "complevel": 1}
     encoding = {str(n): packed for n, v in data.variables.items() if v.ndim and v.size and v.dtype.kind in "fiu"}
     data.to_netcdf(path, engine="netcdf4", encoding=encoding)
     return path.read_bytes()

@@ -59,7 +59,7 @@ _PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _TABLES, _TABLE_AT = (_PLACE,) * 4, (_PLACE, _INTEGER, _INTEGER)
 #: C types of what Python calls, as `calls.SIGNATURES` has them
 PROTOTYPES = {
-    "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, *_TABLE_AT),
+    "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, _PLACE, _INTEGER),
     "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
 }
 LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _PLACE, _INTEGER)
@@ -140,7 +140,7 @@ class Entry:
     ) -> None:
         """Evaluate what is recorded of every row."""
         given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._function(LATE)(*_tables(h, f, w, n), *given, tolerance, place(out), *out.shape)
+        self._function(LATE)(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
 
     def complete(self) -> None:
         """Wait for what is still being compiled."""

@@ -289,8 +289,8 @@ def retract(h, w, y, displacement, out, total):
     return 0
 """
 OBSERVE = """@calls.exported("observe")
-def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, out_count, out_width):
-    rows, out = calls.carray(rows, (count, width)), calls.carray(out, (out_count, out_width))
+def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, length):
+    rows, out = calls.carray(rows, (count, width)), calls.carray(out, (length,))
     observation(h, f, w, n, rows, calls.carray(pieces, (lines, laws)), tolerance, out)
     return 0
 """

@@ -21,13 +21,13 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import STARTS
 from flexclear.pipeline.dynamics.equations import observation
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_blocks
 from flexclear.pipeline.dynamics.run.pace import Judge
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
@@ -210,20 +210,21 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 
     Raises SolverError where one of them could not be evaluated.
     """
-    parts = []
+    parts = list[Blocks]()
     for part, kept in trajectory.parts():
         engine.keep(kept)
-        out = observe_flat(engine, trajectory.rows[part])
+        out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
-            row, lost = trajectory.rows[part][k], observation.by_name(out, engine.model.arrays.size).status[k]
+            row, lost = trajectory.rows[part][k], out["status"][k, 0]
             limit = beside(engine, row, motion, CLEAR)
             if limit is None and lost:
                 limit = beside(engine, row, motion, NEARLY_CLEAR)
-            if limit is not None:
-                out[k] = limit
+            for name, values in (limit or {}).items():
+                out[name][k] = values
         parts.append(out)
-    # a megabyte is copied only where there is something to join: that would take as long as a short run
-    seen = observation.by_name(parts[0] if len(parts) == 1 else np.concatenate(parts), engine.model.arrays.size)
+    # megabytes are copied only where there is something to join: that would take as long as a short run
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts[1:] else parts[0]
+    seen = observation.by_name(joined, engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"
