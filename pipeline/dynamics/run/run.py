@@ -176,13 +176,14 @@ def follow(
 ) -> Followed:
     """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
 
-    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`.
+    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`;
+    none looks at an integrator that a run comes back to.
     stop, outputs: as of `trajectory.integrate`.
     """
-    left, reasons = None, list[str]()
+    left, reasons, judges = None, list[str](), dict(judges or {})
     while True:
         traits = engine.method.traits
-        judge, heir = (judges or {}).get(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
+        judge, heir = judges.pop(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
         try:
             done = stepping.integrate(engine, y, progress, stop, left, outputs, judge)
             return engine, done, "\n".join(reasons)
