@@ -49,7 +49,7 @@ interpreters: $(READY) ## A short run under every other Python there is
 	done; test "$$ran" != " " || echo "skipped: there is no other Python here"
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
-	$(RUN) -m benchmarks evaluation peers runs commands cold growth exudyn
+	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn
 
 chaos: $(READY) ## Periodic or chaotic, with evidence: docs/chaos.md (an hour; keeps every scene that is finished)
 	@$(RUN) -m flexclear sections sps4/csj $(foreach d,sps4 sps4/damped,$(d)/far_csj_free $(d)/far_csj_fixed $(d)/far_csj_cb) --page docs/chaos.md

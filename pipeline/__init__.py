@@ -11,21 +11,17 @@ The same things that the command ``flexclear`` does, from Python::
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from flexclear.pipeline.core import threads as threads  # before NumPy is loaded
+
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
-
-# One thread in BLAS and OpenMP, before NumPy is loaded: the matrices are small, and sums whose
-# order depends on the number of cores would break the promise of equal bytes for equal inputs.
-for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"):
-    os.environ[_variable] = "1"  # also where somebody asked for more: that would change the bytes
 
 __all__ = [
     "Scene",

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import FlexclearError, InputError
 from flexclear.pipeline.core.log import set_level
 from flexclear.pipeline.core.workflow import stopping
-from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.fingerprint import Sources, sources_of
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
@@ -94,7 +94,7 @@ def workplace(options: argparse.Namespace | None = None) -> Workplace:
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
     root, (seconds, why) = results_root(), limit.deadline(options)
-    sources = Sources(TREE, root / "cache" / "imports.json")
+    sources = sources_of(TREE, root / "cache" / "imports.json")
     return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (time.monotonic() + seconds, why))
 
 

@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,9 @@ from tempfile import TemporaryDirectory
 from benchmarks.command_parts import IMPORTS, REST
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
-from benchmarks.timing import interleaved, of_children
+from benchmarks.timing import Times, interleaved, of_children
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
+from flexclear.pipeline.core.system import cores
 
 ROUNDS = 5
 #: parts as they stand in the table; what is not there is in the rest
@@ -25,10 +27,10 @@ LOOP = """import sys, time
 import flexclear as fc
 scene, times = fc.load_scene(sys.argv[1]), []
 for k in range(8):
-    begun = time.process_time()
+    begun, waited = time.process_time(), time.monotonic()
     fc.run(fc.edited(scene, {sys.argv[2]: float(sys.argv[3]) * (1.0 + 1e-6 * k)}))
-    times.append(time.process_time() - begun)
-print(sorted(times)[4])"""
+    times.append((time.process_time() - begun, time.monotonic() - waited))
+print(*(sorted(kind)[4] for kind in zip(*times)))"""
 
 
 @dataclass(frozen=True)
@@ -62,19 +64,29 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     """A record for each command; they take turns. Bytecode is kept, as an installed program has it."""
     with TemporaryDirectory() as folder:
         fresh = (1.0 + 1e-7 * k for k in itertools.count())
-        times = interleaved({case.name: _timed(COMMANDS[case.name], Path(folder), fresh) for case in cases}, ROUNDS)
+        waits = {case.name: list[float]() for case in cases}
+        tasks = {name: _timed(COMMANDS[name], Path(folder), fresh, waits[name]) for name in waits}
+        times = interleaved(tasks, ROUNDS)
         for case in cases:
             command = COMMANDS[case.name]
             parts = {} if command.loop else json.loads(_run(command, Path(folder), fresh, "benchmarks.command_parts"))
             shares = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
-            yield case, [{"cpu": times[case.name].told("s"), "parts": shares}]
+            wall = Times(tuple(waits[case.name][-ROUNDS:])).told("s")
+            yield case, [{"cpu": times[case.name].told("s"), "wall": wall, "processors": cores(), "parts": shares}]
 
 
-def _timed(command: Command, folder: Path, fresh: Iterator[float]) -> Callable[[], float]:
+def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[float]) -> Callable[[], float]:
+    """What runs a command for its processor time [s]; how long it was waited for is added to `waits` [s]."""
+
     def seconds() -> float:
         if command.loop:
-            return float(_run(command, folder, fresh))
-        return of_children(lambda: _run(command, folder, fresh))
+            spent, wall = (float(told) for told in _run(command, folder, fresh).split())
+        else:
+            begun = time.monotonic()
+            spent = of_children(lambda: _run(command, folder, fresh))
+            wall = time.monotonic() - begun
+        waits.append(wall)
+        return spent
 
     return seconds
 
@@ -99,10 +111,15 @@ def _run(command: Command, folder: Path, fresh: Iterator[float], module: str = "
 
 
 def show(records: list[Record]) -> str:
-    """The table: seconds of the processor, and what they go into in milliseconds."""
+    """The table: seconds of the processor and waited for, and what the former go into in milliseconds."""
+    waited: Columns = {
+        "wall [s]": lambda r: spread(r["wall"], "s", 2) if "wall" in r else "",
+        "processors": lambda r: str(r.get("processors", "")),
+    }
     columns: Columns = {
         "command": lambda r: r["case"],
         "CPU [s]": lambda r: spread(r["cpu"], "s", 2),
+        **(waited if any("wall" in r for r in records) else {}),  # earlier records do not tell it
         **{f"{part} [ms]": lambda r, part=part: _told(r["parts"], part) for part in SHOWN},  # type: ignore[misc]
     }
     return table(records, columns)
@@ -113,7 +130,7 @@ def _told(parts: Mapping[str, float], part: str) -> str:
 
 
 FAMILY = Family(
-    what="seconds of whole commands, and what they go into",
+    what="seconds of whole commands, and what they go into; not to be held to one processor",
     takes="1 min, and what is stale of the report",
     page="benchmarks.md",
     cases=lambda: [Case(name) for name in COMMANDS],

@@ -89,6 +89,15 @@ def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
     return np.where(q[..., :1] >= 0.0, q, -q)
 
 
+def continued(q: np.ndarray) -> np.ndarray:
+    """Unit quaternions (time, ..., 4) without jumps of sign; the first one's is kept."""
+    flips = np.einsum("t...i,t...i->t...", q[1:], q[:-1]) < 0.0
+    if flips.any():
+        q = q.copy()
+        q[1:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[..., None]
+    return q
+
+
 def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Hamilton product; ``R(a b) = R(a) R(b)``."""
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)

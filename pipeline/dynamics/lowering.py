@@ -21,7 +21,7 @@ from numba.core import typed_passes as typed
 from numba.core import untyped_passes as untyped
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
 from numba.core.errors import TypingError
 from numba.core.ir_utils import build_definitions
@@ -118,6 +118,22 @@ class Part(JITCodeLibrary):
                 below = library._linking_libraries if isinstance(library, Part) else []
                 open_calls += [(other, False) for other in below if other not in found]
         return list(reversed(found))
+
+
+class Whole(JITCodeLibrary):
+    """Code of a function that Python calls, with all the kernels that it reaches: optimised for short loops.
+
+    What goes over the bodies, closures or modes goes round a few times. As Numba has it, loops take several turns at
+    once, in vectors: then most of the time goes to what is left over, and compiling takes twice as long.
+    """
+
+    def _optimize_final_module(self) -> None:
+        """LLVM's passes; Numba's also look for references that are counted, of which there are none."""
+        options = llvm.create_pipeline_tuning_options()
+        options.speed_level = 3
+        options.loop_vectorization = options.slp_vectorization = options.loop_unrolling = False
+        passes = llvm.create_pass_builder(self._codegen._tm, options)
+        passes.getModulePassManager().run(self._final_module, passes)
 
 
 @cache
@@ -242,16 +258,25 @@ class KernelLower(Lower):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(NativeLowering):
-    """Lowers a function into a `Part`."""
+    """Lowers a kernel into a `Part`."""
 
     _name = "part_lowering"
     lowering_class = KernelLower
+    library_class: type[JITCodeLibrary] = Part
 
     def run_pass(self, state: Any) -> bool:
         """As of any function, but for where its code goes."""
-        state.library = Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = self.library_class(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return bool(super().run_pass(state))
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class WholeLowering(PartLowering):
+    """Lowers a function that Python calls into a `Whole`."""
+
+    _name = "whole_lowering"
+    library_class = Whole
 
 
 #: Numba's steps that kernels have a use for, in Numba's order. What is left out makes functions of comprehensions and
@@ -362,7 +387,21 @@ class KernelCompiler(CompilerBase):
 
     def __init__(self, typing: Any, target: Any, *others: Any) -> None:
         super().__init__(Typing(typing), Target(target), *others)
+        # h, f, w and n are four arrays: what is written into w changes nothing that was read from h
+        self.state.flags.noalias = True
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one; there is no object mode to fall back to."""
         return [PIPELINE]
+
+
+class WholeCompiler(CompilerBase):
+    """Numba's pipeline with `WholeLowering`."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only one."""
+        found = PassManager("whole")
+        for step, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
+            found.add_pass(WholeLowering if step is NativeLowering else step, what)
+        found.finalize()
+        return [found]

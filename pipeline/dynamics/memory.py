@@ -13,7 +13,9 @@ Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the pla
 table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by what they hold (`record`).
 
-Flat arrays, because a compiled call costs what its arguments cost, and compilation too.
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them share memory,
+and the compiler knows: what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes is
+never given one of them twice.
 
 Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
@@ -129,8 +131,8 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT,
-) = _places(32)
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES,
+) = _places(34)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
@@ -143,15 +145,20 @@ SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
 #: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
 #: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 n_moments inboard coupled n_held basis0 n_basis moving0 interface0")
+FLEXES = wiring("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0")
 BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
-MOMENTS = wiring("row_of mode")  # row (3k + l) n + j, mode i of int rho S_ki S_lj
+MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
+MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: place in MOMENTS after its last one
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
-ENVELOPE = wiring("first start")  # first column, start of each row of the mass matrix
-#: coupling: that this closure is, or -1
-CLOSURES = wiring("site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept coupling")
+#: rows of the mass matrix. first: column; origin: place of column 0, which may lie before that of the first
+ENVELOPE = wiring("first origin")
+#: threes: of rows that are solved for, which stand side by side in JACOBIAN and SPREAD and are worked on together; the
+#: last of them may end with zeros.  coupling: that this closure is, or -1
+CLOSURES = wiring(
+    "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling"
+)
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
 ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
@@ -159,7 +166,7 @@ KNOWN_ENTRIES = wiring("closure drive column sign part")
 COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
-CLOSURE_ENVELOPE = wiring("first start")  # of the rows that are solved for
+CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
 #: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
 CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
@@ -183,6 +190,7 @@ RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; pres
 REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels
 REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
 WORN = wiring("contact")  # contacts whose wear is counted
+BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: what is recorded, which no step reads
 GROUPS = wiring("group")  # error group of each state variable
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
@@ -209,6 +217,9 @@ LOAD_NUMBERS = numbers("value")  # see `loads`
 LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
 GRAVITY = numbers("acceleration:3")
 FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
+#: of bodies and named frames in their link, undeformed. mass, com, inertia: as of LINK_NUMBERS; mass and inertia are 0
+#: where nothing but the body itself is in its link
+BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")
 
 # Work space in w -----------------------------------------------------------------------------------------------------
 #: a frame in world axes; the velocity is that of its origin

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ast
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
-from numba import njit
+from numba import carray, cfunc, njit
 from numba.core.codegen import CPUCodeLibrary
 
 from flexclear.pipeline.dynamics.kernels import field_reader, kernel, looked_at, row_reader
-from flexclear.pipeline.dynamics.lowering import Part
+from flexclear.pipeline.dynamics.lowering import Part, Whole, WholeCompiler
 
 #: with other releases kernels compile as Numba does it, to the same results
 needs_lowering = pytest.mark.skipif(not looked_at(), reason="this release of Numba has not been looked at")
@@ -128,3 +130,58 @@ def test_a_kernel_is_compiled_once_for_integers_that_are_written_out() -> None:
 
     assert called(3) == 12
     assert len(double.dispatcher.overloads) == 1
+
+
+@needs_lowering
+def test_loops_go_round_one_turn_at_a_time() -> None:
+    """Those over bodies and modes are short: what takes several turns at once takes longer for what is left over."""
+
+    @kernel
+    def scaled(a, count, factor):
+        for k in range(count):
+            a[k] *= factor
+
+    def function(a, count):
+        scaled(carray(a, (count,)), count, 3.0)
+        return count
+
+    made = cfunc("int64(CPointer(float64), int64)", error_model="numpy", pipeline_class=WholeCompiler)(function)
+    numbers = np.arange(7.0)
+    assert made.ctypes(numbers.ctypes.data_as(made.ctypes.argtypes[0]), 6) == 6
+    assert numbers.tolist() == [0.0, 3.0, 6.0, 9.0, 12.0, 15.0, 6.0]
+    assert isinstance(made._library, Whole)
+    code = made._library.get_llvm_str()
+    assert code.count("fmul") == 1
+    assert "x double>" not in code
+
+
+#: kernels that may be given one array twice, since they write into none
+READERS = {"dot6"}
+
+
+def calls_of_kernels(root: Path) -> Iterator[tuple[str, ast.Call]]:
+    """All calls in kernels, by where they are."""
+    for path in sorted((root / "pipeline" / "dynamics").rglob("*.py")):
+        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(function, ast.FunctionDef) and "kernel" in map(ast.unparse, function.decorator_list):
+                for call in ast.walk(function):
+                    if isinstance(call, ast.Call):
+                        yield f"{path.name}: {function.name}: {ast.unparse(call)}", call
+
+
+def test_no_kernel_is_given_an_array_twice(root: Path) -> None:
+    """What it writes into one argument changes nothing that it reads from another: the compiler is told so."""
+    twice = {
+        where
+        for where, call in calls_of_kernels(root)
+        if ast.unparse(call.func) not in READERS
+        for name in "hfwn"
+        if sum(ast.unparse(argument) == name for argument in call.args) > 1
+    }
+    assert twice == set()
+    source = (root / "pipeline" / "dynamics" / "vectors.py").read_text(encoding="utf-8")
+    functions = [found for found in ast.parse(source).body if isinstance(found, ast.FunctionDef)]
+    readers = [found for found in functions if found.name in READERS]
+    assert len(readers) == len(READERS)
+    targets = [node for found in readers for node in ast.walk(found) if isinstance(node, ast.Subscript)]
+    assert all(isinstance(node.ctx, ast.Load) for node in targets)

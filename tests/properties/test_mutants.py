@@ -1,4 +1,4 @@
-"""Whatever stands in a scene or a recipe: it is taken, or refused in words, without endless work and in little memory."""
+"""Whatever stands in a scene or a recipe: taken, or refused in words, without endless work and in little memory."""
 
 from __future__ import annotations
 

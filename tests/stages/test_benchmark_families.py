@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from benchmarks import families, faults, log, page
+from benchmarks import command_parts, families, faults, log, page
 from benchmarks.__main__ import main
-from benchmarks.families import solids
+from benchmarks.families import commands, solids
 from benchmarks.family import Case, Family
 from benchmarks.log import Session
 from flexclear.pipeline.core.errors import InputError
@@ -39,6 +40,12 @@ def test_every_module_of_the_families_is_one(root: Path):
     there = {path.stem for path in (root / "benchmarks" / "families").glob("*.py")} - {"__init__"}
     assert there == {module.partition(":")[0] for module in families.NAMES.values()}
     assert {f"{name}.jsonl" for name in FAMILIES} == {path.name for path in log.FOLDER.iterdir()}
+
+
+def test_make_bench_measures_all_that_stands_on_the_page_of_benchmarks(root: Path):
+    recipe = (root / "Makefile").read_text().partition("\nbench:")[2].partition("\n\n")[0]
+    named = recipe.partition("-m benchmarks ")[2].split()
+    assert sorted(named) == sorted(name for name, family in FAMILIES.items() if family.page == "benchmarks.md")
 
 
 @pytest.mark.parametrize("name", PAGES)
@@ -102,6 +109,38 @@ def test_the_parts_of_a_solid_s_work_add_up():
     assert idle == {"normal modes", "counting them, by another factorisation"}
     assert record["displacements"] == 3 * 7 * 4 * 4
     assert "336" in str(solids.FAMILY.show([{"case": "small", **record}]))
+
+
+def test_what_was_measured_before_commands_were_waited_for_is_shown_beside_what_is():
+    before = {"case": "check csj", "cpu": {"s": 0.25, "spread": 0.01}, "parts": {"imports": 0.2}}
+    now = before | {"wall": {"s": 0.5, "spread": 0.02}, "processors": 2}
+    assert "wall" not in str(commands.show([before]))
+    rows = [[cell.strip() for cell in line.split("|")[1:5]] for line in str(commands.show([before, now])).splitlines()]
+    assert rows[0] == ["command", "CPU [s]", "wall [s]", "processors"]
+    assert rows[2:4] == [
+        ["check csj", "0.25 ± 1.0 %", "", ""],
+        ["check csj", "0.25 ± 1.0 %", "0.50 ± 2.0 %", "2"],
+    ]
+
+
+def test_parts_of_a_command_are_told_apart_in_each_of_its_threads(monkeypatch: pytest.MonkeyPatch):
+    """A part inside of another one in one thread, while a second thread is in a third part."""
+    monkeypatch.setattr(command_parts, "_spent", {})
+    clock = threading.local()
+    monkeypatch.setattr(command_parts.time, "thread_time", lambda: getattr(clock, "now", 0.0))
+    both = threading.Barrier(2, timeout=60.0)
+
+    def spend(seconds: float) -> None:
+        clock.now = getattr(clock, "now", 0.0) + seconds
+        both.wait()
+
+    inner = command_parts.timed("inner", spend)
+    outer = command_parts.timed("outer", lambda: (spend(1.0), inner(2.0)))
+    beside = threading.Thread(target=command_parts.timed("beside", lambda: (spend(4.0), spend(8.0))))
+    beside.start()
+    outer()
+    beside.join()
+    assert command_parts._spent == {"outer": 1.0, "inner": 2.0, "beside": 12.0}
 
 
 def test_a_name_that_is_no_family_is_refused_with_those_there_are(capsys: pytest.CaptureFixture):

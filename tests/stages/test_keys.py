@@ -12,9 +12,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, parents, source_file
+from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported, parents, source_file, sources_of
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
 from flexclear.stages import s4_simulate, s5_post
 from flexclear.stages.graph import Graph
@@ -267,6 +268,18 @@ def test_the_memo_of_imports_notices_edits(copy: Path):
     assert "meshio" in edited["flexclear.stages.s4_simulate"].libraries
     memo.write_text("{ not json")
     assert Sources(copy, memo).closure(roots) == edited
+
+
+def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What it runs was loaded then; a memo that is begun later holds all of them all the same."""
+    roots, memo = ["flexclear.stages.s4_simulate"], tmp_path / "imports.json"
+    known = sources_of(TREE).closure(roots)
+    with monkeypatch.context() as patch:
+        patch.setattr(Sources, "_parse", lambda self, path, name: pytest.fail(f"{name} is read again"))
+        assert sources_of(TREE, memo).closure(roots) == known
+    assert {name: module.digest for name, module in known.items()} == {
+        name: digest for name, (digest, *_) in (read_checked(memo) or {}).items()
+    }
 
 
 def test_library_versions_count(root: Path):

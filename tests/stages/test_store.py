@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import resource
 import subprocess
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import disk
+from flexclear.pipeline.core.artifacts import disk, netcdf
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
 from flexclear.pipeline.core.errors import ResourceError
@@ -155,6 +156,57 @@ def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, root: Path, kind
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] == resource.RLIM_INFINITY
 
 
+TOO_SMALL = """
+import random, resource, sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from test_store import dataset
+from flexclear.pipeline.core.artifacts import netcdf
+from flexclear.pipeline.core.artifacts.labelled import of
+netcdf.COMPRESSED = int(sys.argv[3])
+folder, data = Path(sys.argv[2]), of(dataset(3_000))
+netcdf.write(folder / "whole.nc", data)
+size = (folder / "whole.nc").stat().st_size
+drawn = random.Random(1)
+limits = {0, 1, 100, size - 1, size - 2, size - 100, size - 4096, *(drawn.randrange(size) for _ in range(40))}
+for limit in sorted(limits):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+    try:
+        netcdf.write(folder / f"{limit}.nc", data)
+    except (OSError, RuntimeError):
+        continue
+    sys.exit(f"nothing was told of a limit of {limit} of {size} bytes")
+resource.setrlimit(resource.RLIMIT_FSIZE, (size, resource.RLIM_INFINITY))
+netcdf.write(folder / "again.nc", data)
+assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
+"""
+
+
+@pytest.mark.parametrize("compressed", [1 << 26, 0])
+def test_the_library_tells_of_every_byte_that_it_cannot_write(tmp_path: Path, root: Path, compressed: int):
+    """What it writes is not read back: wherever a disk ends, it raises an error."""
+    arguments = [sys.executable, "-c", TOO_SMALL, str(Path(__file__).parent), str(tmp_path), str(compressed)]
+    done = subprocess.run(arguments, capture_output=True, text=True, cwd=root, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+
+
+def test_a_disk_that_takes_no_more_when_it_is_forced_leaves_the_old_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Network disks may tell only then that they are full; the file is forced by a thread beside its digest."""
+    path = tmp_path / "a.nc"
+    digest = write_dataset(path, dataset(9))
+
+    def full(handle: int) -> None:
+        raise OSError(errno.EDQUOT, "Disk quota exceeded")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(ResourceError, match="the disk is full"), disk.disk_limits(tmp_path):
+        write_dataset(path, dataset(10))
+    assert os.listdir(tmp_path) == ["a.nc"]
+    assert disk.digest_of(path) == digest
+
+
 def test_what_a_killed_process_left_is_swept_and_never_read(store: Store):
     folder = store.path("simulate", KEY, "nc").parent
     folder.mkdir(parents=True)
@@ -278,12 +330,40 @@ def test_a_name_is_on_the_disk_before_it_is_relied_on(tmp_path: Path, monkeypatc
     assert forced[1:] == [str(tmp_path)]
 
 
-def test_what_was_just_written_is_parsed_once_and_given_once(store: Store) -> None:
+def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+):
+    """Each takes milliseconds of a disk, and an artifact is what has a record."""
+    forced: list[Path] = []
+    real = os.fsync
+    monkeypatch.setattr(
+        os, "fsync", lambda handle: (forced.append(Path(os.readlink(f"/proc/self/fd/{handle}"))), real(handle))
+    )
+    store.put("simulate", KEY, {"nc": dataset()}, {})
+    folder = store.path("simulate", KEY, "nc").parent
+    assert [path.parent for path in forced[:2]] == [folder, folder]
+    assert forced[2:] == [folder]
+
+
+def test_what_was_just_stored_is_not_parsed_and_given_once(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever loads it may change it: the next one gets it from the file."""
     record = put(store)
-    first, second = store.load(record), store.load(record)
+    with monkeypatch.context() as patch:
+        patch.delattr(netcdf, "read")
+        first = store.load(record)
+    second = store.load(record)
     assert first.identical(second)
     name = next(str(n) for n, v in first.data_vars.items() if v.dtype.kind == "f" and v.size)
     first[name].values[...] = -1.0
     assert not first.identical(second)
     assert store.load(record).identical(second)
+
+
+def test_whoever_writes_into_what_was_just_stored_is_noticed(store: Store) -> None:
+    """Also where sizes are equal: what is in memory is of the file that was written."""
+    record = put(store)
+    path = store.path("simulate", KEY, "nc")
+    path.write_bytes(bytes(path.stat().st_size))
+    os.utime(path, (1.0, 1.0))  # some clocks of disks are slower than this test
+    with pytest.raises(ResourceError, match="changed while it was read"):
+        store.load(record)

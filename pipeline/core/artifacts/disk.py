@@ -19,6 +19,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core import system
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
 #: bytes that no table of records, facts or imports has
 LARGEST_TABLE = 64 << 20
-#: bytes that are compared at once
+#: bytes that are copied at once: more are new to memory each time, which takes longer than to copy them
 PIECE = 1 << 17
 #: what a full or limited disk answers
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -74,17 +75,40 @@ def publish(path: Path, content: bytes) -> str:
         made.write_bytes(content)
         if made.read_bytes() != content:
             raise OSError(errno.EIO, "what was written does not read back", str(path))
-        settle(made, path)
-    return sha256(content)
+        digest = settle(made, path)
+    system.sync_folder(path.parent)
+    return digest
 
 
-def holds(path: Path, content: bytes) -> bool:
-    """Whether an ordinary file holds these bytes and no others; OSError for others."""
-    if require_ordinary(path) != len(content):
-        return False
-    view = memoryview(content)
-    with path.open("rb", buffering=0) as file:  # piece by piece: what is new to memory takes longer than to compare it
-        return all(file.read(PIECE) == view[k : k + PIECE].tobytes() for k in range(0, len(view), PIECE))
+def settle(made: Path, path: Path) -> str:
+    """Force the bytes of a file to the disk and give it its name; returns its sha256, taken while the disk writes.
+
+    The name is on the disk after `system.sync_folder`, together with all others of its folder.
+    """
+    failed = list[OSError]()
+
+    def write() -> None:
+        try:
+            force(made)
+        except OSError as error:
+            failed.append(error)
+
+    beside = Thread(target=write)
+    beside.start()
+    try:
+        digest = digest_of(made)
+    finally:
+        beside.join()
+    if failed:
+        raise failed[0]
+    system.replace(made, path)
+    return digest
+
+
+def force(path: Path) -> None:
+    """Force the bytes of a file to the disk; OSError where it takes them no more."""
+    with path.open("rb+") as file:  # Windows forces only what could be written
+        os.fsync(file.fileno())
 
 
 def checked(table: Mapping[str, Any]) -> bytes:
@@ -113,7 +137,7 @@ def copy(source: Path, target: Path) -> None:
     with temporary(target) as made:
         with source.open("rb") as old, made.open("wb") as new:
             if not system.share(old, new):
-                shutil.copyfileobj(old, new, 1 << 20)
+                shutil.copyfileobj(old, new, PIECE)
         status = source.stat()
         os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
         made.chmod(0o444)
@@ -140,14 +164,6 @@ def temporary(path: Path) -> Iterator[Path]:
     finally:
         with contextlib.suppress(PermissionError):  # a library that failed has it still open, on Windows: `sweep` will
             system.remove(made)
-
-
-def settle(made: Path, path: Path) -> None:
-    """Force the bytes to the disk, give the file its name, and force that to the disk."""
-    with made.open("rb+") as file:  # Windows forces only what could be written
-        os.fsync(file.fileno())
-    system.replace(made, path)
-    system.sync_folder(path.parent)
 
 
 @contextlib.contextmanager

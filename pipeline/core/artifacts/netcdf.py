@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -30,10 +31,10 @@ _COORDINATES, _BOOL, _FILL = "coordinates", {"dtype": "bool"}, "_FillValue"
 def write(path: Path, data: LabelledArrays) -> None:
     """Write a file; OSError or RuntimeError of the library where it cannot.
 
-    Numeric arrays carry fletcher32 sums, so that other programs notice damage too; they are compressed from
-    `COMPRESSED` bytes on, since what a run records has few digits to spare: deflating it takes longer than making it,
-    and leaves half of it.  They are written when all are defined: each change between the two lets the library write
-    all that it has so far, which took as long as the rest.
+    Numeric arrays carry fletcher32 sums, so that other programs notice damage too, wherever the file is taken; without
+    them writing takes three quarters of the time.  From `COMPRESSED` bytes on they are deflated; below that it takes
+    longer than making them, since what a run records has few digits to spare.  They are written when all are defined:
+    each change between the two lets the library write all that it has so far, which took as long as the rest.
     """
     import netCDF4
 
@@ -130,22 +131,36 @@ def _words(attrs: dict[str, Any]) -> list[str]:
     return str(attrs.pop(_COORDINATES, "")).split()
 
 
-def same(one: LabelledArrays, other: LabelledArrays) -> bool:
-    """Whether two have the same arrays with the same names, dimensions and values, to the last bit."""
-    if one.coords != other.coords or one.variables.keys() != other.variables.keys():
-        return False
-    return all(array.dims == other[name].dims and _equal(array, other[name]) for name, array in one.variables.items())
+def as_read(data: LabelledArrays) -> LabelledArrays:
+    """What `read` gives of the file that `write` makes of them, without the file.
+
+    Large arrays that are as they are read are not copied.
+    """
+    variables = {
+        name: LabelledArray(array.dims, _values_as_read(array.values), _attributes_as_read(array.attrs))
+        for name, array in data.variables.items()
+    }
+    return replace(data, variables=variables, attrs=_attributes_as_read(data.attrs))
 
 
-def _equal(one: LabelledArray, other: LabelledArray) -> bool:
-    a, b = one.values, other.values
-    if a.shape != b.shape:
-        return False
-    if a.dtype.kind in "OU":
-        return bool(np.all(a == b))
-    # as bytes: not a number is what it was
-    return a.dtype == b.dtype and bool(np.array_equal(_bytes(a), _bytes(b)))
+def _values_as_read(values: np.ndarray) -> np.ndarray:
+    """In one piece, writable, as this machine has them; texts as long as the longest of them."""
+    if values.dtype.kind in "OU":
+        return np.asarray(values.astype(object), dtype=str)
+    small = values.nbytes < _LARGE  # may be of what stays in this process, and costs nothing to copy
+    native = values.astype(values.dtype.newbyteorder("="), order="C", copy=small)
+    return np.require(native, requirements=["C", "W"])
 
 
-def _bytes(values: np.ndarray) -> np.ndarray:
-    return np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+def _attributes_as_read(attrs: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: _attribute_as_read(value) for name, value in attrs.items()}
+
+
+def _attribute_as_read(value: Any) -> Any:
+    """Texts, lists of more than one of them, numbers of NumPy, arrays of more than one."""
+    if isinstance(value, str):
+        return value
+    numbers = np.array(value).reshape(-1)
+    if numbers.dtype.kind in "OU":
+        return [*map(str, numbers)] if numbers.size > 1 else str(numbers[0])
+    return numbers[0] if numbers.size == 1 else numbers

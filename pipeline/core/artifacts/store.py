@@ -23,7 +23,6 @@ from flexclear.pipeline.core.artifacts.disk import (
     copy,
     digest_of,
     disk_limits,
-    holds,
     is_copy,
     locked,
     publish,
@@ -55,8 +54,8 @@ TOLD = ("warnings", "accuracy_verdict")
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
-#: what this process has written last and read back, bytes and arrays by their sha256, until it is loaded
-_READ_BACK: dict[str, tuple[bytes, LabelledArrays]] = {}
+#: what this process has stored last by the sha256 of its file: which file that is, and arrays, until they are loaded
+_STORED: dict[str, tuple[tuple[int, ...], LabelledArrays]] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -114,6 +113,7 @@ class Store:
             except OSError:
                 return f"{self._shown(path)} is missing, or no file"
             if found != digest:
+                _STORED.pop(digest, None)
                 return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
         return None
 
@@ -128,7 +128,7 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
-                digests[name] = publish(path, content) if isinstance(content, bytes) else write_dataset(path, content)
+                digests[name] = publish(path, content) if isinstance(content, bytes) else _store(path, content)
             said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
             record = Record(stage, key, digests, dict(facts), said)
             publish(self.path(stage, key, "json"), checked(record.table()))
@@ -141,15 +141,15 @@ class Store:
     def arrays(self, record: Record) -> LabelledArrays:
         """The main file in memory. The bytes that were checked are those that are parsed.
 
-        The last one that this process has written was parsed already; that is given once, where the file still holds
-        the same bytes.
+        What this process has stored last is not parsed: it is given once, where the file is still the one that was
+        written, since whoever gets it may change it.
         """
         from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
-        written = _READ_BACK.pop(record.files[MAIN], None)
-        if written is not None and holds(path, written[0]):
-            return written[1]
+        file, stored = _STORED.pop(record.files[MAIN], (None, None))
+        if stored is not None and file == _identity(path):
+            return stored
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
@@ -311,29 +311,47 @@ def _attributes(product: Product) -> Mapping[str, object]:
 
 
 def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
-    """Write NetCDF-4 atomically, read back and compared before it takes its name; returns its sha256.
+    """Write NetCDF-4 atomically; returns its sha256.
 
-    What was read is kept for `Store.arrays`, until the next one is written.
     Equal datasets give equal bytes: no times or names of this machine.
     """
-    from flexclear.pipeline.core.artifacts import netcdf  # here, since what finds everything fresh writes nothing
-    from flexclear.pipeline.core.artifacts.labelled import of
+    from flexclear.pipeline.core.artifacts.labelled import of  # here, since what finds everything fresh writes nothing
 
-    data = of(dataset)
+    digest = _written(path, of(dataset))
+    system.sync_folder(path.parent)
+    return digest
+
+
+def _written(path: Path, data: LabelledArrays) -> str:
+    from flexclear.pipeline.core.artifacts import netcdf
+
     with temporary(path) as made:
         try:
             netcdf.write(made, data)
         except (OSError, RuntimeError) as error:
-            # the HDF5 library has no or a wrong name for a full disk; plain bytes get the true reason
+            # the HDF5 library tells that it cannot write, but not that the disk is full; plain bytes get the reason
             made.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
-        content = made.read_bytes()
-        read = netcdf.read(content)
-        if not netcdf.same(read, data):
-            raise OSError(errno.EIO, "what was written does not read back", str(path))
-        settle(made, path)
-    digest = sha256(content)
-    _READ_BACK.clear()
+        return settle(made, path)
+
+
+def _store(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
+    """Write a dataset, and keep its arrays for `Store.arrays` until the next one is stored.
+
+    Its name is forced to the disk with that of its record.
+    """
+    from flexclear.pipeline.core.artifacts import netcdf
+    from flexclear.pipeline.core.artifacts.labelled import of
+
+    data = of(dataset)
+    _STORED.clear()
+    digest = _written(path, data)
     if data.nbytes < netcdf.COMPRESSED:
-        _READ_BACK[digest] = content, read
+        _STORED[digest] = _identity(path), netcdf.as_read(data)
     return digest
+
+
+def _identity(path: Path) -> tuple[int, ...]:
+    """What tells a file from others, and from itself after somebody wrote into it."""
+    status = path.stat()
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns

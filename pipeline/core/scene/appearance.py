@@ -1,9 +1,7 @@
 """What bodies look like in pictures: shapes and a colour. No effect on the motion, and in no key of it."""
 
-from __future__ import annotations
-
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -22,7 +20,7 @@ class BoxShape(Part):
     pose: Pose = Field(default=Pose(), description="of the box's middle in the body frame")
 
     @model_validator(mode="after")
-    def _extended(self) -> BoxShape:
+    def _extended(self) -> Self:
         if min(self.size) <= 0.0:
             raise ValueError(f"the edges of a box are longer than zero, not {list(self.size)} m")
         return self

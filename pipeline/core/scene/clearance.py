@@ -3,9 +3,7 @@
 What a friction law called 'modified-coulomb' does is in `pipeline.dynamics.contact.friction.modified_coulomb`.
 """
 
-from __future__ import annotations
-
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -45,7 +43,7 @@ class NormalLaw(Part):
     effective_mass: Annotated[Mass, Positive] | None = None
 
     @model_validator(mode="after")
-    def _one_restitution(self) -> NormalLaw:
+    def _one_restitution(self) -> Self:
         if self.restitution is not None and self.delivered_restitution is not None:
             raise ValueError(
                 "restitution (the law's parameter) and delivered_restitution (the rebound) say the same; give one"
@@ -67,7 +65,7 @@ class ModifiedCoulomb(Part):
     v_dynamic: Annotated[Speed, Positive]
 
     @model_validator(mode="after")
-    def _ordered(self) -> ModifiedCoulomb:
+    def _ordered(self) -> Self:
         if not self.v_static < self.v_dynamic:
             raise ValueError(
                 "v_static must be below v_dynamic, as friction falls from static to dynamic between them; "
@@ -89,7 +87,7 @@ class Ambrosio(Part):
     v1: Annotated[Speed, Positive]
 
     @model_validator(mode="after")
-    def _ordered(self) -> Ambrosio:
+    def _ordered(self) -> Self:
         if not self.v0 < self.v1:
             raise ValueError(
                 "v0 must be below v1, as friction rises from nothing at v0 to `dynamic` at v1; "
@@ -115,7 +113,7 @@ class LuGre(Part):
     viscous: Annotated[Number, Field(ge=0.0)] = 0.0
 
     @model_validator(mode="after")
-    def _passive(self) -> LuGre:
+    def _passive(self) -> Self:
         _not_above(self.dynamic, self.static)
         # the damping fades as exp(-(v/v_stribeck)^2); its v-fold is then at most 0.4289 v_stribeck sigma_1, and
         # the law takes energy only while that stays below 4 mu (Barahanov & Ortega 2000, for constant damping)
@@ -195,7 +193,7 @@ class ClearanceSpherical(_Clearance):
     wear: Wear | None = None
 
     @model_validator(mode="after")
-    def _stiffness_known(self) -> ClearanceSpherical:
+    def _stiffness_known(self) -> Self:
         _require_materials(self.normal, self.materials, "socket_material and ball_material")
         return self
 
@@ -226,7 +224,7 @@ class ClearanceRevolute(_Clearance):
     wear: Wear | None = None
 
     @model_validator(mode="after")
-    def _stiffness_known(self) -> ClearanceRevolute:
+    def _stiffness_known(self) -> Self:
         _require_materials(self.normal, self.materials, "journal_material and pin_material")
         return self
 
@@ -258,7 +256,7 @@ class ClearanceSlot(_Clearance):
     pin_material: Material | None = None
 
     @model_validator(mode="after")
-    def _stiffness_known(self) -> ClearanceSlot:
+    def _stiffness_known(self) -> Self:
         _require_materials(self.normal, self.materials, "slot_material and pin_material")
         return self
 
@@ -292,7 +290,7 @@ class BallOnPlane(_Contact):
     ball_material: Material | None = None
 
     @model_validator(mode="after")
-    def _stiffness_known(self) -> BallOnPlane:
+    def _stiffness_known(self) -> Self:
         _require_materials(self.normal, self.materials, "plane_material and ball_material")
         return self
 

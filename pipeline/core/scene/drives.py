@@ -1,9 +1,7 @@
 """Drives: what prescribes a motion. Either a coordinate of a joint, or the pose of a frame in the world."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -58,7 +56,7 @@ class PathDrive(Part):
     allocation: Literal["unique", "least-norm"] = "unique"
 
     @model_validator(mode="after")
-    def _prescribes(self) -> PathDrive:
+    def _prescribes(self) -> Self:
         if not list(self.components()):
             raise ValueError("a path must prescribe at least one component of position or rotation")
         turning = self.rotation.laws() if self.rotation is not None else {}

@@ -1,11 +1,9 @@
 """Field types that scene files and mesh recipes share: quantities, vectors, poses, sources."""
 
-from __future__ import annotations
-
 import math
 import re
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias
 
 from pydantic import (
     AfterValidator,
@@ -220,7 +218,7 @@ class Pose(Part):
     axis: Direction | None = None
 
     @model_validator(mode="after")
-    def _one_orientation(self) -> Pose:
+    def _one_orientation(self) -> Self:
         given_once(self, ("quaternion", "rotation_vector", "axes", "axis"))
         if self.quaternion is not None and not 0.999 < math.hypot(*self.quaternion) < 1.001:
             raise ValueError(
@@ -233,7 +231,7 @@ class Pose(Part):
             check_axis(self.axis)
         return self
 
-    def as_quaternion(self) -> np.ndarray:
+    def as_quaternion(self) -> "np.ndarray":
         """Unit quaternion w x y z, frame to parent, shape (4,)."""
         import numpy as np
 

@@ -1,6 +1,6 @@
 """Gears and racks: joint coordinates that follow each other."""
 
-from __future__ import annotations
+from typing import Self
 
 from pydantic import model_validator
 
@@ -20,7 +20,7 @@ class Gear(Part):
     ratio: Value
 
     @model_validator(mode="after")
-    def _two(self) -> Gear:
+    def _two(self) -> Self:
         if self.first == self.second:
             raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
         return self

@@ -1,7 +1,5 @@
 """Friction of ideal joints that follows the force which they carry: laws of contacts, on a bearing of given size."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 
 from pydantic import Field, create_model

@@ -4,13 +4,11 @@ The values of a law are lengths, angles, forces or torques, as the place where i
 a bare number is in SI units. How a law of type 'step' goes is in `pipeline.dynamics.drives.step`.
 """
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
@@ -70,7 +68,7 @@ class Step(Part):
         return value
 
     @model_validator(mode="after")
-    def _same_length(self) -> Step:
+    def _same_length(self) -> Self:
         if not len(self.start) == len(self.end) == len(self.change):
             raise ValueError(
                 "start, end and change must have one entry per step each; "
@@ -117,7 +115,7 @@ class Harmonic(Part):
     offset: Value = 0.0
 
     @model_validator(mode="after")
-    def _same_length(self) -> Harmonic:
+    def _same_length(self) -> Self:
         phases = self.frequency if self.phase is None else self.phase
         if not len(self.amplitude) == len(self.frequency) == len(phases):
             raise ValueError(
@@ -142,7 +140,7 @@ class Spline(Part):
     ends: Ends = "not-a-knot"
 
     @model_validator(mode="after")
-    def _drawable(self) -> Spline:
+    def _drawable(self) -> Self:
         if len(self.time) != len(self.value):
             raise ValueError(
                 f"each time must have one value; there are {len(self.time)} times, but {len(self.value)} values"
@@ -196,7 +194,7 @@ class Table(Part):
         return {**data, "file": path.name, "points": read_points(path, data["time"], data["value"])}
 
     @model_validator(mode="after")
-    def _drawable(self) -> Table:
+    def _drawable(self) -> Self:
         _check_points([t for t, _ in self.points], self.degree, self.ends)
         if self.ends == "periodic" and self.points[0][1] != self.points[-1][1]:
             raise ValueError(
@@ -213,10 +211,10 @@ class Sum(Part):
     """
 
     type: Literal["sum"]
-    laws: Annotated[tuple[Bare, ...], Field(min_length=1)]
+    laws: Annotated[tuple["Bare", ...], Field(min_length=1)]
 
     @model_validator(mode="after")
-    def _countable(self) -> Sum:
+    def _countable(self) -> Self:
         if _count(self) * len(self.laws) > MOST_SUMMED:
             raise ValueError(f"a sum of {len(self.laws)} laws takes at most {MOST_SUMMED // len(self.laws)} pieces")
         return self
@@ -229,7 +227,7 @@ class Section(Part):
     """
 
     start: Time
-    law: Bare
+    law: "Bare"
 
 
 class Piecewise(Part):
@@ -242,7 +240,7 @@ class Piecewise(Part):
     sections: Annotated[tuple[Section, ...], Field(min_length=1)]
 
     @model_validator(mode="after")
-    def _ordered(self) -> Piecewise:
+    def _ordered(self) -> Self:
         starts = [s.start for s in self.sections]
         if any(not a < b for a, b in pairwise(starts)):
             raise ValueError(f"the sections must start one after the other, not at {starts} s")
@@ -260,10 +258,10 @@ class Repeated(Part):
     period: Annotated[Time, Field(gt=0)]
     times: Annotated[int, Field(ge=1)]
     start: Time = 0.0
-    law: Bare
+    law: "Bare"
 
     @model_validator(mode="after")
-    def _countable(self) -> Repeated:
+    def _countable(self) -> Self:
         _check_count(self)
         return self
 
@@ -281,8 +279,6 @@ def _bare(law: Any) -> Any:
 
 
 Bare = Annotated[Law, BeforeValidator(_bare, json_schema_input_type=Law | float | str)]
-for _composed in (Sum, Section, Piecewise, Repeated):
-    _composed.model_rebuild()
 
 
 def _count(law: Any) -> int:

@@ -1,7 +1,5 @@
 """What a scene may ask of the machine; what its run would ask is estimated in `demand`."""
 
-from __future__ import annotations
-
 import re
 from math import prod
 from pathlib import Path

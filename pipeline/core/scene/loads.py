@@ -3,9 +3,7 @@
 A load of type 'point-force' acts as the class of the same name in `pipeline.dynamics.loads.point_force` says.
 """
 
-from __future__ import annotations
-
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -66,7 +64,7 @@ class SpringDamper(Part):
     free_length: Annotated[Length, Field(ge=0.0)] | None = None
 
     @model_validator(mode="after")
-    def _acts(self) -> SpringDamper:
+    def _acts(self) -> Self:
         if self.stiffness == 0.0 and self.damping == 0.0:
             raise ValueError("a spring-damper needs a stiffness, a damping, or both; it has neither")
         if self.stiffness > 0.0 and self.free_length is None:
@@ -150,7 +148,7 @@ class Bushing(Part):
     damping: BushingDamping = NOTHING
 
     @model_validator(mode="after")
-    def _acts(self) -> Bushing:
+    def _acts(self) -> Self:
         if self.stiffness == NOTHING and self.damping == NOTHING:
             raise ValueError("a bushing needs a stiffness, a damping, or both; it has neither")
         return self

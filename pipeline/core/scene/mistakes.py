@@ -146,6 +146,7 @@ def _alternatives(annotation: Any) -> Iterator[Any]:
 def _inside(alternative: Any, key: Any) -> list[Any]:
     """What may stand under a key of a table or list."""
     if _is_model(alternative):
+        alternative.model_rebuild()  # laws that are made of laws know what these are only then
         info = alternative.model_fields.get(key) if isinstance(key, str) else None
         return [] if info is None else list(_alternatives(info.annotation))
     if get_origin(alternative) is dict and isinstance(key, str):

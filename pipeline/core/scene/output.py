@@ -4,8 +4,6 @@ A request is a key of ``[output]``, with the variables that it adds to the run's
 name in `pipeline.dynamics.record` makes them.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 from pydantic import Field

@@ -1,9 +1,7 @@
 """The parts of a scene: bodies and joints. An effect is a part; absent means not there."""
 
-from __future__ import annotations
-
 import math
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
@@ -92,7 +90,7 @@ class Modes(Part):
     of: str | None = None
 
     @model_validator(mode="after")
-    def _one_choice(self) -> Modes:
+    def _one_choice(self) -> Self:
         ways = ("count", "up_to", "compliance", "mass")
         given = [name for name in ways if getattr(self, name) is not None]
         if len(given) != 1:
@@ -209,7 +207,7 @@ class IdealJoint(Part):
     friction: JointFriction | None = None
 
     @model_validator(mode="after")
-    def _rubs(self) -> IdealJoint:
+    def _rubs(self) -> Self:
         if self.friction is not None:
             require_fitting(self.type, self.friction)
         return self

@@ -1,9 +1,7 @@
 """A whole scene as one frozen model; `Scene` is what every tower is given."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -54,7 +52,7 @@ class TimeSpan(Part):
     end: Time
 
     @model_validator(mode="after")
-    def _forward(self) -> TimeSpan:
+    def _forward(self) -> Self:
         if not self.end > self.start:
             raise ValueError(f"time.end = {self.end} s must lie after time.start = {self.start} s")
         return self
@@ -155,7 +153,7 @@ class View(Part):
     )
 
     @model_validator(mode="after")
-    def _points(self) -> View:
+    def _points(self) -> Self:
         for asked in (self.direction, self.up):
             if asked is not None and not any(asked):
                 raise ValueError("a direction must not have the length zero")
@@ -277,7 +275,7 @@ class Scene(Part):
         return {**table, "accuracy": {**accuracy, "by_need": not {"integrator", "step"} & set(solver or ())}}
 
     @model_validator(mode="after")
-    def _fits_together(self) -> Scene:
+    def _fits_together(self) -> Self:
         self.check()
         return self
 

@@ -1,9 +1,7 @@
 """How a scene asks for its integration: an integrator, and only the parameters that it has."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
@@ -32,13 +30,13 @@ class Stepping(Part):
     events: Literal["located", "at step ends"] = "located"
 
     @model_validator(mode="after")
-    def _located_unless_fixed(self) -> Stepping:
+    def _located_unless_fixed(self) -> Self:
         if self.events != "located" and self.step is None:
             raise ValueError('events = "at step ends" needs fixed steps: give step, or leave events out')
         return self
 
     @model_validator(mode="after")
-    def _has_what_chooses_steps(self) -> Stepping:
+    def _has_what_chooses_steps(self) -> Self:
         if self.step is None and not INTEGRATORS[self.integrator].estimates:
             raise ValueError(f'{self.integrator} has no error estimate to choose steps by: give step, e.g. "1e-5 s"')
         return self

@@ -1,9 +1,7 @@
 """How a run begins, where that is more than the bodies' poses and velocities."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 
@@ -28,7 +26,7 @@ class JointStart(Part):
     velocity: Measure | None = None
 
     @model_validator(mode="after")
-    def _something(self) -> JointStart:
+    def _something(self) -> Self:
         if all(getattr(self, key) is None for key in KEYS):
             raise ValueError(f"one of {', '.join(KEYS)} says how the coordinate starts; here none does")
         if self.position is not None and self.near is not None:
@@ -100,7 +98,7 @@ class Start(Part):
     branch: Annotated[tuple[Branch, ...], BeforeValidator(_several)] = ()
 
     @model_validator(mode="after")
-    def _no_two_deformations(self) -> Start:
+    def _no_two_deformations(self) -> Self:
         given = [name for name, modal in self.modal.items() if modal.coordinate]
         if self.at is not None and given:
             raise ValueError(

@@ -1,6 +1,6 @@
 """Stops at the ends of joint coordinates."""
 
-from __future__ import annotations
+from typing import Self
 
 from pydantic import model_validator
 
@@ -28,7 +28,7 @@ class Stop(Part):
     initial_approach_speed: Value | None = None
 
     @model_validator(mode="after")
-    def _complete(self) -> Stop:
+    def _complete(self) -> Self:
         if self.lower is None and self.upper is None:
             raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
         if self.normal.stiffness is None:

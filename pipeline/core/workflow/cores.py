@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import copy_context
+from threading import Event, Thread
 from typing import TypeVar
 
 from flexclear.pipeline.core.errors import StoppedError
-from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.system import cores
 
-__all__ = ["cores", "free", "side_by_side", "tell", "width"]
+__all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
 
 Result = TypeVar("Result")
+#: how long a thread is waited for before this one listens to the keyboard [s]: some systems interrupt no wait
+TICK = 0.1
 #: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
 BESIDE = 4
 
@@ -47,8 +52,6 @@ def side_by_side(
     raised.
     """
     from concurrent.futures import CancelledError, ThreadPoolExecutor
-    from contextvars import copy_context
-    from threading import Event
 
     given_up = Event()
 
@@ -68,3 +71,51 @@ def side_by_side(
             pool.shutdown(cancel_futures=True)
             raise
     return results
+
+
+class _GivenUpError(Exception):
+    """Nobody waits for this work any more."""
+
+
+@contextmanager
+def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
+    """Meanwhile a thread does some work that is mostly compiled code; gives what waits for its result.
+
+    work: is given a progress to call now and then, which ends it when what goes on beside it has failed.  Where no
+    processor is free it is done when its result is asked for.  What waits raises what the work raised.
+    """
+    if not free():
+        yield lambda: work(silent)
+        return
+    given_up, results, errors = Event(), list[Result](), list[BaseException]()
+
+    def alive(fraction: float | None, text: str) -> None:
+        if given_up.is_set():
+            raise _GivenUpError
+
+    def do() -> None:
+        try:
+            results.append(work(alive))
+        except BaseException as error:
+            errors.append(error)
+
+    def ended() -> None:
+        while thread.is_alive():
+            thread.join(TICK)
+
+    def result() -> Result:
+        ended()
+        if errors:
+            raise errors[0]
+        return results[0]
+
+    thread = Thread(target=copy_context().run, args=(do,))
+    thread.start()
+    try:
+        yield result
+    except BaseException as error:
+        if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves what it has in good order
+            given_up.set()
+        raise
+    finally:
+        ended()

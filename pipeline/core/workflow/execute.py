@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
+from flexclear.pipeline.core import threads
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.workflow import journal, opened
@@ -51,10 +52,8 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             load = store.arrays if hasattr(run, ARRAYS) else store.load
             data = {name: load(above) for name, above in inputs.items()}
             begun = store.path(task.stage, _with_files(task, known, store)[1], "part")
-            from threadpoolctl import threadpool_limits  # here, since what is fresh needs no BLAS
-
             with (
-                threadpool_limits(1),  # whoever loaded NumPy first, with however many threads
+                threads.one(),
                 journal.kept(begun.parent, begun.stem) as kept,
                 opened.watched(task.base, outside=(store.root,)) as read,
             ):

@@ -21,7 +21,7 @@ from pathlib import Path
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
 from flexclear.pipeline.core.artifacts.paths import TREE
 
-__all__ = ["TREE", "Sources", "imported", "library_version", "library_versions", "parents", "source_file"]
+__all__ = ["TREE", "Sources", "imported", "library_version", "library_versions", "parents", "source_file", "sources_of"]
 
 OWN = ("flexclear", "benchmarks")
 #: what modules import, by name, with the digest of the text that says so: what one `Sources` has learnt no other parses
@@ -67,6 +67,9 @@ class Sources:
             self._remember()
             known = dict(self.imports)
             self.closures[wanted] = self._reach(wanted)
+            for name, module in self.closures[wanted].items():
+                if self.imports.get(name, [""])[0] != module.digest:
+                    self.imports[name] = (module.digest, sorted(module.own), sorted(module.libraries))
             if self.memo is not None and self.imports != known:
                 with contextlib.suppress(OSError):
                     publish(self.memo, checked(self.imports))
@@ -119,12 +122,10 @@ class Sources:
     def _parse(self, path: Path, name: str) -> Module:
         source = path.read_bytes()
         digest = hashlib.sha256(source).hexdigest()
-        if self.imports.get(name, [""])[0] != digest:
-            if KNOWN.get(name, [""])[0] != digest:
-                own, libraries = imported(source, name, path.name == "__init__.py")
-                KNOWN[name] = (digest, sorted(own), sorted(libraries))
-            self.imports[name] = KNOWN[name]
-        _, own_names, library_names = self.imports[name]
+        if KNOWN.get(name, [""])[0] != digest:
+            own, libraries = imported(source, name, path.name == "__init__.py")
+            KNOWN[name] = (digest, sorted(own), sorted(libraries))
+        _, own_names, library_names = KNOWN[name]
         return Module(digest, frozenset(own_names), frozenset(library_names), path.name == "__init__.py")
 
     def _remember(self) -> None:
@@ -132,6 +133,15 @@ class Sources:
         if self.memo is not None and not self.imports:
             self.imports.update(read_checked(self.memo) or {})
             KNOWN.update(self.imports)
+
+
+#: this program's own modules, as this process has read them
+_OWN_MODULES: dict[str, Module | None] = {}
+
+
+def sources_of(root: Path, memo: Path | None = None) -> Sources:
+    """The source tree under `root`; this program's own is read once by a process, which runs what it was then."""
+    return Sources(root, memo, _OWN_MODULES if root == TREE else {})
 
 
 def source_file(root: Path, name: str) -> Path | None:
@@ -230,4 +240,5 @@ def _metadata(package: str) -> str | None:
     except PackageNotFoundError:
         return None
     # in a checkout that is on the path itself, the program's own stands under its older name
-    return found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    return text.partition("\n\n")[0]  # the rest describes the library

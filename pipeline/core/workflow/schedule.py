@@ -17,7 +17,7 @@ from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, Resource
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.workflow import cores, stopping, workers
 from flexclear.pipeline.core.workflow.execute import execute, find, key_of
-from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.fingerprint import Sources, sources_of
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import Task, in_order
 
@@ -275,7 +275,7 @@ def _work(
         reports.put((name, fraction, text))
 
     with stopping.busy():
-        return attempt(task, inputs, Store(root, say=partial(progress, None)), Sources(source, memo), progress)
+        return attempt(task, inputs, Store(root, say=partial(progress, None)), sources_of(source, memo), progress)
 
 
 def attempt(

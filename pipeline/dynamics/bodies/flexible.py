@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.bodies.interface import deform, in_interface, modal_rates
+from flexclear.pipeline.dynamics.bodies.interface import all_in_interface, deform, modal_rates
 from flexclear.pipeline.dynamics.bodies.modal_terms import (
     RATE,
     body_mass_matrix,
@@ -94,14 +94,15 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         n, x, u, data = places(h, k)
         P = h[m.MODAL]
         V = P + 9 * n
-        for e in range(9 * n):
-            w[P + e] = f[data + 3 * n + e]
-            w[V + e] = 0.0
-        first, count = m.FLEXES.moment0(h, k), m.FLEXES.n_moments(h, k)
-        for e in range(first, first + count):
-            row, i, value = m.MOMENTS.row_of(h, e), m.MOMENTS.mode(h, e), f[m.MOMENT_VALUES.row(h, e)]
-            w[P + row] += value * w[x + i]
-            w[V + row] += value * w[u + i]
+        e, first = m.FLEXES.moment0(h, k), m.FLEXES.moment_row0(h, k)
+        for row in range(9 * n):
+            place, rate, end = f[data + 3 * n + row], 0.0, m.MOMENT_ROWS.end(h, first + row)
+            while e < end:
+                i, value = m.MOMENTS.mode(h, e), f[m.MOMENT_VALUES.row(h, e)]
+                place += value * w[x + i]
+                rate += value * w[u + i]
+                e += 1
+            w[P + row], w[V + row] = place, rate
         for j in range(n):
             w[P + j] += second_moment(h, f, w, k, j, x)
 
@@ -155,10 +156,8 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         """Forces on the shapes of the interface basis, and the momentum that each one's rate carries."""
         n, x, c0 = m.FLEXES.n_modes(h, k), h[m.X] + m.FLEXES.q0(h, k), m.FLEXES.c0(h, k)
         bias, C = h[m.MODAL] + 18 * n, h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k)
-        S, T = bias + n, bias + 4 * n
-        in_interface(h, f, w, k, bias, h[m.MODAL_BIAS] + c0)
-        for e in range(3):
-            in_interface(h, f, w, k, S + e * n, T + e * n)
+        T = bias + 4 * n
+        all_in_interface(h, f, w, k, bias, h[m.MODAL_BIAS] + c0, T)
         for j in range(n):
             drawn = first_moment(h, f, w, k, j, x)  # if not zero, shapes are eigenmodes
             linear = turn(R, (f[C + j] + drawn, f[C + n + j], f[C + 2 * n + j]))

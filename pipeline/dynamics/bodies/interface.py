@@ -16,22 +16,33 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
-
-
-@kernel
-def _gather(h, f, w, k, first, source, out):
-    """Entries of T^T times a vector, from the entry `first` of T on."""
-    end = m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
-    for e in range(first, end):
-        w[out + m.BASIS.shape(h, e)] += f[m.BASIS_VALUES.row(h, e)] * w[source + m.BASIS.mode(h, e)]
+from flexclear.pipeline.dynamics.vectors import ZERO, add, scale
 
 
 @kernel
 def in_interface(h, f, w, k, source, out):
     """T^T of body k: what w holds of each mode from `source` on, of each shape from `out` on."""
+    e, end = m.FLEXES.basis0(h, k), m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
     for j in range(m.FLEXES.n_modes(h, k)):
-        w[out + j] = 0.0
-    _gather(h, f, w, k, m.FLEXES.basis0(h, k), source, out)
+        total = 0.0
+        while e < end and m.BASIS.shape(h, e) == j:
+            total += f[m.BASIS_VALUES.row(h, e)] * w[source + m.BASIS.mode(h, e)]
+            e += 1
+        w[out + j] = total
+
+
+@kernel
+def all_in_interface(h, f, w, k, source, out, more):
+    """The same of four times as much: what stands from `source` on goes to `out`, the three after it from `more` on."""
+    n, e, end = m.FLEXES.n_modes(h, k), m.FLEXES.basis0(h, k), m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
+    for j in range(n):
+        total, rest = 0.0, ZERO
+        while e < end and m.BASIS.shape(h, e) == j:
+            value, i = f[m.BASIS_VALUES.row(h, e)], source + m.BASIS.mode(h, e)
+            total += value * w[i]
+            rest = add(rest, scale(value, (w[i + n], w[i + 2 * n], w[i + 3 * n])))
+            e += 1
+        w[out + j], w[more + j], w[more + n + j], w[more + 2 * n + j] = total, rest[0], rest[1], rest[2]
 
 
 @kernel
@@ -48,11 +59,16 @@ def in_modes(h, f, w, k, source, out):
 def deform(h, f, w):
     """Coordinates of the moving shapes and their rates, INTERFACE_X and INTERFACE_U, from X and U."""
     for k in range(h[m.N_FLEX]):
-        c0, first = m.FLEXES.c0(h, k), m.FLEXES.moving0(h, k)
+        c0, x, u = m.FLEXES.c0(h, k), h[m.X] + m.FLEXES.q0(h, k), h[m.U] + m.FLEXES.c0(h, k)
+        e, end = m.FLEXES.moving0(h, k), m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
         for j in range(m.FLEXES.n_held(h, k), m.FLEXES.n_modes(h, k)):
-            w[h[m.INTERFACE_X] + c0 + j] = w[h[m.INTERFACE_U] + c0 + j] = 0.0
-        _gather(h, f, w, k, first, h[m.X] + m.FLEXES.q0(h, k), h[m.INTERFACE_X] + c0)
-        _gather(h, f, w, k, first, h[m.U] + c0, h[m.INTERFACE_U] + c0)
+            place = rate = 0.0
+            while e < end and m.BASIS.shape(h, e) == j:
+                value, i = f[m.BASIS_VALUES.row(h, e)], m.BASIS.mode(h, e)
+                place += value * w[x + i]
+                rate += value * w[u + i]
+                e += 1
+            w[h[m.INTERFACE_X] + c0 + j], w[h[m.INTERFACE_U] + c0 + j] = place, rate
 
 
 @kernel

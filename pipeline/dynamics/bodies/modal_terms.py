@@ -91,7 +91,7 @@ def body_mass_matrix(h, f, w, k):
     n, c0, held, moves = m.FLEXES.n_modes(h, k), m.FLEXES.c0(h, k), m.FLEXES.n_held(h, k), m.FLEXES.inboard(h, k)
     mass = h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k) + 3 * n
     for i in range(n):
-        start = h[m.MASS] + m.ENVELOPE.start(h, c0 + i) - m.ENVELOPE.first(h, c0 + i) + c0
+        start = h[m.MASS] + m.ENVELOPE.origin(h, c0 + i) + c0
         for j in range(0 if m.FLEXES.coupled(h, k) and i >= held else i, i + 1):
             value = f[mass + i * n + j]
             if moves and j >= held:

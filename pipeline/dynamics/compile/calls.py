@@ -24,14 +24,14 @@ _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
 _FLOAT, _INTEGER = types.float64, types.int64
 _TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
 #: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, w, y, retractment, out,
-#: total). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and columns, tolerance, out); (h, f,
-#: w, n, t, repeat, outputs with their number, rows, events);
+#: total). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and columns, tolerance, out with its
+#: length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
 #: (table, places, numbers, address of `stacks`' function)
 SIGNATURES = {
     "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(_INTEGERS, _FLOATS, _PLACE, _PLACE, _PLACE, _PLACE),
-    "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, *_TABLE),
+    "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
     "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
     "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS, _INTEGER),
 }
@@ -55,9 +55,10 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
-    if not INTERPRETED and looked_at():
-        import_module("flexclear.pipeline.dynamics.lowering")  # before anything is compiled: it spares Numba an import
-    return compiles(cfunc(SIGNATURES[name], error_model="numpy"))
+    options: dict[str, Any] = {"error_model": "numpy"}
+    if not INTERPRETED and looked_at():  # before anything is compiled: it spares Numba an import
+        options["pipeline_class"] = import_module("flexclear.pipeline.dynamics.lowering").WholeCompiler
+    return compiles(cfunc(SIGNATURES[name], **options))
 
 
 if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for places

@@ -24,7 +24,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported, library_version
+from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version, sources_of
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
@@ -34,7 +34,7 @@ from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
-SOURCES = Sources(TREE)
+SOURCES = sources_of(TREE)
 #: what the functions are to who waits for them
 WORDS = {
     "evaluate": "equations of motion",
@@ -59,7 +59,7 @@ _PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _TABLES, _TABLE_AT = (_PLACE,) * 4, (_PLACE, _INTEGER, _INTEGER)
 #: C types of what Python calls, as `calls.SIGNATURES` has them
 PROTOTYPES = {
-    "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, *_TABLE_AT),
+    "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, _PLACE, _INTEGER),
     "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
 }
 LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _PLACE, _INTEGER)
@@ -140,7 +140,7 @@ class Entry:
     ) -> None:
         """Evaluate what is recorded of every row."""
         given = (place(rows), *rows.shape, place(pieces, np.int64), *pieces.shape)
-        self._function(LATE)(*_tables(h, f, w, n), *given, tolerance, place(out), *out.shape)
+        self._function(LATE)(*_tables(h, f, w, n), *given, tolerance, place(out), len(out))
 
     def complete(self) -> None:
         """Wait for what is still being compiled."""
@@ -262,14 +262,11 @@ def reached(source: str) -> dict[str, str]:
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
     found: dict[str, str] = {}
-    waiting = sorted(imported(source.encode(), "entry", package=False)[0])
+    waiting = sorted(sources.imported(source))
     while waiting:
         name = waiting.pop()
-        module = SOURCES.module(name)
-        package = (SOURCES.root / Path(*name.split("."))).is_dir()
-        if module is None or name in found or not name.startswith(CODE):
-            continue
-        if not package:
+        module = SOURCES.module(name) if name.startswith(CODE) and name not in found else None
+        if module is not None and not module.package:
             found[name] = module.digest
             waiting.extend(module.own)
     return found

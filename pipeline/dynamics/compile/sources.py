@@ -7,12 +7,13 @@ the integrator and on whether there are closures and contacts, not on joints or 
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core import integrators
 from flexclear.pipeline.core.registry import listed
-from flexclear.pipeline.core.workflow.fingerprint import TREE, imported, source_file
+from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file
 from flexclear.pipeline.dynamics.effects import (
     FORMS,
     FRICTION_LAWS,
@@ -65,8 +66,13 @@ def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
 @cache
 def _reached(source: str) -> frozenset[str]:
     """Modules that a generated file imports; steps depend on few of the parts."""
-    names, _ = imported(source.encode(), "entry", package=False)
-    return frozenset(name for name in names if source_file(TREE, name))  # others are in modules
+    return frozenset(name for name in imported(source) if source_file(TREE, name))  # others are in modules
+
+
+def imported(source: str) -> set[str]:
+    """Modules and names that a generated file imports, as `fingerprint.imported` tells those of any other source."""
+    lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
+    return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
 
 def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
@@ -283,8 +289,8 @@ def retract(h, w, y, displacement, out, total):
     return 0
 """
 OBSERVE = """@calls.exported("observe")
-def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, out_count, out_width):
-    rows, out = calls.carray(rows, (count, width)), calls.carray(out, (out_count, out_width))
+def observe(h, f, w, n, rows, count, width, pieces, lines, laws, tolerance, out, length):
+    rows, out = calls.carray(rows, (count, width)), calls.carray(out, (length,))
     observation(h, f, w, n, rows, calls.carray(pieces, (lines, laws)), tolerance, out)
     return 0
 """

@@ -17,7 +17,7 @@ from __future__ import annotations
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.envelope import backward, base, factor, forward
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import add, at, at9, axis, cross, dot, dot6, put, scale, sub
+from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, at9, axis, cross, dot, dot6, put, scale, sub
 
 #: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
 SINGULAR_PIVOT = 1e-13
@@ -58,56 +58,96 @@ def rows(h, w, c):
 
 
 @kernel
+def at_some(w, i, count):
+    """The first `count` entries of a vector stored from place i, zeros for those that are not there."""
+    return (w[i], w[i + 1] if count > 1 else 0.0, w[i + 2] if count > 2 else 0.0)
+
+
+@kernel
+def put_some(w, i, v, count):
+    """Store the first `count` entries of a vector from place i."""
+    w[i] = v[0]
+    if count > 1:
+        w[i + 1] = v[1]
+    if count > 2:
+        w[i + 2] = v[2]
+
+
+@kernel
+def three(h, stored, c, t):
+    """Where JACOBIAN or SPREAD (`stored`) keeps the t-th three rows of closure c: slot after slot, side by side."""
+    return h[stored] + m.CLOSURES.jacobian0(h, c) + 3 * t * m.CLOSURES.n_support(h, c)
+
+
+@kernel
 def jacobian(h, w, c):
-    """J^T of closure c on its support: slot after slot, the rows of the closure side by side."""
-    start, size, count = h[m.JACOBIAN] + m.CLOSURES.jacobian0(h, c), m.CLOSURES.n_support(h, c), m.CLOSURES.n_kept(h, c)
-    for k in range(start, start + size * count):
-        w[k] = 0.0
-    first, wrenches = m.CLOSURES.entry0(h, c), m.ROWS.row(h, m.CLOSURES.row0(h, c))
-    for e in range(first, first + m.CLOSURES.n_entries(h, c)):
-        col, sign = m.COLUMNS.row(h, m.ENTRIES.column(h, e)), float(m.ENTRIES.sign(h, e))
-        angular, linear = scale(sign, at(w, col)), scale(sign, at(w, col + 3))
-        slot = start + count * m.ENTRIES.slot(h, e)
-        for k in range(count):
-            o = wrenches + 6 * k
-            w[slot + k] += dot(angular, at(w, o)) + dot(linear, at(w, o + 3))
+    """J^T of closure c on its support."""
+    count, wrenches, first = m.CLOSURES.n_kept(h, c), m.ROWS.row(h, m.CLOSURES.row0(h, c)), m.CLOSURES.entry0(h, c)
+    for t in range(m.CLOSURES.threes(h, c)):
+        start, o, second, third = three(h, m.JACOBIAN, c, t), wrenches + 18 * t, 3 * t + 1 < count, 3 * t + 2 < count
+        for k in range(start, start + 3 * m.CLOSURES.n_support(h, c)):
+            w[k] = 0.0
+        moment0, force0 = at(w, o), at(w, o + 3)
+        moment1, force1 = at(w, o + 6) if second else ZERO, at(w, o + 9) if second else ZERO
+        moment2, force2 = at(w, o + 12) if third else ZERO, at(w, o + 15) if third else ZERO
+        for e in range(first, first + m.CLOSURES.n_entries(h, c)):
+            col, sign = m.COLUMNS.row(h, m.ENTRIES.column(h, e)), float(m.ENTRIES.sign(h, e))
+            angular, linear = at(w, col), at(w, col + 3)
+            share = (
+                dot(moment0, angular) + dot(force0, linear),
+                dot(moment1, angular) + dot(force1, linear),
+                dot(moment2, angular) + dot(force2, linear),
+            )
+            accumulate(w, start + 3 * m.ENTRIES.slot(h, e), scale(sign, share))
 
 
 @kernel
 def spread(h, w, c):
     """L^-1 J^T of closure c, laid out like J^T."""
-    size, support, count = m.CLOSURES.n_support(h, c), m.CLOSURES.support0(h, c), m.CLOSURES.n_kept(h, c)
-    J, S = h[m.JACOBIAN] + m.CLOSURES.jacobian0(h, c), h[m.SPREAD] + m.CLOSURES.jacobian0(h, c)
-    for a in range(size):
-        i = m.SUPPORT.coordinate(h, support + a)
-        first, row, mine = m.ENVELOPE.first(h, i), base(h, h[m.ENVELOPE.place], h[m.MASS], i), S + count * a
-        for r in range(count):
-            w[mine + r] = w[J + count * a + r]
-        for b in range(a - 1, -1, -1):
-            k = m.SUPPORT.coordinate(h, support + b)
-            if k < first:
-                break  # in increasing order
-            l_ik, other = w[row + k], S + count * b
-            for r in range(count):
-                w[mine + r] -= l_ik * w[other + r]
-        inverse = w[row + i]
-        for r in range(count):
-            w[mine + r] *= inverse
+    size, support = m.CLOSURES.n_support(h, c), m.CLOSURES.support0(h, c)
+    for t in range(m.CLOSURES.threes(h, c)):
+        J, S = three(h, m.JACOBIAN, c, t), three(h, m.SPREAD, c, t)
+        for a in range(size):
+            i = m.SUPPORT.coordinate(h, support + a)
+            first, row, value = m.ENVELOPE.first(h, i), base(h, h[m.ENVELOPE.place], h[m.MASS], i), at(w, J + 3 * a)
+            for b in range(a - 1, -1, -1):
+                k = m.SUPPORT.coordinate(h, support + b)
+                if k < first:
+                    break  # in increasing order
+                value = sub(value, scale(w[row + k], at(w, S + 3 * b)))
+            put(w, S + 3 * a, scale(w[row + i], value))
+
+
+@kernel
+def put_couplings(h, w, row, column, values, count):
+    """The first `count` of three entries of J M^-1 J^T."""
+    put_some(w, base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], row) + column, values, count)
 
 
 @kernel
 def couple(h, w, p):
-    """The block of J M^-1 J^T between the closures of pair p, added to zeros."""
+    """The block of J M^-1 J^T between the closures of pair p, three by three entries after the other."""
     a, b, common = m.CLOSURE_PAIRS.a(h, p), m.CLOSURE_PAIRS.b(h, p), m.CLOSURE_PAIRS.common0(h, p)
-    A, B = h[m.SPREAD] + m.CLOSURES.jacobian0(h, a), h[m.SPREAD] + m.CLOSURES.jacobian0(h, b)
-    rows_a, rows_b = m.CLOSURES.n_kept(h, a), m.CLOSURES.n_kept(h, b)
-    row0, col0 = m.CLOSURES.kept0(h, b), m.CLOSURES.kept0(h, a)
-    for k in range(common, common + m.CLOSURE_PAIRS.n_common(h, p)):
-        left, right = A + rows_a * m.COMMON.a(h, k), B + rows_b * m.COMMON.b(h, k)
-        for r in range(rows_b):
-            value, row = w[right + r], base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], row0 + r) + col0
-            for s in range(r + 1 if a == b else rows_a):
-                w[row + s] += value * w[left + s]
+    for t in range(m.CLOSURES.threes(h, b)):
+        right = three(h, m.SPREAD, b, t)
+        row, rows = m.CLOSURES.kept0(h, b) + 3 * t, m.CLOSURES.n_kept(h, b) - 3 * t
+        for u in range(t + 1 if a == b else m.CLOSURES.threes(h, a)):
+            left, first, second, third = three(h, m.SPREAD, a, u), ZERO, ZERO, ZERO
+            for k in range(common, common + m.CLOSURE_PAIRS.n_common(h, p)):
+                values, factors = at(w, left + 3 * m.COMMON.a(h, k)), at(w, right + 3 * m.COMMON.b(h, k))
+                first = add(first, scale(factors[0], values))
+                second = add(second, scale(factors[1], values))
+                third = add(third, scale(factors[2], values))
+            column, columns, diagonal = (
+                m.CLOSURES.kept0(h, a) + 3 * u,
+                m.CLOSURES.n_kept(h, a) - 3 * u,
+                a == b and t == u,
+            )
+            put_couplings(h, w, row, column, first, 1 if diagonal else columns)
+            if rows > 1:
+                put_couplings(h, w, row + 1, column, second, 2 if diagonal else columns)
+            if rows > 2:
+                put_couplings(h, w, row + 2, column, third, 3 if diagonal else columns)
 
 
 @kernel
@@ -122,8 +162,8 @@ def complete(h, w, n):
     for r in range(h[m.N_KEPT_ROWS]):
         size = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r]
         w[h[m.ROW_SCALE] + h[m.N_CLOSURE_ROWS] + r] = size
-    ratio = factor(h, h[m.CLOSURE_ENVELOPE.place], w, h[m.SCHUR], h[m.N_KEPT_ROWS], SINGULAR_PIVOT)
-    pivot = independence(h, w) if ratio > SINGULAR_PIVOT else 0.0
+    sound = factor(h, h[m.CLOSURE_ENVELOPE.place], w, h[m.SCHUR], h[m.N_KEPT_ROWS], SINGULAR_PIVOT)
+    pivot = independence(h, w) if sound else 0.0
     w[h[m.PIVOT] + m.LAST_PIVOT] = pivot
     n[m.EVALUATION] = m.OK if pivot > SINGULAR_PIVOT else m.SINGULAR
 
@@ -131,26 +171,37 @@ def complete(h, w, n):
 @kernel
 def independence(h, w):
     """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
-    least = 1.0
+    most = 1.0
     for r in range(h[m.N_KEPT_ROWS]):
         inverse = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r]
-        pivot = 1.0 / (inverse * inverse)
         o = h[m.ROW_SCALE] + r
-        least = min(least, pivot / max(w[o], w[o + h[m.N_CLOSURE_ROWS]]))
-    return least
+        most = max(most, inverse * inverse * max(w[o], w[o + h[m.N_CLOSURE_ROWS]]))
+    return 1.0 / most
 
 
 @kernel
 def add_spread(h, w, y, weight):
     """Y <- y + weight L^-1 J^T lambda, y in w."""
     for c in range(h[m.N_CLOSURES]):
-        count, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
-        S, first = h[m.SPREAD] + m.CLOSURES.jacobian0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for a in range(m.CLOSURES.n_support(h, c)):
-            total = 0.0
-            for r in range(count):
-                total += w[S + count * a + r] * w[first + r]
-            w[y + m.SUPPORT.coordinate(h, support + a)] += weight * total
+        support, first = m.CLOSURES.support0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
+        for t in range(m.CLOSURES.threes(h, c)):
+            S, forces = three(h, m.SPREAD, c, t), at_some(w, first + 3 * t, m.CLOSURES.n_kept(h, c) - 3 * t)
+            forces = scale(weight, forces)
+            for a in range(m.CLOSURES.n_support(h, c)):
+                w[y + m.SUPPORT.coordinate(h, support + a)] += dot(forces, at(w, S + 3 * a))
+
+
+@kernel
+def take_spread(h, w, y):
+    """Lambda <- lambda - (L^-1 J^T)^T y, y in w."""
+    for c in range(h[m.N_CLOSURES]):
+        support, first = m.CLOSURES.support0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
+        for t in range(m.CLOSURES.threes(h, c)):
+            S, count = three(h, m.SPREAD, c, t), m.CLOSURES.n_kept(h, c) - 3 * t
+            total = at_some(w, first + 3 * t, count)
+            for a in range(m.CLOSURES.n_support(h, c)):
+                total = sub(total, scale(w[y + m.SUPPORT.coordinate(h, support + a)], at(w, S + 3 * a)))
+            put_some(w, first + 3 * t, total, count)
 
 
 @kernel
@@ -173,13 +224,7 @@ def solve(h, w):
 def respond(h, w):
     """Multipliers of what is asked of the rows (there, in place) and of FORCE, which holds L^-1 f and is completed by
     them: L^-T then gives the accelerations."""
-    for c in range(h[m.N_CLOSURES]):
-        count, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
-        S, first = h[m.SPREAD] + m.CLOSURES.jacobian0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for a in range(m.CLOSURES.n_support(h, c)):
-            force = w[h[m.FORCE] + m.SUPPORT.coordinate(h, support + a)]
-            for r in range(count):
-                w[first + r] -= w[S + count * a + r] * force
+    take_spread(h, w, h[m.FORCE])
     solve(h, w)
     add_spread(h, w, h[m.FORCE], 1.0)
 

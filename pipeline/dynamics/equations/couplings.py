@@ -48,12 +48,12 @@ def jacobian(h, w, c):
     start = h[m.JACOBIAN] + m.CLOSURES.jacobian0(h, c)
     if m.CLOSURES.n_kept(h, c) == 0:
         return
-    for k in range(start, start + m.CLOSURES.n_support(h, c)):
+    for k in range(start, start + 3 * m.CLOSURES.n_support(h, c)):
         w[k] = 0.0
     first = m.CLOSURES.entry0(h, c)
     for e in range(first, first + m.CLOSURES.n_entries(h, c)):
         col, o = m.COLUMNS.row(h, m.ENTRIES.column(h, e)), wrench_row(h, c, m.ENTRIES.part(h, e))
-        w[start + m.ENTRIES.slot(h, e)] += m.ENTRIES.sign(h, e) * dot6(w, o, w, col)
+        w[start + 3 * m.ENTRIES.slot(h, e)] += m.ENTRIES.sign(h, e) * dot6(w, o, w, col)
 
 
 @kernel

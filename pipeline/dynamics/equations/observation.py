@@ -11,8 +11,9 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
+from flexclear.pipeline.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
-from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest
+from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest, widest
 from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing, spread_state
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
@@ -21,6 +22,9 @@ from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
 ENERGY = m.layout("kinetic potential elastic")
 #: tolerance by which the loops of rows stay as they are, and nothing but frames is written
 AS_RECORDED = -1.0
+#: of so many rows one is closed first, and those between two of them start from what that changed there, where rows
+#: follow at distances in time that differ by no more than this share
+APART, EVEN = 4, 1e-6
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,10 @@ class Observed:
 
     state: with its loops closed, (rows, NY).  positions, speeds, accelerations: of all coordinates, free ones first.
     links, sites: their frames (LINK_FRAMES), of which accelerations are true ones less gravity; (rows, links or sites).
+    body_position, ...: of the moving bodies' centres of mass and axes, (rows, bodies, 3); quaternions w x y z, w >= 0,
+    (rows, bodies, 4).  frame_position: of all named frames, (rows, frames, 3).  Of flexible bodies as if undeformed.
+    body_demand: what rigid bodies need to move as they do, less their weight, where others share their link: moment
+    about the kernels' origin, force; (rows, bodies, 6), 0 of all others.
     link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
     about the kernels' origin (WRENCH).  touch, loads, bearings: what contacts, loads and bearings with friction do
     (TOUCH, LOAD, BEARING).
@@ -43,6 +51,14 @@ class Observed:
     accelerations: np.ndarray
     links: np.ndarray
     sites: np.ndarray
+    body_position: np.ndarray
+    body_quaternion: np.ndarray
+    body_velocity: np.ndarray
+    body_omega: np.ndarray
+    body_acceleration: np.ndarray
+    body_alpha: np.ndarray
+    body_demand: np.ndarray
+    frame_position: np.ndarray
     link_wrenches: np.ndarray
     closure_wrenches: np.ndarray
     touch: np.ndarray
@@ -56,26 +72,35 @@ class Observed:
 
 
 def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
-    """What `observe` writes, in its order: rows of which table, or floats (None), and how many of them."""
+    """What `observe` writes, in its order: of what in each row, and how many of them.
+
+    Of rows of a table, of vectors of so many numbers, or of floats (None).
+    """
     drives = size(m.N_DRIVES)
     return {
+        "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
+        **{f"body_{name}": (numbers, size(m.N_BODIES)) for name, numbers in OF_BODIES.items()},
+        "frame_position": (3, size(m.N_FRAMES)),
+        "energy": (ENERGY, 1),
+        "residual": (None, 1),
+        "status": (None, 1),
+        **_frames(size),
         "state": (None, size(m.NY)),
         "positions": (None, size(m.NQ) + drives),
         "speeds": (None, size(m.NV) + drives),
-        "accelerations": (None, size(m.NV) + drives),
-        "links": (m.LINK_FRAMES, size(m.N_LINKS)),
-        "sites": (m.SITE_FRAMES, size(m.N_SITES)),
+        "free_accelerations": (None, size(m.NV)),
+        "driven_accelerations": (None, drives),
         "link_wrenches": (m.WRENCH, size(m.N_LINKS)),
-        "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
         "touch": (m.TOUCH, size(m.N_CONTACTS)),
         "loads": (m.LOAD, size(m.N_LOADS)),
         "bearings": (m.BEARING, size(m.N_BEARINGS)),
         "drive_force": (None, drives),
-        "energy": (ENERGY, 1),
         "jacobian": (None, size(m.JACOBIAN_SIZE)),
-        "residual": (None, 1),
-        "status": (None, 1),
     }
+
+
+def _frames(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
+    return {"links": (m.LINK_FRAMES, size(m.N_LINKS)), "sites": (m.SITE_FRAMES, size(m.N_SITES))}
 
 
 class Frames(NamedTuple):
@@ -85,31 +110,45 @@ class Frames(NamedTuple):
     sites: np.ndarray
 
 
-def frames_room(rows: int, size: Callable[[int], int]) -> np.ndarray:
-    """Room for frames alone, shape (rows, columns)."""
-    return np.empty((rows, m.FRAME.size * (size(m.N_LINKS) + size(m.N_SITES))))
+#: what `observe` has written, each over the rows: (rows, numbers)
+Blocks = dict[str, np.ndarray]
 
 
-def frames_by_name(out: np.ndarray, size: Callable[[int], int]) -> Frames:
-    """Views of the frames that `observe` has written."""
-    end = m.FRAME.size * size(m.N_LINKS)
+def room(rows: int, size: Callable[[int], int], *, frames: bool = False) -> tuple[np.ndarray, Blocks]:
+    """Zeros that `observe` can write on, all in one piece, and the parts of it; size: of a place in the header.
+
+    One quantity of all rows stands in one piece, as datasets have it.  frames: whether only they are written.
+    """
+    columns = _frames(size) if frames else _columns(size)
+    widths = [_numbers(kind) * count for kind, count in columns.values()]
+    ends = rows * np.cumsum(widths)
+    whole = np.zeros(int(ends[-1]))
+    parts = np.split(whole, ends[:-1])
+    return whole, {name: part.reshape(rows, w) for name, part, w in zip(columns, parts, widths, strict=True)}
+
+
+def _numbers(kind: Any) -> int:
+    return 1 if kind is None else getattr(kind, "size", kind)
+
+
+def frames_by_name(blocks: Blocks, size: Callable[[int], int]) -> Frames:
+    """Views of the frames alone that `observe` has written."""
     known = ["origin", "axes", "omega", "velocity"]
-    return Frames(m.named(m.LINK_FRAMES, out[:, :end])[known], m.named(m.SITE_FRAMES, out[:, end:])[known])
+    return Frames(*(_named(kind, count, blocks[name])[known] for name, (kind, count) in _frames(size).items()))
 
 
-def room(rows: int, size: Callable[[int], int]) -> np.ndarray:
-    """Zeros that `observe` can write on, shape (rows, columns); size: of a place in the header."""
-    return np.zeros((rows, sum((table.size if table else 1) * count for table, count in _columns(size).values())))
-
-
-def by_name(out: np.ndarray, size: Callable[[int], int]) -> Observed:
+def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
     """Views of what `observe` has written."""
-    fields, end = dict[str, np.ndarray](), 0
-    for name, (table, count) in _columns(size).items():
-        begin, end = end, end + (table.size if table else 1) * count
-        fields[name] = m.named(table, out[:, begin:end]) if table else out[:, begin:end]
+    fields = {name: _named(kind, count, blocks[name]) for name, (kind, count) in _columns(size).items()}
+    accelerations = np.concatenate([fields.pop("free_accelerations"), fields.pop("driven_accelerations")], axis=1)
     single = {name: fields[name][:, 0] for name in ("energy", "residual", "status")}
-    return Observed(**fields | single)
+    return Observed(**fields | single, accelerations=accelerations)
+
+
+def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
+    if isinstance(kind, int):
+        return block.reshape(len(block), count, kind)
+    return block if kind is None else m.named(kind, block)
 
 
 @kernel
@@ -129,10 +168,55 @@ def no_friction(h, w, out, column):
 
 
 @kernel
-def _copy(w, first, count, out, column):
-    for k in range(count):
-        out[column + k] = w[first + k]
-    return column + count
+def columns_before_state(h):
+    """Columns of what is worked out, and of the frames of links and sites."""
+    worked_out = m.WRENCH.size * h[m.N_CLOSURES] + SIZE * h[m.N_BODIES] + 3 * h[m.N_FRAMES] + ENERGY.size + 2
+    return worked_out + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES])
+
+
+@kernel
+def place_of(k, count):
+    """Row that comes k-th: of `count` rows every fourth comes first."""
+    first = (count + APART - 1) // APART
+    return APART * k if k < first else (k - first) + (k - first) // (APART - 1) + 1
+
+
+@kernel
+def even(rows, first, last):
+    """Whether the rows from the first to the last follow at equal distances in time."""
+    step = (rows[last, 0] - rows[first, 0]) / (last - first)
+    most = 0.0
+    for r in range(first, last):
+        most = max(most, abs(rows[r + 1, 0] - rows[r, 0] - step))
+    return most < EVEN * step
+
+
+@kernel
+def open_by(h, w):
+    """How far loops are open, or how fast they open, at the evaluated state [m, or m/s]."""
+    return max(widest(h, w, h[m.RESIDUAL], True), widest(h, w, h[m.RESIDUAL_RATE], True))
+
+
+@kernel
+def foresee(h, w, rows, r, state, closed, states):
+    """Add to Y, which is as recorded, what closing the loops is to change there; whether that is anything.
+
+    By how much loops are open grows and falls within a step as smoothly as the motion: the cubic through the changes
+    of two rows before and two after that have been closed.  states: place of their states, row after row, in closed.
+    """
+    before, most = r - r % APART, 0.0
+    s = (r - before) / APART
+    outer, inner = -s * (1.0 - s) / 6.0, (1.0 + s) * (2.0 - s) / 2.0
+    for k in range(h[m.NQ] + h[m.NV]):
+        change = 0.0
+        for j in range(-1, 3):
+            row = before + APART * j
+            # of Lagrange's interpolation between -1, 0, 1 and 2
+            weight = inner * (1.0 - s if j == 0 else s) if 0 <= j <= 1 else outer * (2.0 - s if j < 0 else 1.0 + s)
+            change += weight * (closed[states + h[m.NY] * row + k] - rows[row, state + k])
+        w[h[m.Y] + k] += change
+        most = max(most, abs(change))
+    return most > 0.0
 
 
 def make_observation(
@@ -147,7 +231,7 @@ def make_observation(
     couplings: Any = None,
     friction: Callable | None = None,
 ) -> Callable:
-    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out); one row of `out` per row.
+    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out), which writes on the blocks of `room`.
 
     With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
 
@@ -162,37 +246,37 @@ def make_observation(
     flexible_energy = no_energy if flexible is None else flexible.energies
 
     @kernel
-    def closure_wrenches(h, w, out, column):
-        """Wrench of every closure on its second body; taken off the links that it acts on."""
+    def closure_wrenches(h, w, out, o):
+        """Wrench of every closure on its second body, from out[o] on; taken off the links that it acts on."""
         for c in range(h[m.N_CLOSURES]):
             for e in range(6):
                 total = 0.0
                 for k in range(m.CLOSURES.n_kept(h, c)):
                     wrench_row = m.ROWS.row(h, m.CLOSURES.row0(h, c) + k)
                     total += w[wrench_row + e] * w[h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c) + k]
-                out[column + 6 * c + e] = total
+                out[o + 6 * c + e] = total
                 w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_b(h, c))) + e] -= total
                 w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_a(h, c))) + e] += total
         couple(h, w)
-        rub(h, w, out, column)
-        return column + 6 * h[m.N_CLOSURES]
+        rub(h, w, out, o)
 
     @kernel
-    def joint_wrenches(h, f, w, n, out, column):
-        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler)."""
+    def joint_wrenches(h, f, w, n, out, o):
+        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler).
+
+        Wrenches of closures are stored from out[o] on.
+        """
         forces(h, f, w, n)
         modal_inertia(h, f, w, n)
-        after = closure_wrenches(h, w, out, column + 6 * h[m.N_LINKS])
+        closure_wrenches(h, w, out, o)
         for i in range(h[m.N_LINKS] - 1, 0, -1):
             up = m.WRENCH.row(h, m.LINKS.parent(h, i))
             accumulate(w, up, at(w, m.WRENCH.row(h, i)))
             accumulate(w, up + 3, at(w, m.WRENCH.row(h, i) + 3))
-        _copy(w, h[m.WRENCH.place], 6 * h[m.N_LINKS], out, column)
-        return after
 
     @kernel
-    def energies(h, f, w, out, column):
-        """Kinetic energy, potential of gravity, energy stored in bodies and contacts."""
+    def energies(h, f, w, out, o):
+        """Kinetic energy, potential of gravity, energy stored in bodies and contacts, from out[o] on."""
         kinetic, elastic = flexible_energy(h, f, w)
         potential = 0.0
         for i in range(1, h[m.N_LINKS]):
@@ -203,17 +287,7 @@ def make_observation(
             elastic += w[m.TOUCH.row(h, c) + m.TOUCH.stored] + w[m.TOUCH.row(h, c) + m.TOUCH.bent]
         for k in range(h[m.N_LOADS]):
             elastic += w[m.LOAD.row(h, k) + m.LOAD.stored]
-        out[column], out[column + 1], out[column + 2] = kinetic, potential, elastic
-        return column + 3
-
-    @kernel
-    def evaluate_closed(h, f, w, n, t, tolerance):
-        """Evaluate the state in Y with its loops closed to `tolerance`."""
-        evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
-        if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
-            n[m.EVALUATION] = m.NOT_CLOSED
-        if n[m.EVALUATION] == m.OK and h[m.N_KEPT_ROWS] > 0 and w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
-            n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
+        out[o], out[o + 1], out[o + 2] = kinetic, potential, elastic
 
     @kernel
     def place(h, f, w, n, t):
@@ -223,48 +297,95 @@ def make_observation(
         prescribe(h, w)
 
     @kernel
-    def copy_frames(h, w, line, column):
-        """Copy the frames of links and sites."""
-        o = _copy(w, h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS], line, column)
-        return _copy(w, h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES], line, o)
+    def copy(h, w, out, every, r, column, frames):
+        """Copy the stretches of w that are recorded as they are, each to its row in its block.
+
+        column: number of columns before them.  frames: whether only those of links and sites.
+        """
+        known = h[m.N_DRIVES]
+        stretches = (
+            (h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS]),
+            (h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES]),
+            (h[m.Y], h[m.NY]),
+            (h[m.X], h[m.NQ] + known),
+            (h[m.U], h[m.NV] + known),
+            (h[m.SLOPES] + h[m.NQ], h[m.NV]),
+            (h[m.DU] + h[m.NV], known),
+            (h[m.WRENCH.place], m.WRENCH.size * h[m.N_LINKS]),
+            (h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS]),
+            (h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS]),
+            (h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS]),
+            (h[m.DRIVE_FORCE], known),
+            (h[m.JACOBIAN], h[m.JACOBIAN_SIZE]),
+        )
+        for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
+            first, count = stretches[s]
+            o = every * column + count * r
+            for k in range(count):
+                out[o + k] = w[first + k]
+            column += count
+
+    @kernel
+    def store(h, f, w, n, out, every, r):
+        """Store what is worked out of a row that has been evaluated; the number of columns that it takes."""
+        status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
+        column = m.WRENCH.size * h[m.N_CLOSURES]
+        joint_wrenches(h, f, w, n, out, column * r)
+        put_bodies(h, f, w, out, every * column, every, r)
+        column += SIZE * h[m.N_BODIES]
+        put_frames(h, f, w, out, every * column + 3 * h[m.N_FRAMES] * r)
+        column += 3 * h[m.N_FRAMES]
+        energies(h, f, w, out, every * column + ENERGY.size * r)
+        column += ENERGY.size
+        out[every * column + r], out[every * (column + 1) + r] = residual, status
+        return column + 2
+
+    @kernel
+    def select(h, w, n, row, pieces):
+        """State, contacts' modes and pieces of the laws of a row of the record."""
+        mode, latched, state = m.record_columns(h[m.N_CONTACTS])
+        for c in range(h[m.N_CONTACTS]):
+            n[n[m.MODE] + c] = int(row[mode + c])
+            w[h[m.LATCHED] + c] = row[latched + c]
+        for k in range(h[m.N_LAWS]):
+            n[n[m.ACTIVE] + k] = pieces[k]
+        for k in range(h[m.NY]):
+            w[h[m.Y] + k] = row[state + k]
+        return state
+
+    @kernel
+    def close(h, f, w, n, t, tolerance):
+        """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
+        if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
+            n[m.EVALUATION] = m.NOT_CLOSED
+        if n[m.EVALUATION] == m.OK and h[m.N_KEPT_ROWS] > 0 and w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
+            n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
+        if n[m.EVALUATION] == m.OK:
+            keep_scales(h, w)
 
     @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):
-        mode, latched, state = m.record_columns(h[m.N_CONTACTS])
-        for r in range(rows.shape[0]):
-            row, line = rows[r], out[r]
-            for c in range(h[m.N_CONTACTS]):
-                n[n[m.MODE] + c] = int(row[mode + c])
-                w[h[m.LATCHED] + c] = row[latched + c]
-            for k in range(h[m.NY]):
-                w[h[m.Y] + k] = row[state + k]
-            for k in range(h[m.N_LAWS]):
-                n[n[m.ACTIVE] + k] = pieces[r, k]
+        every, uneven, states = rows.shape[0], -1, rows.shape[0] * columns_before_state(h)
+        for turn in range(every):
+            r = place_of(turn, every)
+            first, last = r - r % APART - APART, r - r % APART + 2 * APART
+            foreseen = tolerance != AS_RECORDED and r % APART > 0 and first >= 0 and last < every and first != uneven
+            foreseen = foreseen and even(rows, first, last)
+            while True:
+                state = select(h, w, n, rows[r], pieces[r])
+                if tolerance == AS_RECORDED:
+                    place(h, f, w, n, rows[r, 0])
+                    break
+                foreseen = foreseen and foresee(h, w, rows, r, state, out, states)
+                evaluate(h, f, w, n, rows[r, 0], h[m.Y], h[m.SLOPES])
+                if not foreseen or open_by(h, w) <= tolerance:
+                    close(h, f, w, n, rows[r, 0], tolerance)
+                    break
+                uneven, foreseen = first, False  # as where a step ends
+            kinematics(h, f, w)  # at the accelerations in DU
             if tolerance == AS_RECORDED:
-                place(h, f, w, n, row[0])
+                copy(h, w, out, every, r, 0, True)
             else:
-                evaluate_closed(h, f, w, n, row[0], tolerance)
-                if n[m.EVALUATION] == m.OK:
-                    keep_scales(h, w)
-            # at the accelerations in DU; written once, since twice would be compiled twice
-            kinematics(h, f, w)
-            if tolerance == AS_RECORDED:
-                copy_frames(h, w, line, 0)
-                continue
-            status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
-            o = _copy(w, h[m.Y], h[m.NY], line, 0)
-            o = _copy(w, h[m.X], h[m.NQ] + h[m.N_DRIVES], line, o)
-            o = _copy(w, h[m.U], h[m.NV] + h[m.N_DRIVES], line, o)
-            o = _copy(w, h[m.SLOPES] + h[m.NQ], h[m.NV], line, o)
-            o = _copy(w, h[m.DU] + h[m.NV], h[m.N_DRIVES], line, o)
-            o = copy_frames(h, w, line, o)
-            o = joint_wrenches(h, f, w, n, line, o)
-            o = _copy(w, h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS], line, o)
-            o = _copy(w, h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS], line, o)
-            o = _copy(w, h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS], line, o)
-            o = _copy(w, h[m.DRIVE_FORCE], h[m.N_DRIVES], line, o)
-            o = energies(h, f, w, line, o)
-            o = _copy(w, h[m.JACOBIAN], h[m.JACOBIAN_SIZE], line, o)
-            line[o], line[o + 1] = residual, status
+                copy(h, w, out, every, r, store(h, f, w, n, out, every, r), False)
 
     return observe

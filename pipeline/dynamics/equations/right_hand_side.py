@@ -179,8 +179,9 @@ def make_rates(
             w[k] = 0.0
         forces(h, f, w, n)
         modal_mass(h, f, w)
-        for k in range(m.INERTIA.size * h[m.N_LINKS]):
-            w[h[m.INERTIA.place] + k] = w[h[m.OWN.place] + k]
+        for i in range(h[m.N_LINKS]):
+            for e in range(m.INERTIA.size):
+                w[m.INERTIA.row(h, i) + e] = w[m.OWN.row(h, i) + e]
         for i in range(h[m.N_LINKS] - 1, 0, -1):
             port_load(h, w, i)
             gather(h, w, i)
@@ -212,7 +213,7 @@ def make_rates(
         gather_forces(h, f, w, n)
         assemble_mass(h, w)
         n[m.EVALUATION] = m.OK
-        if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], MASSLESS_PIVOT) > MASSLESS_PIVOT:
+        if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], MASSLESS_PIVOT):
             n[m.EVALUATION] = m.NOT_POSITIVE
             return
         for k in range(h[m.NV]):

@@ -22,7 +22,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
-from flexclear.pipeline.dynamics.equations.closures import add_spread, solve
+from flexclear.pipeline.dynamics.equations.closures import add_spread, solve, take_spread
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.integrate import contact_springs as springs
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -202,14 +202,9 @@ def constrained(h, w, b):
     Modes are in the interface basis.
     """
     forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)
-    for c in range(h[m.N_CLOSURES]):
-        rows, support = m.CLOSURES.n_kept(h, c), m.CLOSURES.support0(h, c)
-        S, first = h[m.SPREAD] + m.CLOSURES.jacobian0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for r in range(rows):
-            total = 0.0
-            for a in range(m.CLOSURES.n_support(h, c)):
-                total -= w[S + rows * a + r] * w[b + m.SUPPORT.coordinate(h, support + a)]
-            w[first + r] = total
+    for k in range(h[m.MULTIPLIER], h[m.MULTIPLIER] + h[m.N_KEPT_ROWS]):
+        w[k] = 0.0
+    take_spread(h, w, b)
     solve(h, w)
     add_spread(h, w, b, 1.0)
     backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)

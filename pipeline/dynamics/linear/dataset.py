@@ -124,11 +124,11 @@ def _energies(motions: Motions) -> dict[str, np.ndarray]:
     motions: of the pose with its drives' motion alone, which is taken off, then with the speeds of vibrations.
     The shortening of bent beams, which is of second order here, is left out.
     """
-    energies = {name: _rigid(body, motions.bodies[name]) for name, body in motions.model.scene.rigid().items()}
+    energies = {name: _rigid(body, motions.body(name)) for name, body in motions.model.scene.rigid().items()}
     for i in motions.model.numbering.flexible:
         link, state = motions.model.links[i], motions.modal(i)
         assert link.bundle is not None
-        energies[str(link.flexible)] = _flexible(link.bundle, motions.links[i], state.q[0], state.u[1:] - state.u[0])
+        energies[str(link.flexible)] = _flexible(link.bundle, motions.link(i), state.q[0], state.u[1:] - state.u[0])
     return energies
 
 

@@ -199,10 +199,10 @@ def modal_forces(
 ) -> np.ndarray:
     """Forces of its joints, its inertia and gravity along the elastic coordinates of a body, shape (rows, mode) [N]."""
     i = model.mechanism.link_of[name]
-    R_WB = motions.links[i].R[rows] @ model.mechanism.links[i].places[name].R
+    R_WB = motions.link(i).R[rows] @ model.mechanism.links[i].places[name].R
     shapes, turns = bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values
     frames = [str(frame) for frame in bundle["frame"].values]
-    accelerations = np.einsum("tji,tj->ti", R_WB, motions.links[i].a[rows] - model.gravity)
+    accelerations = np.einsum("tji,tj->ti", R_WB, motions.link(i).a[rows] - model.gravity)
     forces = -accelerations @ bundle["modal_first_moment"].values
     for joint, (frame, sign) in _ports(model.scene, name).items():
         k = frames.index(frame)

@@ -129,9 +129,11 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
         m.N_RUBBING: count[m.RUBBING],
         m.N_BEARINGS: count[m.BEARINGS],
         m.N_WORN: count[m.WORN],
+        m.N_BODIES: count[m.BODIES],
+        m.N_FRAMES: count[m.FRAMES],
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
-        m.JACOBIAN_SIZE: int(np.sum(closures["n_rows"] * closures["n_support"])),
+        m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),
     }
 
 
@@ -140,7 +142,7 @@ def envelope_size(envelope: np.ndarray) -> int:
     if not len(envelope):
         return 0
     last = len(envelope) - 1
-    return int(envelope["start"][last] + last - envelope["first"][last] + 1)
+    return int(envelope["origin"][last] + last + 1)
 
 
 def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: int) -> dict[int, int]:

@@ -26,18 +26,19 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
     """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
     flex, flex_real, data, index, value = [], [], [], [], []
     entry, entry_value, interface = list[tuple[int, int]](), list[float](), list[np.ndarray]()
+    row_end = list[int]()
     data0 = moment0 = interface0 = 0
     mechanism, bodies = numbering.mechanism, numbering.mechanism.scene.flexible()
     any_shortened = any(b.stiffening is not None for b in bodies.values())
     for i in numbering.flexible:
         name, bundle = _body(mechanism, i)
         q, c = numbering.modal_positions[i], numbering.modal_coordinates[i]
-        moments, where = _moments(bundle)
+        moments, where, ends = _moments(bundle)
         chunk = _data(bundle, _damping(name, bodies[name], bundle))
         if any_shortened:
             chunk = np.concatenate([chunk, *_forms(mechanism, i, len(q))])
         basis, moves = numbering.bases[i], int(_inboard_moves(mechanism, i))
-        entries, places = basis.entries(), (i, len(q), q.start, c.start, data0, moment0, len(moments))
+        entries, places = basis.entries(), (i, len(q), q.start, c.start, data0, moment0, len(row_end))
         held = sum(j < basis.held for _, j in entries)
         of_basis = (basis.held, len(entry), len(entries), len(entry) + held, interface0)
         flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis))
@@ -50,13 +51,15 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         data.append(chunk)
         value.append(moments)
         index.append(where)
+        row_end += (moment0 + ends).tolist()
         data0 += len(chunk)
         moment0 += len(moments)
         interface0 += len(interface[-1])
     port, port_real, port_data = _ports(numbering, any_shortened)
     return {
         m.FLEXES: flex,
-        m.MOMENTS: np.concatenate([*index, np.zeros((0, 2), dtype=np.int64)]),
+        m.MOMENTS: np.concatenate([*index, np.zeros(0, dtype=np.int64)]),
+        m.MOMENT_ROWS: row_end,
         m.BASIS: entry,
         m.PORTS: port,
         m.FLEX_NUMBERS: flex_real,
@@ -160,15 +163,14 @@ def _interface_data(bundle: xr.Dataset, basis: InterfaceBasis) -> np.ndarray:
     return np.concatenate([(bundle["modal_first_moment"].values @ T).ravel(), mixed.ravel(), stiffness.ravel()])
 
 
-def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Nonzero int rho S_ki S_lj as values and (row (3k + l) n + j, i)."""
+def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nonzero int rho S_ki S_lj, row (3k + l) n + j after row: values, modes i, and per row how many end with it."""
     F = bundle["mode_mode_moment"].values
     n = F.shape[-1]
     k, l, i, j = np.nonzero(np.abs(F) > NEGLIGIBLE * max(np.abs(F).max(), 1e-300))
     row = (3 * k + l) * n + j
     order = np.lexsort((i, row))
-    where = np.stack([row[order], i[order]], axis=1).astype(np.int64)
-    return F[k, l, i, j][order], where
+    return F[k, l, i, j][order], i[order], np.cumsum(np.bincount(row, minlength=9 * n))
 
 
 def _inboard_frame(mechanism: Mechanism, link: int) -> str | None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
 from flexclear.pipeline.dynamics.model.driving import prescribed
@@ -179,6 +180,11 @@ class Mechanism:
         """
         signs = {name: link.joint.sign for link in self.links for name in link.drives}
         return np.array([signs[name] for name in self.drives])
+
+    @cached_property
+    def moving_bodies(self) -> list[str]:
+        """Names of all bodies but the ground, as the scene lists them."""
+        return [name for name, body in self.scene.body.items() if not isinstance(body, Ground)]
 
     @property
     def has_paths(self) -> bool:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
@@ -137,6 +138,7 @@ def filled(
             **coupling_tables,
             **rubbing,
             m.WORN: contacting.worn(mechanism),
+            **_recorded(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
             m.GROUPS: groups,
@@ -165,9 +167,48 @@ def filled(
     )
 
 
+def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
+    """Tables of what is recorded by its name: moving bodies as the scene lists them, and frames."""
+    bodies, frames, links = mechanism.moving_bodies, mechanism.frames.values(), mechanism.links
+    holding = [mechanism.link_of[frame.body] for frame in frames]
+    return {
+        m.BODIES: [mechanism.link_of[name] for name in bodies],
+        m.BODY_NUMBERS: [_body_numbers(mechanism, name) for name in bodies],
+        m.FRAMES: holding,
+        m.NAMED_FRAME_NUMBERS: [links[i].places[f.body].point(f.place.p) for i, f in zip(holding, frames, strict=True)],
+    }
+
+
+def _body_numbers(mechanism: Mechanism, name: str) -> np.ndarray:
+    """Row of the table BODY_NUMBERS; the kernels' frame of a flexible body is no centre of mass."""
+    body, places = mechanism.scene.body[name], mechanism.links[mechanism.link_of[name]].places
+    here = places[name]
+    if not isinstance(body, RigidBody):
+        return np.concatenate([np.zeros(10), here.R.ravel()])
+    mass, J = (body.mass, here.R @ np.array(body.inertia) @ here.R.T) if len(places) > 1 else (0.0, np.zeros((3, 3)))
+    return np.concatenate([[mass], here.point(np.array(body.com)), _symmetric(J), here.R.ravel()])
+
+
+def _symmetric(J: np.ndarray) -> list[float]:
+    """Entries xx yy zz xy xz yz of a symmetric matrix."""
+    return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
+
+
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
-    *(m.LINKS, m.SITES, m.SITE_NUMBERS, m.FLEXES, m.BASIS, m.MOMENTS, m.PORTS, m.PAIRS, m.KNOWN_PAIRS, m.ENVELOPE),
+    *(
+        m.LINKS,
+        m.SITES,
+        m.SITE_NUMBERS,
+        m.FLEXES,
+        m.BASIS,
+        m.MOMENTS,
+        m.MOMENT_ROWS,
+        m.PORTS,
+        m.PAIRS,
+        m.KNOWN_PAIRS,
+        m.ENVELOPE,
+    ),
     *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
     *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
     *(m.BASIS_VALUES, m.INTERFACE_DATA),
@@ -243,7 +284,7 @@ def _link_numbers(link: Link) -> np.ndarray:
     if link.inertia is None:
         return np.zeros(m.LINK_NUMBERS.size)
     mass, com, J = link.inertia
-    return np.array([mass, *com, J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]])
+    return np.array([mass, *com, *_symmetric(J)])
 
 
 def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.ndarray, np.ndarray]:

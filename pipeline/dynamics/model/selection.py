@@ -14,7 +14,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.arrays import envelope_size
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.wiring import closure_envelope
+from flexclear.pipeline.dynamics.model.wiring import closure_envelope, threes
 
 #: a row below this share of its natural length is rounding: the square root of what rounding leaves of a cancelling
 #: sum, 1e-13 at worst, with some digits to spare
@@ -121,9 +121,10 @@ def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
         order = np.argsort(~kept[span], kind="stable")
         rows[span] = declared[span][order]
         closure["kept0"], closure["n_kept"] = start, np.sum(kept[span])
+        closure["threes"] = threes(closure["n_kept"])
         start += int(closure["n_kept"])
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
-    envelope["first"][:start], envelope["start"][:start] = closure_envelope(
+    envelope["first"][:start], envelope["origin"][:start] = closure_envelope(
         closures, model.arrays.table(m.CLOSURE_PAIRS)
     ).T
     h[m.N_KEPT_ROWS], h[m.SCHUR_SIZE] = start, envelope_size(envelope[:start])
@@ -137,11 +138,12 @@ def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
     support = model.arrays.table(m.SUPPORT)["coordinate"]
     full = np.zeros((*stored.shape[:-1], int(h[m.N_KEPT_ROWS]), model.nv))
     for c in model.arrays.table(m.CLOSURES, h):
-        count, slots = int(c["n_kept"]), int(c["n_support"])
+        count, slots, groups = int(c["n_kept"]), int(c["n_support"]), int(c["threes"])
         columns = support[c["support0"] : c["support0"] + slots]
-        block = stored[..., c["jacobian0"] : c["jacobian0"] + count * slots]
-        block = block.reshape(*stored.shape[:-1], slots, count)
-        full[..., c["kept0"] : c["kept0"] + count, columns] = np.swapaxes(block, -1, -2)
+        block = stored[..., c["jacobian0"] : c["jacobian0"] + 3 * groups * slots]
+        block = np.swapaxes(block.reshape(*stored.shape[:-1], groups, slots, 3), -1, -2)
+        block = block.reshape(*stored.shape[:-1], 3 * groups, slots)[..., :count, :]
+        full[..., c["kept0"] : c["kept0"] + count, columns] = block
     return full
 
 

@@ -41,13 +41,13 @@ def mass_entries(numbering: Numbering) -> dict[Any, Any]:
                 first[c] = min(first[c], modes.start)
     start, rows = 0, []
     for i, f in enumerate(first):
-        rows.append((f, start))
+        rows.append((f, start - f))
         start += i - f + 1
     pairs, known = [], []
     for momentum, col, c, d in products:
         if c < numbering.nv and d < numbering.nv:
             i, j = max(c, d), min(c, d)
-            pairs.append((momentum, col, rows[i][1] + j - rows[i][0]))
+            pairs.append((momentum, col, rows[i][1] + j))
         elif c < numbering.nv or d < numbering.nv:
             pair = (max(c, d) - numbering.nv, min(c, d))
             known.append((momentum, col, *pair))
@@ -90,13 +90,13 @@ def closures(
         entries += [(slots.index(c), col, sign, part) for c, col, sign, part in moved if c < numbering.nv]
         known += [(new, c - numbering.nv, col, sign, part) for c, col, sign, part in moved if c >= numbering.nv]
         n_entries = len(entries) - entry0
-        own = (a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries, row0, len(mine), coupling)
-        closure.append(own)
+        where = (a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries)
+        closure.append((*where, row0, len(mine), threes(len(mine)), coupling))
         rows += mine
         support += slots
         supports.append(slots)
         row0 += len(mine)
-        jacobian0 += len(mine) * len(slots)
+        jacobian0 += 3 * threes(len(mine)) * len(slots)
     tables = {
         m.CLOSURES: closure,
         m.CLOSURE_ROWS: rows,
@@ -112,6 +112,11 @@ def _rows(kind: str) -> list[tuple[int, int, int]]:
     """Rows of the table CLOSURE_ROWS of a joint type."""
     declared = joint_class(kind)
     return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
+
+
+def threes(count: int) -> int:
+    """Into how many groups of three, the last of which may be smaller, so many rows of a closure go."""
+    return -(-count // 3)
 
 
 def closure_route(numbering: Numbering, a: int, b: int) -> list[tuple[int, int, int]]:
@@ -154,13 +159,13 @@ def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]
 
 
 def closure_envelope(closures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """First column and start of each kept row of J M^-1 J^T, shape (rows, 2); pairs: rows of CLOSURE_PAIRS."""
+    """First column and origin of each kept row of J M^-1 J^T, shape (rows, 2); pairs: rows of CLOSURE_PAIRS."""
     first = closures["kept0"].copy()
     for a, b in zip(pairs["a"], pairs["b"], strict=True):
         first[b] = min(first[b], closures["kept0"][a])
     rows, start = [], 0
     for b, closure in enumerate(closures):
         for k in range(closure["kept0"], closure["kept0"] + closure["n_kept"]):
-            rows.append((first[b], start))
+            rows.append((first[b], start - first[b]))
             start += k - first[b] + 1
     return arrays.rows(m.CLOSURE_ENVELOPE, rows)

@@ -8,16 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.record.dataset import dataset
+from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed, twin_of
+from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.sensitivity import Twin
 
 #: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
 #: that: a disturbance of a millisecond is a tenth of some. What has taken LONG is an average by itself [s]
@@ -48,14 +55,28 @@ def measure(
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    last, trajectory, switched = follow(engine, start, progress, other)
+    last, trajectory, switched, twin = _followed(engine, start, progress, other)
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
     recording = _repeated(lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched)), 0)
-    run = dataset(Run(scene, last, trajectory, seen, twin_of(last, start, trajectory), switched))
+    run = dataset(Run(scene, last, trajectory, seen, twin, switched))
     integration = _repeated(lambda: follow(engine, start, silent, other), MOST)
     return Cost(run, integration, recording, engine.model.length)
+
+
+def _followed(
+    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine]
+) -> tuple[Engine, Trajectory, str, Twin | None]:
+    """What a run follows, and where it has contacts its twin after it: what is measured goes on alone."""
+    if not engine.model.contacts:
+        return *follow(engine, start, progress, other), None
+    from flexclear.pipeline.dynamics.run.sensitivity import Pair
+
+    pair = Pair(engine)
+    followed = pair.run(lambda *told: follow(engine, start, progress, other, None, *told))
+    twin = pair.twin(start, lambda mine, y, *told: follow(mine, y, silent, lambda n: another(other(n)), None, *told))
+    return *followed, twin
 
 
 def _repeated(task: Callable[[], object], most: int) -> tuple[float, ...]:

@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.stops import ends_an_angle
-from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
+from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
 from flexclear.pipeline.dynamics.run import ledger
@@ -215,12 +215,12 @@ def _motion(motions: Motions) -> Part:
     moment, force = every_joint_wrench(motions, joints)
     more = {
         ("angular_acceleration", "body"): body.alpha,
-        ("frame_position", "frame"): motions.every_frame + origin,
+        ("frame_position", "frame"): shifted(motions.every_frame, origin),
         ("joint_moment", "joint"): moment,
         ("joint_force", "joint"): force,
     }
     variables: Variables = motion_series(body, origin)
-    variables |= {name: (("time", dim, "axis"), np.ascontiguousarray(values)) for (name, dim), values in more.items()}
+    variables |= {name: (("time", dim, "axis"), values) for (name, dim), values in more.items()}
     owners = [name.partition(".")[0] for name in frames]
     coordinates = {"body": motions.moving_bodies, "frame": frames, "frame_body": ("frame", owners)}
     return variables, coordinates | _joints(motions.model)

@@ -8,8 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import cross, matrix_to_quaternion, turned
-from flexclear.pipeline.core.scene.parts import Ground, RigidBody
+from flexclear.pipeline.core.algebra import continued, cross, turned
+from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -20,8 +20,8 @@ from flexclear.pipeline.dynamics.model.model import Model
 class Motion:
     """Motion of a point of a body and of the body's axes, over time; world axes, kernels' origin.
 
-    p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3). Of several bodies at once,
-    all of them have a dimension of bodies after that of time.  In Fortran's order, see `core.algebra.cross`.
+    p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3).  In Fortran's order, see
+    `core.algebra.cross`.
     """
 
     p: np.ndarray
@@ -31,26 +31,12 @@ class Motion:
     a: np.ndarray
     alpha: np.ndarray
 
-    def of(self, k: int) -> Motion:
-        """Motion of one of several bodies."""
-        return Motion(self.p[:, k], self.R[:, k], self.v[:, k], self.omega[:, k], self.a[:, k], self.alpha[:, k])
-
-    def taken(self, numbers: Sequence[int]) -> Motion:
-        """Motion of several of several bodies, copied."""
-        every = (self.p, self.R, self.v, self.omega, self.a, self.alpha)
-        return Motion(*(values.T[..., list(numbers), :].T for values in every))
-
     def at(self, arm: np.ndarray, turn: np.ndarray | None = None) -> Motion:
-        """Motion of a fixed point `arm`, and of axes turned by `turn`, both given in the body.
-
-        arm: (3,); of several bodies, of each its own, (body, 3).  turn: (3, 3) or (body, 3, 3).
-        """
+        """Motion of a fixed point `arm`, and of axes turned by `turn`, both given in the body; (3,) and (3, 3)."""
         r = turned(self.R, arm)
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing)
-        return Motion(
-            self.p + r, self.R if turn is None else _product(self.R, turn), self.v + swing, self.omega, a, self.alpha
-        )
+        return Motion(self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha)
 
     def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
         """Motion of a point that moves in the body: its place, rate and second rate there, (time, 3)."""
@@ -58,6 +44,21 @@ class Motion:
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing + 2.0 * s) + t
         return Motion(self.p + r, self.R, self.v + swing + s, self.omega, a, self.alpha)
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """Motion of the centres of mass and axes of several bodies, over time; world axes, kernels' origin.
+
+    Shape (time, body, 3), of quaternions w x y z (time, body, 4).
+    """
+
+    position: np.ndarray
+    quaternion: np.ndarray
+    velocity: np.ndarray
+    omega: np.ndarray
+    acceleration: np.ndarray
+    alpha: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -81,16 +82,17 @@ class Motions:
     seen: Observed
 
     @cached_property
-    def every_link(self) -> Motion:
-        """Motion of every link's frame, (time, link, ...), gravity's upward acceleration of the ground taken out."""
-        known = ("origin", "axes", "velocity", "omega", "acceleration", "alpha")
-        p, R, v, omega, a, alpha = (np.asfortranarray(self.seen.links[field]) for field in known)
-        return Motion(p, R, v, omega, a + self.model.gravity, alpha)
+    def _links(self) -> dict[int, Motion]:
+        return {}
 
-    @cached_property
-    def links(self) -> list[Motion]:
-        """The same of each."""
-        return [self.every_link.of(i) for i in range(self.seen.links.shape[1])]
+    def link(self, i: int) -> Motion:
+        """Motion of a link's frame."""
+        if i not in self._links:
+            known = ("origin", "axes", "velocity", "omega", "acceleration", "alpha")
+            p, R, v, omega, a, alpha = (np.asfortranarray(self.seen.links[field][:, i]) for field in known)
+            # gravity is an upward acceleration of the ground there
+            self._links[i] = Motion(p, R, v, omega, a + self.model.gravity, alpha)
+        return self._links[i]
 
     def modal(self, link: int) -> Modal:
         """Modal coordinates of a flexible link."""
@@ -101,80 +103,67 @@ class Motions:
     @cached_property
     def moving_bodies(self) -> list[str]:
         """Names of all bodies but the ground, as the scene lists them."""
-        return [name for name, body in self.model.scene.body.items() if not isinstance(body, Ground)]
+        return self.model.mechanism.moving_bodies
 
     @cached_property
-    def every_body(self) -> Motion:
-        """Motion of each moving body's centre of mass and axes, (time, body, ...)."""
-        return self.several(self.moving_bodies)
+    def every_body(self) -> Bodies:
+        """Motion of each moving body's centre of mass and axes."""
+        seen = self.seen
+        position, velocity, acceleration = seen.body_position, seen.body_velocity, seen.body_acceleration
+        bending = [k for k, name in enumerate(self.moving_bodies) if name in self.model.scene.flexible()]
+        if bending:
+            position, velocity, acceleration = (values.copy() for values in (position, velocity, acceleration))
+        for k in bending:
+            centre = self.body(self.moving_bodies[k])
+            position[:, k], velocity[:, k], acceleration[:, k] = centre.p, centre.v, centre.a
+        return Bodies(position, seen.body_quaternion, velocity, seen.body_omega, acceleration, seen.body_alpha)
 
-    @cached_property
-    def bodies(self) -> dict[str, Motion]:
-        """The same by name."""
-        return {name: self.every_body.of(k) for k, name in enumerate(self.moving_bodies)}
+    def several(self, names: Sequence[str]) -> Bodies:
+        """The same of some bodies."""
+        places, every = [self.moving_bodies.index(name) for name in names], self.every_body
+        return Bodies(**{field.name: np.take(getattr(every, field.name), places, axis=1) for field in fields(Bodies)})
 
     def body(self, name: str) -> Motion:
         """Motion of one moving body's centre of mass and axes."""
-        return self.several([name]).of(0)
-
-    def several(self, names: Sequence[str]) -> Motion:
-        """Motion of the centres of mass and axes of some moving bodies, (time, body, ...)."""
-        rigid = [k for k, name in enumerate(names) if isinstance(self.model.scene.body[name], RigidBody)]
-        found = self._rigid([names[k] for k in rigid])
-        if len(rigid) == len(names):
-            return found
-        bending = {k: self._flexible(name) for k, name in enumerate(names) if k not in rigid}
-        whole = dict[str, np.ndarray]()
-        for field in (field.name for field in fields(Motion)):
-            values = getattr(found, field)
-            whole[field] = np.empty((len(values), len(names), *values.shape[2:]), order="F")
-            whole[field][:, rigid] = values
-            for k, motion in bending.items():
-                whole[field][:, k] = getattr(motion, field)
-        return Motion(**whole)
-
-    def _rigid(self, names: Sequence[str]) -> Motion:
-        model, arms, turns = self.model, np.zeros((len(names), 3)), np.zeros((len(names), 3, 3))
-        numbers = [model.mechanism.link_of[name] for name in names]
-        for k, name in enumerate(names):
-            place, body = model.links[numbers[k]].places[name], model.scene.body[name]
-            assert isinstance(body, RigidBody)
-            arms[k], turns[k] = place.p + place.R @ np.array(body.com), place.R
-        return self.every_link.taken(numbers).at(arms, turns)
-
-    def _flexible(self, name: str) -> Motion:
         i = self.model.mechanism.link_of[name]
-        link = self.model.links[i]
+        link, body = self.model.links[i], self.model.scene.body[name]
+        if isinstance(body, RigidBody):
+            place = link.places[name]
+            return self.link(i).at(place.point(np.array(body.com)), place.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
         arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
-        return self.links[i].moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
+        return self.link(i).moving((first + arm) / link.mass, rate / link.mass, second / link.mass)
+
+    @cached_property
+    def _frames(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.model.mechanism.frames)}
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
-        """Origins of named frames, kernels' origin, shape (time, frame, 3), in Fortran's order."""
-        found = np.empty((len(self.seen.state), len(names), 3), order="F")
-        of_link = dict[int, dict[int, np.ndarray]]()
-        for k, name in enumerate(names):
-            frame = self.model.mechanism.frames[name]
-            i = self.model.mechanism.link_of[frame.body]
-            body = self.model.links[i].places[frame.body]
-            of_link.setdefault(i, {})[k] = body.p + body.R @ frame.place.p
-        for i, arms in of_link.items():
-            link, bundle, places = self.links[i], self.model.links[i].bundle, np.array(list(arms.values()))
-            if bundle is None:
-                found[:, list(arms)] = link.p[:, None] + turned(link.R[:, None], places)
-                continue
-            for k, arm in arms.items():
-                label = names[k].partition(".")[2]
-                S = bundle["frame_translation_shape"].sel(frame=label).values
-                bent = arm + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
-                found[:, k] = link.p + turned(link.R, bent)
+        """Origins of named frames, kernels' origin, shape (time, frame, 3)."""
+        found = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
+        self._bend(found, names)
         return found
 
     @cached_property
     def every_frame(self) -> np.ndarray:
         """Origin of every named frame of the mechanism, as `positions` has them."""
-        return self.positions(list(self.model.mechanism.frames))
+        if self.model.mechanism.all_rigid:
+            return self.seen.frame_position
+        return self.positions(list(self._frames))
+
+    def _bend(self, found: np.ndarray, names: Sequence[str]) -> None:
+        """Move those frames, of which some are named, that are on bent bodies."""
+        if self.model.mechanism.all_rigid:
+            return
+        for k, name in enumerate(names):
+            i, place = self._place(name)
+            link, bundle = self.link(i), self.model.links[i].bundle
+            if bundle is not None:
+                label = name.partition(".")[2]
+                S = bundle["frame_translation_shape"].sel(frame=label).values
+                bent = place.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
+                found[:, k] = link.p + turned(link.R, bent)
 
     @cached_property
     def frame_positions(self) -> dict[str, np.ndarray]:
@@ -187,7 +176,7 @@ class Motions:
         velocities = {}
         for name in self.model.mechanism.frames:
             i, place = self._place(name)
-            link, bundle = self.links[i], self.model.links[i].bundle
+            link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is None:
                 velocities[name] = link.at(place.p).v, link.omega
                 continue
@@ -216,29 +205,20 @@ def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:
     return rate + first * swing + second * cross(theta, swing)
 
 
-def _product(R: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """R turn, in Fortran's order."""
-    out = np.empty(R.shape, order="F")
-    for k in range(3):
-        out[..., k] = turned(R, turn[..., k])
-    return out
-
-
-def quaternions(R: np.ndarray) -> np.ndarray:
-    """Unit quaternions of rotation matrices (time, ..., 3, 3), without jumps of sign; w >= 0 at first."""
-    q = matrix_to_quaternion(R)
-    flips = np.where(np.sum(q[1:] * q[:-1], axis=-1, keepdims=True) < 0.0, -1.0, 1.0)
-    q[1:] *= np.cumprod(flips, axis=0)
-    return q
-
-
-def motion_series(bodies: Motion, origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def motion_series(bodies: Bodies, origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Position, orientation, velocities and acceleration of several bodies over time, by variable."""
     series = {
-        ("position", "axis"): bodies.p + origin,
-        ("quaternion", "quat"): quaternions(bodies.R),
-        ("velocity", "axis"): bodies.v,
+        ("position", "axis"): shifted(bodies.position, origin),
+        ("quaternion", "quat"): continued(bodies.quaternion),
+        ("velocity", "axis"): bodies.velocity,
         ("angular_velocity", "axis"): bodies.omega,
-        ("acceleration", "axis"): bodies.a,
+        ("acceleration", "axis"): bodies.acceleration,
     }
-    return {name: (("time", "body", dim), np.ascontiguousarray(values)) for (name, dim), values in series.items()}
+    return {name: (("time", "body", dim), values) for (name, dim), values in series.items()}
+
+
+def shifted(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    """Points (time, point, 3) from the kernels' origin, in the world."""
+    rows, count, _ = points.shape
+    # added to whole rows, since three numbers at a time take five times as long
+    return (points.reshape(rows, 3 * count) + np.tile(origin, count)).reshape(points.shape)

@@ -21,7 +21,7 @@ from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
-from flexclear.pipeline.dynamics.record.motion import Motions, quaternions
+from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
@@ -206,14 +206,9 @@ def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]
         column = drives.index(owner)
         force: np.ndarray = motions.model.drive_signs[column] * motions.seen.drive_force[:, [column]]
         return force
-    body = motions.body(owner)
-    by_kind: dict[str, Callable[[], np.ndarray]] = {
-        "position": lambda: body.p + motions.model.mechanism.origin,
-        "orientation": lambda: quaternions(body.R),
-        "velocity": lambda: body.v,
-        "angular_velocity": lambda: body.omega,
-    }
-    return by_kind[kind]()
+    series = motion_series(motions.several([owner]), motions.model.mechanism.origin)
+    _, values = series["quaternion" if kind == "orientation" else kind]
+    return values[:, 0]
 
 
 def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kept) -> float:

@@ -154,7 +154,7 @@ def _motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, 
     """What `section_forces` takes of a flexible body."""
     model = motions.model
     link = model.mechanism.link_of[name]
-    frame, state = motions.links[link], motions.modal(link)
+    frame, state = motions.link(link), motions.modal(link)
     R_BW = np.swapaxes(frame.R, 1, 2)
     a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - model.gravity, frame.omega, frame.alpha))
     names = [frame for frame in model.mechanism.frames if frame.startswith(f"{name}.")]

@@ -21,6 +21,8 @@ ZERO = 1e-9
 #: condition numbers below which no row's rank is in doubt, in whatever units, and with which eigenvalues of J J^T, the
 #: squares of the singular values, still have ten of their digits: their roundings are 1e-16 of the largest one
 WELL = 1e3
+#: so many rows are looked at together: the matrices of all take longer to get from the system than to work out
+AT_ONCE = 256
 
 
 def topology(run: Run) -> tuple[Variables, dict[str, object]]:
@@ -58,13 +60,20 @@ def _singular_values(
     parts = []
     for part, kept in trajectory.parts():
         engine.keep(kept)
-        J = selection.dense(engine.model, engine.h, seen.jacobian[part])
-        parts.append(scale(engine.model, engine.h, J))
-    J = np.concatenate(parts)
+        stored = seen.jacobian[part]
+        for first in range(0, max(len(stored), 1), AT_ONCE):
+            J = selection.dense(engine.model, engine.h, stored[first : first + AT_ONCE])
+            parts.append(_values(scale(engine.model, engine.h, J)))
+    return np.concatenate(parts)
+
+
+def _values(J: np.ndarray) -> np.ndarray:
+    """Singular values of matrices (..., rank, nv), largest first."""
     if not J.size:
         return np.zeros((len(J), 0))
     squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]
     values = np.sqrt(np.maximum(squares, 0.0))
     poor = ~(values[:, -1] * WELL > values[:, 0])
-    values[poor] = np.linalg.svd(J[poor], compute_uv=False)
+    if poor.any():
+        values[poor] = np.linalg.svd(J[poor], compute_uv=False)
     return values

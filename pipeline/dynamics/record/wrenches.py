@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import cross, turned
+from flexclear.pipeline.core.algebra import cross
 from flexclear.pipeline.core.scene.drives import PathDrive
-from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.couplings import Coupling
@@ -30,7 +30,7 @@ def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> di
 
 
 def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
-    """The same of several joints at once, (time, joint, 3), in Fortran's order."""
+    """The same of several joints at once, (time, joint, 3)."""
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
     for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
@@ -39,11 +39,13 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
         known[contact.name] = (moment + cross(seen.touch["point"][:, c], push), force + push)
     if any(name not in known for name in names):
         known |= _inside_groups(motions, known)
-    moments, forces = (np.empty((len(seen.state), len(names), 3), order="F") for _ in range(2))
+    moments, forces = (np.empty((len(seen.state), len(names), 3)) for _ in range(2))
     for k, name in enumerate(names):
         moments[:, k], forces[:, k] = known[name]
     arms = motions.positions([model.scene.joint[name].between[1] for name in names])
-    return moments - cross(arms, forces), forces
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        moments[..., i] -= arms[..., j] * forces[..., k] - arms[..., k] * forces[..., j]
+    return moments, forces
 
 
 def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -54,7 +56,7 @@ def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, n
 
 
 def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
-    moment, force = _wrenches(seen.link_wrenches)
+    moment, force = (seen.link_wrenches[field] for field in ("moment", "force"))
     found = dict[str, Wrench]()
     for i, link in enumerate(model.links):
         if link.branch.edge is not None:
@@ -64,75 +66,50 @@ def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
 
 
 def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
-    moment, force = _wrenches(seen.closure_wrenches)
+    moment, force = (seen.closure_wrenches[field] for field in ("moment", "force"))
     joints = [(c, closure) for c, closure in enumerate(model.closures) if not isinstance(closure, Coupling)]
     return {closure.name: (moment[:, c], force[:, c]) for c, closure in joints}
 
 
-def _wrenches(rows: np.ndarray) -> Wrench:
-    return np.asfortranarray(rows["moment"]), np.asfortranarray(rows["force"])
+class _Beyond(NamedTuple):
+    """Bodies on the far side of a fixed joint within a link; sign: +1 where they are its second body's."""
+
+    joint: str
+    bodies: list[str]
+    sign: float
 
 
 def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, Wrench]:
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
-    model, inside = motions.model, dict[str, Wrench]()
+    model, rows, beyond, inside = motions.model, len(motions.seen.state), list[_Beyond](), dict[str, Wrench]()
     for link in model.links:
         every = model.scene.joint.items()
         inner = [n for n, j in every if n not in known and _is_inside(model, j.between, link.places)]
+        # a second path between bodies that are joined already carries nothing here
+        inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
         tree = _forest(model, inner, list(link.places))
-        sides = {name: _far_side(model, name, tree) for name in tree}
-        # in the scene's order: sums of more than two depend on it
-        beyond = {name: [body for body in link.places if body in side] for name, (side, _) in sides.items()}
-        demand = _demands(motions, sorted({body for bodies in beyond.values() for body in bodies}), known)
-        for name in inner:
-            if name not in tree:
-                # a second path between bodies that are joined already: it carries nothing here
-                inside[name] = (np.zeros((len(motions.seen.state), 3)), np.zeros((len(motions.seen.state), 3)))
-                continue
-            moment, force = (sides[name][1] * np.sum([demand[b][k] for b in beyond[name]], axis=0) for k in (0, 1))
-            inside[name] = (moment, force)
+        for name in tree:
+            side, sign = _far_side(model, name, tree)
+            bodies = [body for body in link.places if body in side and body in model.mechanism.moving_bodies]
+            beyond += [_Beyond(name, bodies, sign)] if bodies else []
+    acting = [(_joined(model, joint), wrench) for joint, wrench in known.items()]
+    places = {name: k for k, name in enumerate(motions.moving_bodies)}
+    for part in beyond:
+        demand = np.sum([motions.seen.body_demand[:, places[body]] for body in part.bodies], axis=0)
+        moment, force = demand[:, :3], demand[:, 3:]
+        for (first, second), (n, f) in acting:
+            out, into = first in part.bodies, second in part.bodies
+            if out != into:
+                moment, force = (moment + n, force + f) if out else (moment - n, force - f)
+        for body in part.bodies:
+            for _, n, f in on_frames(model, motions.seen, body):
+                moment, force = moment - n, force - f
+        inside[part.joint] = part.sign * moment, part.sign * force
     return inside
 
 
 def _is_inside(model: Model, between: tuple[str, str], places: Mapping[str, object]) -> bool:
     return all(model.mechanism.frames[f].body in places for f in between)
-
-
-def _demands(motions: Motions, names: Sequence[str], known: Mapping[str, Wrench]) -> dict[str, Wrench]:
-    """What the fixed joints must supply to bodies: their inertia less gravity, loads, paths and all other joints."""
-    model, seen = motions.model, motions.seen
-    found = {name: (np.zeros((len(seen.state), 3)), np.zeros((len(seen.state), 3))) for name in names}
-    rigid = [name for name in names if isinstance(model.scene.body[name], RigidBody)]
-    if rigid:
-        moments, forces = _inertial(motions, rigid)
-        found |= {name: (moments[:, k], forces[:, k]) for k, name in enumerate(rigid)}
-    for joint, (n, f) in known.items():
-        first, second = _joined(model, joint)
-        if first in found:
-            moment, force = found[first]
-            found[first] = moment + n, force + f
-        if second in found:
-            moment, force = found[second]
-            found[second] = moment - n, force - f
-    for name in names:
-        for _, n, f in on_frames(model, seen, name):
-            moment, force = found[name]
-            found[name] = moment - n, force - f
-    return found
-
-
-def _inertial(motions: Motions, names: Sequence[str]) -> Wrench:
-    """Rates of momentum of rigid bodies about the kernels' origin, and of momentum, less their weight; by Euler and
-    Newton, (time, body, 3)."""
-    model = motions.model
-    bodies = [body for name in names if isinstance(body := model.scene.body[name], RigidBody)]
-    motion = motions.every_body.taken([motions.moving_bodies.index(name) for name in names])
-    inertia, mass = np.array([body.inertia for body in bodies]), np.array([body.mass for body in bodies])
-    R_BW = np.swapaxes(motion.R, -1, -2)
-    omega, alpha = turned(R_BW, motion.omega), turned(R_BW, motion.alpha)
-    spin = turned(motion.R, turned(inertia, alpha) + cross(omega, turned(inertia, omega)))
-    force = mass[:, None] * (motion.a - model.gravity)
-    return spin + cross(motion.p, force), force
 
 
 def _joined(model: Model, name: str) -> tuple[str, str]:

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.polynomial import chebyshev
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.observation import ROUNDING as CLOSED
 from flexclear.pipeline.dynamics.run.observation import observe_with
@@ -112,10 +111,9 @@ class Sampler:
         """The state nearest to y with its loops closed, and whether there is one."""
         record = m.record(self._row, len(self.engine.model.contacts))
         record.time[:], record.state[:] = t, y
-        out = observe_with(self.engine, self._row, self._pieces[None, :], CLOSED)
-        seen = observation.by_name(out, self.engine.model.arrays.size)
+        seen = observe_with(self.engine, self._row, self._pieces[None, :], CLOSED)
         self.evaluations += 2
-        return seen.state[0].copy(), bool(seen.status[0] == m.OK)
+        return seen["state"][0].copy(), bool(seen["status"][0, 0] == m.OK)
 
     def sample(self, t: float, y: np.ndarray) -> Sample:
         """What there is at a state after closing it."""

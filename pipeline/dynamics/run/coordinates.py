@@ -46,7 +46,8 @@ def label(joint: str, kind: str, k: int) -> str:
 
 def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
     """Coordinates of all joints, as the scene lists them: name in records, joint, whether it is an angle."""
-    kinds = {name: joint.type for name, joint in scene.joint.items() if name not in scene.contacts()}
+    contacts = scene.contacts()
+    kinds = {name: joint.type for name, joint in scene.joint.items() if name not in contacts}
     return [
         (label(name, kind, k), name, coordinate.turning)
         for name, kind in kinds.items()

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.algebra import continued
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
-from flexclear.pipeline.dynamics.equations.observation import Frames, Observed
+from flexclear.pipeline.dynamics.equations.observation import Blocks, Frames, Observed
 from flexclear.pipeline.dynamics.integrate.recording import record_share
 from flexclear.pipeline.dynamics.run.engine import Engine
 
@@ -32,11 +33,11 @@ def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observe
 
     On a break the laws hold as before it, or as `after` it.
     """
-    return observation.by_name(observe_flat(engine, rows, after=after), engine.model.arrays.size)
+    return observation.by_name(observe_blocks(engine, rows, after=after), engine.model.arrays.size)
 
 
-def observe_flat(engine: Engine, rows: np.ndarray, *, after: bool = False) -> np.ndarray:
-    """The same as the kernel writes it, shape (rows, columns); see `equations.observation.by_name`."""
+def observe_blocks(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Blocks:
+    """The same as the kernel writes it; see `equations.observation.by_name`."""
     pieces = engine.pieces[engine.segments(rows[:, 0], after=after)]
     return observe_with(engine, rows, pieces, max(record_share(engine.rtol) * engine.rtol, ROUNDING))
 
@@ -45,19 +46,19 @@ def frames(engine: Engine, rows: np.ndarray) -> Frames:
     """The frames of links and sites in rows of the record, whose loops are as open as the run left them."""
     size = engine.model.arrays.size
     pieces = engine.pieces[engine.segments(rows[:, 0], after=False)]
-    return observation.frames_by_name(
-        _observe(engine, rows, pieces, observation.AS_RECORDED, observation.frames_room(len(rows), size)), size
-    )
+    whole, blocks = observation.room(len(rows), size, frames=True)
+    _observe(engine, rows, pieces, observation.AS_RECORDED, whole)
+    return observation.frames_by_name(blocks, size)
 
 
-def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> np.ndarray:
+def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> Blocks:
     """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
-    return _observe(
-        engine, rows, pieces, share * engine.model.length, observation.room(len(rows), engine.model.arrays.size)
-    )
+    whole, blocks = observation.room(len(rows), engine.model.arrays.size)
+    _observe(engine, rows, pieces, share * engine.model.length, whole)
+    return blocks
 
 
-def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> np.ndarray:
+def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
     arrays = engine.model.arrays
     engine.entry.observe(
         engine.h,
@@ -69,7 +70,6 @@ def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: fl
         tolerance,
         out,
     )
-    return out
 
 
 def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
@@ -79,8 +79,8 @@ def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
 
-def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> np.ndarray | None:
-    """What is observed of such a row: the limit from both sides, shape (columns,); None without one.
+def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
+    """What is observed of such a row: the limit from both sides, of each block one row; None without one.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
     of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states
@@ -95,7 +95,12 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -
         near.time[:] += NEAREST * motion.span * WIDER**k * SIDES
         near.state[:] = motion.states(near.time)
         if not any(blurred(engine, side, clear) for side in rows):
-            out = observe_with(engine, rows, pieces, ROUNDING)
-            if not np.any(observation.by_name(out, engine.model.arrays.size).status):
-                return np.asarray(WEIGHTS @ out)
+            seen = observe_with(engine, rows, pieces, ROUNDING)
+            if not np.any(seen["status"]):
+                turned = seen["body_quaternion"].reshape(len(SIDES), -1, 4)
+                seen["body_quaternion"] = continued(turned).reshape(len(SIDES), -1)
+                limit = {name: WEIGHTS @ block for name, block in seen.items()}
+                mean = limit["body_quaternion"].reshape(-1, 4)
+                limit["body_quaternion"] = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).ravel()
+                return limit
     return None

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,9 +19,11 @@ from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.singular_pass import Pass
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_pass import Pass
 
 #: arrays of an engine that change as it works
 MEMORY = ("w", "n", "h", "kept")
@@ -110,7 +112,7 @@ class Piece:
             "room": [len(tape.rows), len(tape.events)],
             "selections": [float(time) for time, _ in tape.selections],
             "collocations": [[laid.start, laid.span, laid.evaluations] for laid in tape.collocations],
-            "passes": [[getattr(one, item.name) for item in fields(Pass)] for one in tape.passes],
+            "passes": [[getattr(one, item.name) for item in fields(one)] for one in tape.passes],
             "doubted": sorted(tape.doubted),
             "straight": [list(rows) for rows in self.engine.straight.rows],
         }
@@ -118,6 +120,9 @@ class Piece:
 
     def restore(self, found: State, outputs: np.ndarray) -> None:
         """Put engine and tape into the state that was found."""
+        from flexclear.pipeline.dynamics.run.collocation import Collocation
+        from flexclear.pipeline.dynamics.run.singular_pass import Pass
+
         arrays, notes = found.arrays, found.notes
         remember(self.engine, arrays)
         rows, events = (int(count) for count in notes["room"])

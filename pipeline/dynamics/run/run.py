@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import import_module
+from threading import Lock
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,25 +17,26 @@ from flexclear.pipeline.core.registry import lookup, module_of
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow.cores import meanwhile
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import STARTS
 from flexclear.pipeline.dynamics.equations import observation
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
-from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_flat
+from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_blocks
 from flexclear.pipeline.dynamics.run.pace import Judge
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
-from flexclear.pipeline.dynamics.run.trajectory import StiffError, Trajectory
+from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.dynamics.run.collocation import Collocation
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
 
 
@@ -101,20 +103,22 @@ def engines(
 ) -> tuple[Engine, Callable[[str], Engine]]:
     """The engine of a run, and the maker of one that goes on with another integrator, given by its name."""
     made = _maker(scene, bundles, progress)
-    return made(""), cache(made)
+    return made("", progress), cache(lambda name: made(name, progress))
 
 
-def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str], Engine]:
-    """What makes the engine of a run by an integrator's name; that of the scene's own by none."""
+def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str, Progress], Engine]:
+    """What makes the engine of a run by an integrator's name, that of the scene's own by none; it tells how it goes."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
+    making = Lock()  # a run and its twin may both go on with another integrator
 
-    def made(name: str) -> Engine:
+    def made(name: str, tell: Progress) -> Engine:
         wanted = edited(moved, {"solver.integrator": name}) if name else moved
-        model = tabulate(build(wanted, bundles), given)
-        if choice:  # the poses found no longer tell of it
-            model = replace(model, mechanism=replace(model.mechanism, choice=choice))
-        return prepare(model, progress)
+        with making:
+            model = tabulate(build(wanted, bundles), given)
+            if choice:  # the poses found no longer tell of it
+                model = replace(model, mechanism=replace(model.mechanism, choice=choice))
+            return prepare(model, tell)
 
     return made
 
@@ -128,32 +132,46 @@ def integrate(
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 
     bundles: reduced flexible bodies by name.  judges: by integrator, who looks whether another one shall go on, and
-    which; without them the explicit ones hand over where they would crawl.  Raises InputError for a scene that cannot
-    be built, SolverError when the run cannot go on, StoppedError with the run so far as `partial` when it is asked to
-    stop.
+    which; without them the explicit ones hand over where they would crawl.  The twin of a run with contacts is made
+    beside it, where a processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run
+    cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
     """
     made = _maker(scene, bundles, progress)
-    engine = made("")
+    engine = made("", progress)
     start = consistent_start(engine)
     mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice
     for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
-    try:
-        engine, trajectory, switched = follow(engine, start, progress, made, judges)
-    except StoppedError as stopped:
-        if stopped.partial is not None:
-            last, there = stopped.partial
-            stopped.partial = Run(scene, last, there, observed(last, there), mended=mended)
-        raise
-    seen = observed(engine, trajectory)
-    require_shallow(engine.model, trajectory, seen)
-    require_closed(engine.model, trajectory, seen)
-    done = Run(scene, engine, trajectory, seen, None, switched, mended)
-    try:
-        return replace(done, twin=twin_of(engine, start, trajectory))
-    except StoppedError as stopped:
-        stopped.partial = done
-        raise
+
+    def steps(mine: Engine, y: np.ndarray, tell: Progress, stop: Stop, outputs: np.ndarray | None = None) -> Followed:
+        return follow(mine, y, tell, lambda name: made(name, tell), judges, stop, outputs)
+
+    def seen(last: Engine, trajectory: Trajectory, switched: str = "") -> Run:
+        return Run(scene, last, trajectory, observed(last, trajectory), None, switched, mended)
+
+    def checked(followed: Callable[[], Followed]) -> Run:
+        try:
+            done = seen(*followed())
+        except StoppedError as stopped:
+            if stopped.partial is not None:
+                stopped.partial = seen(*stopped.partial)
+            raise
+        require_shallow(done.model, done.trajectory, done.observed)
+        require_closed(done.model, done.trajectory, done.observed)
+        return done
+
+    if not engine.model.contacts:
+        return checked(lambda: steps(engine, start, progress, never))
+    from flexclear.pipeline.dynamics.run.sensitivity import Pair
+
+    pair = Pair(engine)
+    with meanwhile(lambda alive: pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, *told))) as twin:
+        done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, *told)))
+        try:
+            return replace(done, twin=twin())
+        except StoppedError as stopped:
+            stopped.partial = done
+            raise
 
 
 def follow(
@@ -162,17 +180,21 @@ def follow(
     progress: Progress,
     other: Callable[[str], Engine],
     judges: Mapping[str, tuple[Judge, str]] | None = None,
-) -> tuple[Engine, Trajectory, str]:
+    stop: Stop = never,
+    outputs: np.ndarray | None = None,
+) -> Followed:
     """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
 
     other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`.
+    stop, outputs: as of `trajectory.integrate`.
     """
     left, reasons = None, list[str]()
     while True:
         traits = engine.method.traits
         judge, heir = (judges or {}).get(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
         try:
-            return engine, stepping.integrate(engine, y, progress, left=left, judge=judge), "\n".join(reasons)
+            done = stepping.integrate(engine, y, progress, stop, left, outputs, judge)
+            return engine, done, "\n".join(reasons)
         except StiffError as stiff:
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
@@ -191,34 +213,26 @@ def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> Non
         refuse_deep(contact.words, contact.joint, float(depth))
 
 
-def twin_of(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin | None:
-    """The twin of a run with contacts."""
-    if not engine.model.contacts:
-        return None
-    from flexclear.pipeline.dynamics.run.sensitivity import twin
-
-    return twin(engine, start, trajectory)
-
-
 def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     """The observed rows of a trajectory, each with the closure rows that were solved for when it was made.
 
     Raises SolverError where one of them could not be evaluated.
     """
-    parts = []
+    parts = list[Blocks]()
     for part, kept in trajectory.parts():
         engine.keep(kept)
-        out = observe_flat(engine, trajectory.rows[part])
+        out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
-            row, lost = trajectory.rows[part][k], observation.by_name(out, engine.model.arrays.size).status[k]
+            row, lost = trajectory.rows[part][k], out["status"][k, 0]
             limit = beside(engine, row, motion, CLEAR)
             if limit is None and lost:
                 limit = beside(engine, row, motion, NEARLY_CLEAR)
-            if limit is not None:
-                out[k] = limit
+            for name, values in (limit or {}).items():
+                out[name][k] = values
         parts.append(out)
-    # a megabyte is copied only where there is something to join: that would take as long as a short run
-    seen = observation.by_name(parts[0] if len(parts) == 1 else np.concatenate(parts), engine.model.arrays.size)
+    # megabytes are copied only where there is something to join: that would take as long as a short run
+    joined = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts[1:] else parts[0]
+    seen = observation.by_name(joined, engine.model.arrays.size)
     bad = np.flatnonzero(seen.status)
     if len(bad):
         at, lost = f"at t = {trajectory.time[bad[0]]:.6g} s: ", "the recorded state does not satisfy the loop closures"

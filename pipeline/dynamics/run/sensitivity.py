@@ -3,26 +3,33 @@
 Impacts make neighbouring motions part exponentially, so that the errors of any integration grow too.
 The twin starts as far away as one step at the run's tolerance may err; where its velocities have
 parted from the run's by a visible share, values of the run are one draw out of many.
+
+The twin goes on beside the run where a processor is free, else after it. It takes the run's own steps of another start,
+with the same times of output, and is cut off where all has been seen: what is told of it does not depend on which of
+the two was ahead.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Condition
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.event_kinds import OPENING
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.quantities import PARTED
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.observation import frames
+from flexclear.pipeline.dynamics.run.singular import select_rows
 from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
-from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate, output_times
+from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop, output_times
 
-#: the two are compared at so many regular outputs, which bounds the cost, and wherever a contact of the run ends
+#: the two are compared at about so many times, which bounds the cost; where outputs are rarer, between these as well
 SAMPLES = 180
+#: comparisons for which the twin is followed beyond the horizon, which show how fast the two part
+BEYOND = 5
 #: offsets below this cannot be told from rounding of the positions [m]
 SMALLEST = 1e-14
 
@@ -40,49 +47,168 @@ class Twin:
     horizon: float
 
 
-def twin(engine: Engine, start: np.ndarray, trajectory: Trajectory) -> Twin:
-    """Run the scene again from a start whose balls are offset, and compare the links' velocities."""
-    contacts = len(engine.model.contacts)
-    size = max(engine.rtol * engine.model.length, SMALLEST)
-    direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
-    moved = perturbed(engine, start, offset_jacobian(engine, start), np.tile(size * direction, contacts))
-    time = _compared(engine, trajectory)
-    one = _velocities(engine, trajectory, time)
-    visible = PARTED * float(np.linalg.norm(one, axis=2).max())
+@dataclass
+class _Seen:
+    """What is known of one of the two. rows: so far.  velocities: of the links' frames, (times so far, link, 3)."""
 
-    def parted(rows: np.ndarray) -> bool:
-        """Whether the twin is already beyond the horizon, where following it further tells nothing."""
-        k = int(np.searchsorted(time, m.record(rows, contacts).time[-1], side="right")) - 1
-        w, n = engine.w.copy(), engine.n.copy()  # the twin's integration goes on with these
-        two = _velocities(engine, replace(trajectory, rows=rows), time[[k]])
-        engine.w[:], engine.n[:] = w, n
-        return bool(np.linalg.norm(one[[k]] - two, axis=2).max() > visible)
-
-    try:
-        other = integrate(engine, moved, silent, parted, outputs=time)
-    except SolverError:
-        # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
-        return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
-    time = time[time <= other.time[-1]]
-    separation = np.linalg.norm(one[: len(time)] - _velocities(engine, other, time), axis=2).max(axis=1)
-    beyond = np.flatnonzero(separation > visible)
-    return Twin(size, time, separation, float(time[beyond[0]] if len(beyond) else engine.end))
+    rows: np.ndarray
+    velocities: np.ndarray
 
 
-def _compared(engine: Engine, trajectory: Trajectory) -> np.ndarray:
-    """Times at which the two are compared, of which the run has rows.
+class Pair:
+    """A run and its twin, which may go on in two threads, each on an engine of its own; a third looks at their rows.
 
-    Motions part in impacts: where outputs are as rare as a stroke, they alone would tell of it one stroke late.
+    outputs: times [s] of which both keep rows.  added: those among them that the scene does not ask for.
     """
-    regular = output_times(engine.breaks, engine.model.scene.output.interval)
-    openings = trajectory.events["time"][trajectory.events["kind"] == OPENING]
-    return np.union1d(np.append(regular[:: max(1, len(regular) // SAMPLES)], regular[-1]), openings)
+
+    def __init__(self, engine: Engine) -> None:
+        wanted = output_times(engine.breaks, engine.model.scene.output.interval)
+        self.added = _between(engine, wanted)
+        self.outputs = np.union1d(wanted, self.added)
+        self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
+        self._engine, self._looking = another(engine), another(engine)
+        self._run, self._news = self._unseen(), Condition()
+        self._complete, self._ended = False, False
+
+    def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
+        """What the run gives that takes these steps, without the rows that it has for comparisons alone."""
+        try:
+            engine, trajectory, switched = steps(self._hear, self.outputs)
+            self._hear(trajectory.rows)
+            self._complete = True
+        except StoppedError as stopped:
+            if stopped.partial is not None:
+                engine, trajectory = stopped.partial
+                stopped.partial = engine, trajectory.without(self.added)
+            raise
+        finally:
+            with self._news:
+                self._ended = True
+                self._news.notify_all()
+        return engine, trajectory.without(self.added), switched
+
+    def twin(self, start: np.ndarray, steps: Callable[[Engine, np.ndarray, Stop, np.ndarray], Followed]) -> Twin:
+        """Run the scene again from a start whose balls are offset, and compare the links' velocities.
+
+        steps: takes the same steps as the run, with an engine from a start.
+        """
+        engine, twin, failed = self._engine, self._unseen(), False
+        size = max(engine.rtol * engine.model.length, SMALLEST)
+
+        def enough(rows: np.ndarray) -> bool:
+            twin.rows = rows
+            return self._enough(twin)
+
+        try:
+            select_rows(engine, start, engine.start)
+            direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
+            offsets = np.tile(size * direction, len(engine.model.contacts))
+            moved = perturbed(engine, start, offset_jacobian(engine, start), offsets)
+            twin.rows = steps(engine, moved, enough, self.outputs)[1].rows
+        except SolverError:
+            failed = True
+        with self._news:
+            self._news.wait_for(lambda: self._ended)
+        time, separation, horizon = self._compared(twin)
+        if failed and horizon is None:
+            # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
+            return Twin(size, np.array([engine.start]), np.zeros(1), engine.start)
+        return Twin(size, time, separation, engine.end if horizon is None else horizon)
+
+    def _hear(self, rows: np.ndarray) -> bool:
+        """Take note of how far the run has come; it goes on."""
+        with self._news:
+            self._run.rows = rows
+            self._news.notify_all()
+        return False
+
+    def _enough(self, twin: _Seen) -> bool:
+        """Whether the twin has been followed far enough beyond the horizon.
+
+        What is visible depends on the largest velocity of the whole run. Where the two have parted by the largest one
+        so far, the twin waits for the run instead of going on, since that seldom changes.
+        """
+        while True:
+            with self._news:
+                complete, ended, known = self._complete, self._ended, self._run.rows
+            self._look(self._run)
+            self._look(twin)
+            parted = np.flatnonzero(self._apart(twin) > self._visible())
+            if not len(parted) or len(twin.velocities) < min(parted[0] + BEYOND + 1, len(self.times)):
+                return False
+            if complete or ended:
+                return complete
+            self._wait_beyond(known)
+
+    def _wait_beyond(self, known: np.ndarray) -> None:
+        """Wait until there is more of the run than the rows that are known, or no more will come."""
+        with self._news:
+            self._news.wait_for(lambda: self._ended or self._run.rows is not known)
+
+    def _compared(self, twin: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
+        """Times of comparison [s], distances [m/s] and the horizon [s], when both have ended; None where they stay."""
+        self._look(self._run)
+        self._look(twin)
+        apart, visible = self._apart(twin), self._visible()
+        time, parted = self.times[: len(apart)], np.flatnonzero(apart > visible)
+        if not len(parted):
+            return time, apart, None
+        k = int(parted[0])
+        time, apart = time[: k + BEYOND + 1], apart[: k + BEYOND + 1]
+        finer = self.outputs[(self.outputs > self.times[max(k - 1, 0)]) & (self.outputs < self.times[k])]
+        between = _distance(self._velocities(self._run.rows, finer), self._velocities(twin.rows, finer))
+        first = np.flatnonzero(between > visible)[:1]
+        horizon = float(finer[first[0]] if len(first) else time[k])
+        return np.insert(time, k, finer[first]), np.insert(apart, k, between[first]), horizon
+
+    def _unseen(self) -> _Seen:
+        model = self._looking.model
+        rows = m.empty_record(0, len(model.contacts), model.ny)
+        return _Seen(rows, np.zeros((0, model.arrays.size(m.N_LINKS), 3)))
+
+    def _look(self, seen: _Seen) -> None:
+        """Add the velocities at the times of comparison that a run has come to since it was looked at last."""
+        rows = seen.rows
+        if len(rows):
+            reached = int(np.searchsorted(self.times, self._time(rows)[-1], side="right"))
+            new = self._velocities(rows, self.times[len(seen.velocities) : reached])
+            seen.velocities = np.concatenate([seen.velocities, new])
+
+    def _time(self, rows: np.ndarray) -> np.ndarray:
+        return m.record(rows, len(self._looking.model.contacts)).time
+
+    def _velocities(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Velocities of all links' frames at times of which there are rows, shape (time, link, 3)."""
+        return frames(self._looking, rows[np.searchsorted(self._time(rows), times)]).links["velocity"]
+
+    def _apart(self, twin: _Seen) -> np.ndarray:
+        """Distances at the times of comparison that both have come to."""
+        both = min(len(self._run.velocities), len(twin.velocities))
+        return _distance(self._run.velocities[:both], twin.velocities[:both])
+
+    def _visible(self) -> float:
+        """From which distance on two motions are told apart [m/s], by what is known of the run."""
+        return PARTED * float(np.linalg.norm(self._run.velocities, axis=2).max(initial=0.0))
 
 
-def _velocities(engine: Engine, trajectory: Trajectory, time: np.ndarray) -> np.ndarray:
-    """Velocities of all links' frames at times that the trajectory has, shape (time, link, 3)."""
-    rows = trajectory.rows[np.searchsorted(trajectory.time, time)]
-    return frames(engine, rows).links["velocity"]
+def _distance(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Largest difference of velocities at each time."""
+    return np.asarray(np.linalg.norm(one - other, axis=2).max(axis=1, initial=0.0))
+
+
+def _between(engine: Engine, wanted: np.ndarray) -> np.ndarray:
+    """Times [s] between outputs that are rarer than comparisons should be.
+
+    Motions part in impacts: outputs as rare as a stroke would tell of it one stroke late.
+    """
+    interval = engine.model.scene.output.interval
+    parts = int(np.ceil(SAMPLES * interval / (engine.end - engine.start) - 1e-9))
+    if parts <= 1:
+        return np.zeros(0)
+    times = output_times(engine.breaks, interval / parts)
+    after = np.clip(np.searchsorted(wanted, times), 1, len(wanted) - 1)
+    apart = np.minimum(np.abs(times - wanted[after - 1]), np.abs(times - wanted[after]))
+    return times[apart > 1e-9 * interval / parts]
 
 
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:

@@ -74,13 +74,13 @@ def improve(engine: Engine, t: float, wanted: float = BETTER) -> bool:
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`: what condition numbers are told of."""
     along = built_rows(model, h) == 0
-    return J * np.where(along, 1.0 / SCALE, 1.0)[:, None] * coordinate_scales(model.numbering)
+    return J * np.outer(np.where(along, 1.0 / SCALE, 1.0), coordinate_scales(model.numbering))
 
 
 def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
     """The same with lengths in units of the mechanism's size, and modes with the root of their body's mass besides."""
     along = built_rows(model, h) == 0
-    return J * np.where(along, 1.0 / model.length, 1.0)[:, None] * model.speed_scales
+    return J * np.outer(np.where(along, 1.0 / model.length, 1.0), model.speed_scales)
 
 
 def built_rows(model: Model, h: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,15 +15,16 @@ from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run import refusal, singular
-from flexclear.pipeline.dynamics.run.collocation import Collocation
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.pace import Judge, crawls
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.reach import require_shallow
-from flexclear.pipeline.dynamics.run.singular_pass import SAME, Pass, foresee_at_start, lay_over
-from flexclear.pipeline.dynamics.run.singular_start import start_motion
 from flexclear.pipeline.dynamics.run.specialised import settle
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_pass import Pass
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -83,9 +85,18 @@ class Trajectory:
         ends = [*firsts[1:], len(self.rows)]
         return [(slice(a, b), kept) for a, b, (_, kept) in zip(firsts, ends, self.selections, strict=True)]
 
+    def without(self, times: np.ndarray) -> Trajectory:
+        """The trajectory without its rows at some times [s], but for those at its events."""
+        dropped = np.isin(self.time, times) & ~np.isin(self.time, self.events["time"])
+        return replace(self, rows=self.rows[~dropped]) if dropped.any() else self
+
     def selection(self, row: int) -> np.ndarray:
         """Closure rows that were solved for to reach a row."""
         return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
+
+
+#: the engine that came to the end, what it followed, and why it is not the one that began
+Followed = tuple[Engine, Trajectory, str]
 
 
 class StiffError(SolverError):
@@ -116,7 +127,8 @@ def integrate(
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
-    stop: asked now and then with the rows recorded so far, whether they are enough.
+    stop: asked now and then with the rows recorded so far, whether they are enough; also of what an earlier attempt has
+        left.
     left: what another method left of this run; it is gone on with from there.
     outputs: times of output [s], the start first; the scene's where there are none.
     judge: whether another method goes on; by default where this one is explicit and would take far too long.
@@ -170,6 +182,8 @@ def _advance(
     """From segment to segment to the end; resumed: the first of them has been begun in an earlier attempt."""
     sample, control = _sampler(engine), engine.control
     settle(engine, progress)
+    if resumed and stop(_so_far(engine, tape)):
+        return
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
@@ -250,6 +264,8 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
 
 def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
+    from flexclear.pipeline.dynamics.run.singular_start import start_motion  # which few mechanisms need
+
     first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
     way = start_motion(engine, first.copy())
@@ -307,7 +323,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
                 raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
             settle(engine, progress)
             _warn(engine, tape, progress)
-            if stop(_in_order(tape.rows[: n[m.N_RECORDED]], len(engine.model.contacts))):
+            if stop(_so_far(engine, tape)):
                 return True
             if mine is not None:
                 mine.keep(tape)
@@ -345,6 +361,8 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and singular.improve(engine, t, singular.CLEARLY):
         tape.selections.append((t, engine.kept.copy()))
         return True
+    from flexclear.pipeline.dynamics.run.singular_pass import SAME, lay_over
+
     made, passes = lay_over(engine)
     if made is not None:
         tape.collocations.append(made)
@@ -358,6 +376,8 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
+    from flexclear.pipeline.dynamics.run.singular_pass import foresee_at_start
+
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
     return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
 
@@ -378,6 +398,11 @@ def _hand_over(engine: Engine, tape: Tape) -> Handover:
     )
 
 
+def _so_far(engine: Engine, tape: Tape) -> np.ndarray:
+    """The rows that have been recorded, by time."""
+    return _in_order(tape.rows[: engine.n[m.N_RECORDED]], len(engine.model.contacts))
+
+
 def _in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
     """The rows by time: those of a step's inner events were written before its outputs.
 
@@ -390,7 +415,6 @@ def _in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
 
 def _collect(engine: Engine, tape: Tape) -> Trajectory:
     n, contacts = engine.n, len(engine.model.contacts)
-    rows = _in_order(tape.rows[: n[m.N_RECORDED]], contacts)
     counters = {
         "evaluations": int(n[m.EVALUATIONS]),
         "steps": int(n[m.STEPS]),
@@ -405,4 +429,6 @@ def _collect(engine: Engine, tape: Tape) -> Trajectory:
     in_order = events[np.argsort(events["time"], kind="stable")]
     drift, rate_drift, steepest = (float(engine.control[k]) for k in (m.DRIFT, m.RATE_DRIFT, m.STEEPEST))
     laid = tuple(tape.collocations), tuple(tape.passes)
-    return Trajectory(rows, in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid)
+    return Trajectory(
+        _so_far(engine, tape), in_order, contacts, counters, tuple(tape.selections), drift, rate_drift, steepest, *laid
+    )

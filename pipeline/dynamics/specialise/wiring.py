@@ -1,8 +1,8 @@
 """The wiring of a mechanism as its specialised code depends on it, and what the code keeps apart from it.
 
-Sizes and tables of h, without those that only laws of time and error norms read. Where w and f keep what is none of it:
-stretches of arrays are known by their place in the header, so that one code serves every integrator and any number of
-pieces of laws.
+Sizes and tables of h, without those that only laws of time, error norms and the record read. Where w and f keep what
+is none of it: stretches of arrays are known by their place in the header, so that one code serves every integrator and
+any number of pieces of laws.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: sizes of the header, then the rows of each table of h
 Wiring = tuple[tuple[int, ...], ...]
-#: read by laws of time and error norms alone
-LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS)
+#: read by laws of time, error norms and the record alone
+LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
 #: a place is a stretch of an array and where in the stretch; the first stretch is the array itself
 STRETCH = 40
@@ -28,7 +28,7 @@ STATE, RATES = m.HEADER + 1, m.HEADER + 2
 def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
     """The wiring in h, with the closure rows that are solved for now."""
     sizes = h[:SIZES].copy()
-    sizes[[m.N_LAWS, m.N_GROUPS]] = 0
+    sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES]] = 0
     tables = []
     for table in m.TABLES["h"]:
         rows = arrays.table(table, h).view(np.int64).reshape(-1, table.size)

@@ -1,0 +1,86 @@
+"""Motion of the bodies and frames that a scene names, from that of the links that carry them, for the record.
+
+Kernels write each quantity of all rows of the record in one piece, as datasets have it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import (
+    add,
+    at,
+    at6,
+    at9,
+    cross,
+    product,
+    put,
+    scale,
+    turn,
+    turn_back,
+    turn_symmetric,
+)
+
+#: what is written of every body, in this order, and how many numbers each is; together
+OF_BODIES = {"position": 3, "quaternion": 4, "velocity": 3, "omega": 3, "acceleration": 3, "alpha": 3, "demand": 6}
+SIZE = sum(OF_BODIES.values())
+
+
+@kernel
+def put_quaternion(out, o, R):
+    """Store the unit quaternion (w x y z, w >= 0) of a rotation matrix, by its largest component (Shepperd 1978)."""
+    xx, yy, zz = R[0], R[4], R[8]
+    w, x, y, z = 1.0 + xx + yy + zz, 1.0 + xx - yy - zz, 1.0 - xx + yy - zz, 1.0 - xx - yy + zz
+    wx, wy, wz = R[7] - R[5], R[2] - R[6], R[3] - R[1]
+    xy, yz, zx = R[1] + R[3], R[5] + R[7], R[2] + R[6]
+    # four times the products of two components, of one with all of them
+    if w >= x and w >= y and w >= z:
+        x, y, z = wx, wy, wz
+    elif x >= y and x >= z:
+        w, y, z = wx, xy, zx
+    elif y >= z:
+        w, x, z = wy, xy, yz
+    else:
+        w, x, y = wz, zx, yz
+    size = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    if w < 0.0:
+        size = -size
+    out[o], out[o + 1], out[o + 2], out[o + 3] = size * w, size * x, size * y, size * z
+
+
+@kernel
+def put_bodies(h, f, w, out, first, every, r):
+    """Store the motion of the centres of mass and axes of all bodies, row r of `every`, from out[first] on."""
+    bodies, gravity = h[m.N_BODIES], at(f, h[m.GRAVITY.place])
+    for k in range(bodies):
+        o, numbers = m.LINK_FRAMES.row(h, m.BODIES.link(h, k)), m.BODY_NUMBERS.row(h, k)
+        R = at9(w, o + m.FRAME.axes)
+        omega, alpha = at(w, o + m.FRAME.omega), at(w, o + m.FRAME.alpha)
+        arm = turn(R, at(f, numbers + m.BODY_NUMBERS.com))
+        swing, p = cross(omega, arm), add(at(w, o + m.FRAME.origin), arm)
+        a = add(at(w, o + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, swing)))
+        here, size = first + 3 * (bodies * r + k), every * bodies
+        put(out, here, p)
+        put_quaternion(out, here + 3 * size + bodies * r + k, product(R, at9(f, numbers + m.BODY_NUMBERS.axes)))
+        put(out, here + 7 * size, add(at(w, o + m.FRAME.velocity), swing))
+        put(out, here + 10 * size, omega)
+        put(out, here + 13 * size, add(a, gravity))
+        put(out, here + 16 * size, alpha)
+        mass = f[numbers + m.BODY_NUMBERS.mass]
+        if mass > 0.0:
+            J, turning, force = at6(f, numbers + m.BODY_NUMBERS.inertia), turn_back(R, omega), scale(mass, a)
+            spin = add(turn_symmetric(J, turn_back(R, alpha)), cross(turning, turn_symmetric(J, turning)))
+            here += 19 * size + 3 * (bodies * r + k)
+            put(out, here, add(turn(R, spin), cross(p, force)))
+            put(out, here + 3, force)
+
+
+@kernel
+def put_frames(h, f, w, out, first):
+    """Store the origins of all frames from out[first] on."""
+    for k in range(h[m.N_FRAMES]):
+        o = m.LINK_FRAMES.row(h, m.FRAMES.link(h, k))
+        arm = turn(at9(w, o + m.FRAME.axes), at(f, m.NAMED_FRAME_NUMBERS.row(h, k)))
+        put(out, first + 3 * k, add(at(w, o + m.FRAME.origin), arm))

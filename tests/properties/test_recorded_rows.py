@@ -1,0 +1,78 @@
+"""What is recorded of a row: the same whatever rows stand beside it, and as independent formulas have it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.algebra import continued, matrix_to_quaternion, quaternion_to_matrix
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.dynamics.equations.named_bodies import put_quaternion
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import integrate
+from tests.analytic.mechanism_runs import TREE
+from tests.properties.kernels import from_python
+
+
+def four_bar():
+    """A four-bar of 501 rows, 11 to a step, of which five sixths have to be closed, and its engine."""
+    engine = engine_of(load_scene(TREE / "scenes/gallery/four_bar.toml"), {}, silent)
+    return engine, integrate(engine, consistent_start(engine), silent)
+
+
+def test_a_row_is_recorded_alike_alone_and_between_others_from_which_its_closing_starts():
+    engine, trajectory = four_bar()
+    together = observe(engine, trajectory.rows)
+    assert np.all(together.status == 0)
+    # each to a ten thousandth of a billionth of its size, the share of it at which rows are closed (rtol 1e-10)
+    assert together.residual.max() < 1e-12 * engine.model.length
+    for k in range(8, 501, 29):
+        alone = observe(engine, trajectory.rows[k : k + 1])
+        for field in fields(alone):
+            here, there = (np.asarray(getattr(seen, field.name)) for seen in (alone, together))
+            if field.name in ("residual", "status", "jacobian") or here.dtype.names:
+                continue
+            size = np.abs(there).max(initial=0.0)
+            # 1e-13 by how rows are closed, times what accelerations feel of that, and a factor ten
+            assert np.abs(here[0] - there[k]).max(initial=0.0) <= 1e-11 * size, (field.name, k)
+
+
+def test_bodies_and_frames_are_recorded_where_their_links_carry_them():
+    engine, trajectory = four_bar()
+    model, seen = engine.model, observe(engine, trajectory.rows)
+    motions = Motions(model, seen)
+    for k, name in enumerate(motions.moving_bodies):
+        body = motions.body(name)  # worked out anew from the link's frame
+        pairs = [(seen.body_position, body.p), (seen.body_velocity, body.v), (seen.body_acceleration, body.a)]
+        for found, known in [*pairs, (seen.body_omega, body.omega), (seen.body_alpha, body.alpha)]:
+            # sums of a few terms of their own size, in another order: rounding
+            assert np.abs(found[:, k] - known).max() <= 1e-13 * max(1.0, np.abs(known).max())
+        turns = quaternion_to_matrix(continued(seen.body_quaternion)[:, k])
+        assert np.abs(turns - body.R).max() < 1e-13
+    for k, (name, frame) in enumerate(model.mechanism.frames.items()):
+        link = model.mechanism.link_of[frame.body]
+        place = model.links[link].places[frame.body].of(frame.place)
+        there = seen.links[:, link]
+        known = there["origin"] + np.einsum("tij,j->ti", there["axes"], place.p)
+        assert np.abs(seen.frame_position[:, k] - known).max() < 1e-14, name
+
+
+@pytest.mark.parametrize("largest", range(4))
+def test_quaternions_of_the_record_are_those_of_their_matrices(largest: int):
+    generator = np.random.default_rng(largest)
+    known = generator.normal(size=(20, 4))
+    known[:, largest] += 5.0 * np.sign(known[:, largest])
+    known[0] = np.eye(4)[largest]  # no turn, or half a turn about an axis
+    known /= np.linalg.norm(known, axis=1, keepdims=True)
+    matrices, found, store = quaternion_to_matrix(known), np.zeros(4), from_python(put_quaternion)
+    for q, R in zip(known, matrices, strict=True):
+        store(found, 0, tuple(R.ravel()))
+        assert found[0] >= 0.0
+        assert abs(abs(found @ q) - 1.0) < 1e-14  # the same rotation: rounding of some products
+        assert np.abs(found - matrix_to_quaternion(R)).max() < 1e-14

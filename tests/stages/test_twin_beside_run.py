@@ -1,0 +1,263 @@
+"""A run and its twin go on side by side where a processor is free; what comes of them is what comes of one by one."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import SolverError, StoppedError
+from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.workflow import cores, journal, stopping
+from flexclear.pipeline.dynamics.run import pace, sensitivity, specialised, trajectory
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.run import engine_of, follow
+from flexclear.pipeline.dynamics.run.sensitivity import Pair, Twin
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
+
+#: nobody waits longer for a thread that does what it should [s]
+PATIENCE = 60.0
+
+
+@pytest.fixture
+def two(monkeypatch: pytest.MonkeyPatch) -> None:
+    processors(monkeypatch, 2)
+
+
+@pytest.fixture
+def parting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Motions count as parted before half of the slider-crank's run is over, and are looked at some hundred times."""
+    monkeypatch.setattr(sensitivity, "PARTED", 1e-8)
+    monkeypatch.setattr(trajectory, "SLICE", 100)
+
+
+def processors(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
+    monkeypatch.setattr(cores, "cores", lambda: count)
+    monkeypatch.setattr(cores, "_told", True)
+
+
+def check(root: Path, name: str, **changes: Any) -> Scene:
+    return edited(load_scene(root / "scenes" / "checks" / f"{name}.toml"), changes)
+
+
+def alone(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> xr.Dataset:
+    """The run whose twin comes after it."""
+    processors(monkeypatch, 1)
+    found = dynamics.simulate(scene, {}, silent)
+    processors(monkeypatch, 2)
+    return found
+
+
+@pytest.mark.parametrize("ahead", ["nobody", "run", "twin"])
+@pytest.mark.usefixtures("parting")
+def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
+    ahead: str, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene = check(root, "clearance_slider_crank")
+    expected = alone(scene, monkeypatch)
+    assert float(expected.horizon) < 0.5 * scene.time.end
+    hear, enough = Pair._hear, Pair._enough
+
+    def late_run(self: Pair, rows: np.ndarray) -> bool:
+        time.sleep(3e-3)  # the twin takes a tenth of that between two looks
+        return hear(self, rows)
+
+    def late_twin(self: Pair, twin: Any) -> bool:
+        with self._news:
+            assert self._news.wait_for(lambda: self._ended, PATIENCE)
+        return enough(self, twin)
+
+    if ahead == "twin":
+        monkeypatch.setattr(Pair, "_hear", late_run)
+    if ahead == "run":
+        monkeypatch.setattr(Pair, "_enough", late_twin)
+    assert dynamics.simulate(scene, {}, silent).identical(expected)
+
+
+@pytest.mark.usefixtures("parting", "two")
+def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not even where it is ahead of the run, whose largest velocity tells what is visible: then it waits."""
+    rows: list[float] = []
+    enough = Pair._enough
+
+    def noted(self: Pair, twin: Any) -> bool:
+        rows.append(float(twin.rows[-1, 0]))
+        return enough(self, twin)
+
+    monkeypatch.setattr(Pair, "_enough", noted)
+    scene = check(root, "clearance_slider_crank")
+    run = dynamics.simulate(scene, {}, silent)
+    horizon, shown = float(run.horizon), run.twin_time.values
+    assert 0.0 < horizon < rows[-1] < 0.8 * scene.time.end
+    # what is told of it ends some comparisons after the horizon, wherever it was stopped
+    assert 1 <= (shown > horizon).sum() <= sensitivity.BEYOND + 1
+    assert np.all(np.diff(shown) > 0.0)
+    visible = run.twin_separation.values > sensitivity.PARTED * np.linalg.norm(run.velocity.values, axis=2).max()
+    assert not visible[shown < 0.9 * horizon].any()
+
+
+@pytest.mark.usefixtures("two")
+@pytest.mark.parametrize("straight_from", [specialised.MANY, 500], ids=["kernels", "straight code"])
+def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
+    straight_from: int, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact.  Only one thread tells of it."""
+    monkeypatch.setattr(specialised, "MANY", straight_from)
+    monkeypatch.setattr(pace, "TRIAL", 1000)
+    monkeypatch.setattr(pace, "HOPELESS", 1100)
+    monkeypatch.setattr(trajectory, "SLICE", 100)
+    scene, told = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
+    expected = alone(scene, monkeypatch)
+    assert expected.attrs["method"] == "radau"
+    found = dynamics.simulate(scene, {}, lambda share, text: told.add(threading.get_ident()))
+    assert found.identical(expected)
+    assert told == {threading.get_ident()}
+
+
+@pytest.mark.parametrize("processors_there", [1, 2])
+def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(
+    processors_there: int, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*arguments: Any) -> np.ndarray:
+        raise SolverError("no neighbour")
+
+    scene = check(root, "bounce")
+    expected = alone(scene, monkeypatch)
+    monkeypatch.setattr(sensitivity, "perturbed", refused)
+    processors(monkeypatch, processors_there)
+    found = dynamics.simulate(scene, {}, silent)
+    assert (float(found.horizon), found.sizes["twin_time"]) == (scene.time.start, 1)
+    assert found.position.identical(expected.position)
+
+
+@pytest.mark.usefixtures("parting")
+def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_not(root: Path) -> None:
+    """However far it was followed: beside a slower run it may come to where it fails, and after the run it does not."""
+    engine = engine_of(check(root, "clearance_slider_crank"), {}, silent)
+    start = consistent_start(engine)
+
+    def twin(until: float) -> Twin:
+        def steps(mine: Engine, y: np.ndarray, stop: Stop, outputs: np.ndarray) -> Followed:
+            def failing(rows: np.ndarray) -> bool:
+                enough = stop(rows)
+                if rows[-1, 0] > until:
+                    raise SolverError("it gives up")
+                return enough and until > engine.end  # as if the run were not there yet
+
+            return follow(mine, y, silent, lambda name: mine, None, failing, outputs)
+
+        pair = Pair(engine)
+        pair.run(lambda *told: follow(engine, start, silent, lambda name: engine, None, *told))
+        return pair.twin(start, steps)
+
+    whole = twin(2.0 * engine.end)
+    late, early = twin(whole.time[-1] + 0.2 * engine.end), twin(0.5 * whole.horizon)
+    assert late.horizon == whole.horizon > engine.start
+    assert np.array_equal(late.separation, whole.separation)
+    assert (early.horizon, len(early.time)) == (engine.start, 1)
+
+
+@pytest.mark.usefixtures("two")
+def test_a_run_that_fails_does_not_wait_for_its_twin(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both would take minutes."""
+    monkeypatch.setattr(trajectory, "SLICE", 100)
+    calls, threads, began = 0, threading.active_count(), time.monotonic()
+
+    def progress(share: float | None, text: str) -> None:
+        nonlocal calls
+        calls += 1
+        if calls > 20:
+            raise SolverError("the run gives up")
+
+    with pytest.raises(SolverError, match="the run gives up"):
+        dynamics.simulate(check(root, "socket_swing", **{"time.end": 100.0}), {}, progress)
+    assert threading.active_count() == threads
+    assert time.monotonic() - began < PATIENCE
+
+
+@pytest.mark.parametrize("stopped", ["run", "twin"])
+def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
+    stopped: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Asked to stop while the run goes on, or its twin alone: what there is of the run is told."""
+    monkeypatch.setattr(trajectory, "SLICE", 100)
+    monkeypatch.setattr(journal, "EVERY", -1.0)
+    monkeypatch.setattr(stopping, "_why", "")
+    scene = check(root, "bounce", **{"output.interval": 0.05})
+    whole = alone(scene, monkeypatch)
+
+    def progress(share: float | None, text: str) -> None:
+        if share is not None and share > 0.3 and stopped == "run":
+            stopping.request("the time is over")
+
+    def late_twin(self: Pair, twin: Any) -> bool:
+        with self._news:
+            assert self._news.wait_for(lambda: self._ended, PATIENCE)
+        stopping.request("the time is over")
+        return False
+
+    with monkeypatch.context() as patch:
+        if stopped == "twin":
+            patch.setattr(Pair, "_enough", late_twin)
+        with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):
+            dynamics.simulate(scene, {}, progress)
+    stopping._why = ""
+    left = told.value.partial
+    assert left.attrs["complete"] == 0
+    assert left.position.identical(whole.position[: left.sizes["time"]])
+    assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
+    with journal.kept(tmp_path, "key"):
+        assert dynamics.simulate(scene, {}, silent).identical(whole)
+
+
+def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) -> None:
+    """Ten outputs in the whole run, and comparisons between them."""
+    scene = check(root, "bounce", **{"output.interval": 0.1})
+    run, pair = dynamics.simulate(scene, {}, silent), Pair(engine_of(scene, {}, silent))
+    assert run.sizes["twin_time"] >= len(pair.added) >= 0.9 * sensitivity.SAMPLES
+    assert not np.isin(run.time.values, pair.added).any()
+    assert np.isin(trajectory.output_times(np.array([scene.time.start, scene.time.end]), 0.1), run.time.values).all()
+
+
+def test_what_goes_on_meanwhile_is_ended_with_what_it_goes_on_beside(monkeypatch: pytest.MonkeyPatch) -> None:
+    processors(monkeypatch, 2)
+    ended = threading.Event()
+
+    def work(alive: Progress) -> None:
+        try:
+            until = time.monotonic() + PATIENCE
+            while time.monotonic() < until:
+                alive(None, "")
+        finally:
+            ended.set()
+
+    began = time.monotonic()
+    with pytest.raises(KeyError), cores.meanwhile(work):
+        raise KeyError
+    assert ended.is_set()
+    assert time.monotonic() - began < 0.5 * PATIENCE
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_the_work_raises_is_told_to_who_waits_for_it(count: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    processors(monkeypatch, count)
+
+    def work(alive: Progress) -> int:
+        raise KeyError("work")
+
+    def threads(alive: Progress) -> int:
+        return threading.get_ident()
+
+    with pytest.raises(KeyError, match="work"), cores.meanwhile(work) as result:
+        result()
+    with cores.meanwhile(threads) as result:
+        assert (result() == threading.get_ident()) is (count == 1)
