@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
-    from flexclear.pipeline.dynamics.run.pace import Judge
+    from flexclear.pipeline.dynamics.run.pace import Judges
 
 __all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
 
@@ -44,7 +44,7 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     from flexclear.pipeline.dynamics.record.dataset import recorded, warnings
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
-    def once(edited: Scene, judges: Mapping[str, tuple[Judge, str]] | None = None) -> LabelledArrays:
+    def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
         try:
             done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:
@@ -60,7 +60,7 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
         return once(scene)
     from flexclear.pipeline.dynamics.run.accuracy import deliver
 
-    def compared(edited: Scene, judges: Mapping[str, tuple[Judge, str]] | None = None) -> xr.Dataset:
+    def compared(edited: Scene, judges: Judges | None = None) -> xr.Dataset:
         return once(edited, judges).to_xarray()
 
     if not scene.by_need():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -136,6 +137,20 @@ def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
     assert "radau" not in late.seen
 
 
+def test_what_becomes_of_a_twin_tells_nothing_of_its_run() -> None:
+    """The twin may be handed on where the run is not, and is made before, beside or after it."""
+    suit = known(exponential=(1e-4, 400.0))
+    solver = SimpleNamespace(integrator="exponential")
+    engine = SimpleNamespace(model=SimpleNamespace(scene=SimpleNamespace(solver=solver)), start=0.0)
+    crawling = looks((0.0, 0), (1e-6, 4_000_000), (2e-6, 8_000_000))
+    run, twin = (panel["exponential"][0] for panel in suit.judges(1e-4))
+    assert "at this pace" in twin.verdict(engine, crawling)
+    suit.learn(1e-4, "exponential", xr.Dataset(attrs={"method": "exponential", "evaluations": 30_000}))
+    assert suit.seen["exponential"] == {1e-4: 30_000.0}  # 1 when all eight millions of the twin were taken off
+    assert "at this pace" in run.verdict(engine, crawling)
+    assert suit.left == (8_000_000, pytest.approx(2e-6 / 0.18))
+
+
 def looks(*pairs: tuple[float, int], stiff: float = 0.0) -> list[Look]:
     """Of a run that was at times [s] after so many evaluations, twelve a step, a share of the steps being stiff."""
     return [Look(time, used, used // 12, int(stiff * used / 12)) for time, used in pairs]
@@ -173,6 +188,12 @@ def test_a_looser_tolerance_is_tried_only_where_it_saves() -> None:
     assert not searched("dop853", 10_000, 10_500).saves(1e-4, 1e-2)
     assert searched("dop853", 10_000, 20_000).saves(1e-4, 1e-2)
     assert not searched("dop853", 10_000, 20_000).saves(1e-4, 2e-4)
+    # near the tightest of all, two runs are less than a hundredfold apart
+    runs = {5e-14: 17_500, 1e-14: 20_000}
+    made = {at: xr.Dataset(attrs={"method": "dop853", "evaluations": n}) for at, n in runs.items()}
+    near = Search(load_scene(RIGID), lambda scene, judges: xr.Dataset(), runs=made)
+    assert near.saves(5e-14, 5e-12)  # to 0.68 of the evaluations
+    assert near.saves(1e-14, 1e-12)
 
 
 def test_the_more_accurate_run_is_delivered_where_it_was_the_cheaper() -> None:
@@ -180,6 +201,23 @@ def test_the_more_accurate_run_is_delivered_where_it_was_the_cheaper() -> None:
     attempt = Attempt(1e-4, dear.runs[1e-4], {"platform.velocity": 1e-3}, 0.2)
     assert dear.cheapest(attempt).run.attrs["evaluations"] == 12_000
     assert dear.cheapest(replace(attempt, share=2.0)).run is attempt.run
+
+
+@pytest.mark.parametrize("apart, delivered", [(1e-4, 12_000), (1e-2, 80_000)])
+def test_a_run_that_tighter_ones_contradict_is_not_delivered(apart: float, delivered: int) -> None:
+    made = searched("exponential", 80_000, 12_000)
+    made.runs[1e-8] = xr.Dataset(attrs={"method": "dop853", "evaluations": 90_000})
+    for rtol, run in made.runs.items():
+        away = apart if rtol == 1e-8 else 0.0
+        velocity = (("time", "body", "axis"), np.full((3, 1, 3), 1.0 + away))
+        coords = {"time": [0.0, 0.5, 1.0], "body": ["platform"]}
+        made.runs[rtol] = xr.Dataset({"velocity": velocity}, coords, run.attrs)
+    made.scene = load_scene(RIGID, {"accuracy": WANTED})
+    attempt = Attempt(1e-4, made.runs[1e-4], {"platform.velocity": 1e-4}, 0.2)
+    found = made.cheapest(attempt)
+    assert found.run.attrs["evaluations"] == delivered
+    if found is not attempt:
+        assert found.errors["platform.velocity"] == pytest.approx(apart * 3.0**0.5)
 
 
 def test_overdamped_modes_are_followed_as_those_that_ring() -> None:

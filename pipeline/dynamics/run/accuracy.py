@@ -27,11 +27,9 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import Quantity, parse
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.pace import Judge
+    from flexclear.pipeline.dynamics.run.pace import Judges
     from flexclear.pipeline.dynamics.run.suited import Suit
 
-#: by integrator, who looks whether another one shall go on, and which
-Judges = Mapping[str, "tuple[Judge, str]"]
 #: the estimate compares with a run at this share of the tolerance
 FINER = 1e-2
 #: tolerances that are tried lie between these; below, rounding decides
@@ -64,7 +62,7 @@ class Search:
     """Runs made so far by tolerance, and what is wanted of them."""
 
     scene: Scene
-    once: Callable[[Scene, Judges], xr.Dataset]
+    once: Callable[[Scene, Judges | None], xr.Dataset]
     suit: Suit | None = None
     runs: dict[float, xr.Dataset] = field(default_factory=dict)
 
@@ -76,7 +74,7 @@ class Search:
 
     def _made(self, rtol: float) -> xr.Dataset:
         if self.suit is None:
-            return self.once(edited(self.scene, {"solver.rtol": rtol}), {})
+            return self.once(edited(self.scene, {"solver.rtol": rtol}), None)
         name, why = self.suit.best(rtol), self.suit.why(rtol)
         run = self.once(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.suit.judges(rtol))
         self.suit.learn(rtol, name, run)
@@ -95,22 +93,33 @@ class Search:
         return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in wanted.items()))
 
     def cheapest(self, found: Attempt) -> Attempt:
-        """The attempt, or the run that told its error, where another method made that for less."""
+        """The attempt, or the run that told its error, where another method made that for less.
+
+        How far the two are apart is the error of either at most, unless both err alike; runs that are tighter than both
+        are asked as well.
+        """
         finer = found.rtol * FINER
         other = self.runs.get(finer)
         if found.share > ENOUGH or other is None or other.attrs["evaluations"] >= found.run.attrs["evaluations"]:
             return found
-        return replace(found, rtol=finer, run=other)
+        tighter = [run for rtol, run in self.runs.items() if rtol < finer]
+        if not tighter:
+            return replace(found, rtol=finer, run=other)
+        wanted = self.wanted(other)
+        errors = {q.name: max(found.errors[q.name], *(quantities.error(other, r, q) for r in tighter)) for q in wanted}
+        share = max(errors[q.name] / w for q, w in wanted.items())
+        return Attempt(finer, other, errors, share) if share <= ENOUGH else found
 
     def saves(self, rtol: float, looser: float) -> bool:
         """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.
 
         Where stability limits the steps it is not, and it takes two runs to know its error.
         """
-        before, finer = self.runs[rtol], self.runs.get(max(rtol * FINER, TIGHTEST))
-        if finer is None or finer.attrs["method"] != before.attrs["method"]:
+        at = max(rtol * FINER, TIGHTEST)
+        before, finer = self.runs[rtol], self.runs.get(at)
+        if finer is None or finer is before or finer.attrs["method"] != before.attrs["method"]:
             return True
-        growth = math.log(finer.attrs["evaluations"] / before.attrs["evaluations"]) / math.log(1.0 / FINER)
+        growth = math.log(finer.attrs["evaluations"] / before.attrs["evaluations"]) / math.log(rtol / at)
         return (rtol / looser) ** max(growth, 0.0) < 1.0 - SAVED
 
     def wanted(self, run: xr.Dataset) -> dict[Quantity, float]:
@@ -134,7 +143,7 @@ class Search:
 
 
 def deliver(
-    scene: Scene, once: Callable[[Scene, Judges], xr.Dataset], progress: Progress, suit: Suit | None = None
+    scene: Scene, once: Callable[[Scene, Judges | None], xr.Dataset], progress: Progress, suit: Suit | None = None
 ) -> xr.Dataset:
     """The cheapest run found whose estimated errors are what the scene wants; or the best, and a word on it.
 
@@ -155,7 +164,7 @@ def deliver(
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,
         accuracy_runs=len(search.runs),
-        accuracy_meaning="largest error of the time integration, estimated by a run at 100 times tighter tolerance",
+        accuracy_meaning="largest error of the time integration, estimated by two runs at tolerances 100 times apart",
     )
 
 

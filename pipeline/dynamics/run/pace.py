@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -35,6 +36,17 @@ class Judge:
     verdict: Callable[[Engine, Sequence[Look]], str]
 
 
+#: by integrator, who looks at its run, and which one goes on if not
+Panel = Mapping[str, tuple[Judge, str]]
+
+
+class Judges(NamedTuple):
+    """Who looks at a run, and who at its twin; two panels, since judges may remember what they have seen."""
+
+    run: Panel
+    twin: Panel
+
+
 def look(engine: Engine) -> Look:
     """Where the run is now."""
     n = engine.n
@@ -45,7 +57,7 @@ def look(engine: Engine) -> Look:
 def half(looks: Sequence[Look]) -> Look:
     """The last look at which at most half of what the method has used by now was used."""
     middle = 0.5 * (looks[0].evaluations + looks[-1].evaluations)
-    return next(one for one in reversed(looks) if one.evaluations <= middle)
+    return looks[bisect_right(looks, middle, key=lambda one: one.evaluations) - 1]
 
 
 def pace(looks: Sequence[Look], patience: float) -> float:

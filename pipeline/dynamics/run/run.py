@@ -29,7 +29,7 @@ from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_blocks
-from flexclear.pipeline.dynamics.run.pace import Judge
+from flexclear.pipeline.dynamics.run.pace import Judges, Panel
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
 
@@ -127,13 +127,13 @@ def integrate(
     scene: Scene,
     bundles: Mapping[str, xr.Dataset],
     progress: Progress,
-    judges: Mapping[str, tuple[Judge, str]] | None = None,
+    judges: Judges | None = None,
 ) -> Run:
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 
-    bundles: reduced flexible bodies by name.  judges: by integrator, who looks whether another one shall go on, and
-    which; without them the explicit ones hand over where they would crawl.  The twin of a run with contacts is made
-    beside it, where a processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run
+    bundles: reduced flexible bodies by name.  judges: who looks whether another integrator shall go on; without them
+    the explicit ones hand over where they would crawl.  The twin of a run with contacts is made beside it, where a
+    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run
     cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
     """
     made = _maker(scene, bundles, progress)
@@ -143,8 +143,12 @@ def integrate(
     for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
 
-    def steps(mine: Engine, y: np.ndarray, tell: Progress, stop: Stop, outputs: np.ndarray | None = None) -> Followed:
-        return follow(mine, y, tell, lambda name: made(name, tell), judges, stop, outputs)
+    ours, twins = judges or (None, None)
+
+    def steps(
+        mine: Engine, y: np.ndarray, tell: Progress, panel: Panel | None, stop: Stop, outputs: np.ndarray | None = None
+    ) -> Followed:
+        return follow(mine, y, tell, lambda name: made(name, tell), panel, stop, outputs)
 
     def seen(last: Engine, trajectory: Trajectory, switched: str = "") -> Run:
         return Run(scene, last, trajectory, observed(last, trajectory), None, switched, mended)
@@ -161,12 +165,12 @@ def integrate(
         return done
 
     if not engine.model.contacts:
-        return checked(lambda: steps(engine, start, progress, never))
+        return checked(lambda: steps(engine, start, progress, ours, never))
     from flexclear.pipeline.dynamics.run.sensitivity import Pair
 
     pair = Pair(engine)
-    with meanwhile(lambda alive: pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, *told))) as twin:
-        done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, *told)))
+    with meanwhile(lambda alive: pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, twins, *told))) as twin:
+        done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, ours, *told)))
         try:
             return replace(done, twin=twin())
         except StoppedError as stopped:
@@ -179,13 +183,13 @@ def follow(
     y: np.ndarray,
     progress: Progress,
     other: Callable[[str], Engine],
-    judges: Mapping[str, tuple[Judge, str]] | None = None,
+    judges: Panel | None = None,
     stop: Stop = never,
     outputs: np.ndarray | None = None,
 ) -> Followed:
     """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
 
-    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`;
+    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: by integrator;
     none looks at an integrator that a run comes back to.
     stop, outputs: as of `trajectory.integrate`.
     """

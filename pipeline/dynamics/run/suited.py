@@ -11,7 +11,7 @@ Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import xarray as xr
@@ -23,7 +23,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pace import Judge, Look, limited, pace
+from flexclear.pipeline.dynamics.run.pace import Judge, Judges, Look, Panel, limited, pace
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start
 
@@ -184,10 +184,13 @@ class Suit:
             return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
-    def judges(self, rtol: float) -> dict[str, tuple[Judge, str]]:
-        """By integrator, who looks whether its run goes as foreseen, and which one goes on if not."""
-        found = {}
+    def judges(self, rtol: float) -> Judges:
+        """Who looks whether a run goes as foreseen, and its twin, of which nothing is remembered afterwards."""
         self.told.clear()
+        return Judges(self._panel(rtol), replace(self, told={}, left=(0.0, 0.0))._panel(rtol))
+
+    def _panel(self, rtol: float) -> Panel:
+        found = {}
         for name in self.names:
             heir, most = self.heir(name, rtol)
             if not heir:
