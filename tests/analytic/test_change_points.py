@@ -16,6 +16,8 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.record.dataset import recorded
+from flexclear.pipeline.dynamics.run.pace import Judge, Judges
 from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import change_points as cp
 from tests.analytic.mechanism_runs import TREE, bundles
@@ -107,6 +109,20 @@ def test_what_is_recorded_beside_a_pose_is_that_of_the_smooth_motion() -> None:
     known = -0.4 * 36.0 * np.cos(1.5 + 6.0 * dataset.time.values)
     # rounding over the cube of the distance at which rows are no longer taken as they are
     assert np.abs(dataset.acceleration.sel(body="slider").values[:, 0] - known).max() < 1e-5
+
+
+def test_passes_are_kept_where_another_method_goes_on() -> None:
+    """Handed on after the first of two poses, in which a row is recorded."""
+    first = (np.pi - 1.5) / 4.0
+    table = cp.four_bar(1.5, 1.0, time={"end": 2.0}, output={"interval": 0.1 * first}, solver={"rtol": 1e-10})
+    scene = Scene.model_validate(cp.driven(table, "A", cp.steady(1.5, 4.0)))
+    panel = {"dop853": (Judge(50, lambda engine, looks: "so" if looks[-1].time > first + 0.1 else ""), "radau")}
+    run = integrate(scene, {}, silent, Judges(panel, panel))
+    assert run.model.scene.solver.integrator == "radau"
+    # the pose is where closures depend on each other, which is known to the square root of what they are open
+    assert [one.time for one in run.trajectory.passes] == pytest.approx([first, first + 0.5 * np.pi], abs=1e-6)
+    found = recorded(run).to_xarray()
+    assert four_bar_error(found, 1.5 + 4.0 * found.time.values, 1.0, cp.FOUR_BAR) < 1e-8  # a hundred times rtol
 
 
 # Where it cannot go on -----------------------------------------------------------------------------------------------

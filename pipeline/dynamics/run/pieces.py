@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -57,7 +57,8 @@ class Handover:
     """What the next method must know, copied, at the end of the last accepted step.
 
     y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
-    lasting: control floats LASTING.  rows, events: what was recorded.  selections: as of a trajectory.
+    lasting: control floats LASTING.  rows, events: what was recorded.  selections, collocations, passes: as of a
+    trajectory.
     """
 
     y: np.ndarray
@@ -69,6 +70,8 @@ class Handover:
     rows: np.ndarray
     events: np.ndarray
     selections: Selections
+    collocations: tuple[Collocation, ...] = ()
+    passes: tuple[Pass, ...] = ()
 
     @property
     def time(self) -> float:
@@ -201,12 +204,11 @@ def _told(scene: Scene) -> str:
     return text
 
 
-def _arrays(left: Any) -> Iterator[np.ndarray]:
-    for item in fields(left) if left is not None else ():
-        value = getattr(left, item.name)
-        if isinstance(value, np.ndarray):
-            yield value
-        else:  # selections
-            for time, rows in value:
-                yield np.array([time])
-                yield rows
+def _arrays(left: Handover | None) -> Iterator[np.ndarray]:
+    """What decides how another method goes on; nothing of how singular poses were passed before does."""
+    if left is None:
+        return
+    yield from (left.y, left.modes, left.latched, left.watched, left.counters, left.lasting, left.rows, left.events)
+    for time, rows in left.selections:
+        yield np.array([time])
+        yield rows

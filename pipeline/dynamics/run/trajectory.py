@@ -232,6 +232,7 @@ def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     tape.rows, tape.events = np.concatenate([left.rows, tape.rows]), np.concatenate([left.events, tape.events])
     same = np.array_equal(left.selections[-1][1], engine.kept)
     tape.selections = [*left.selections, *([] if same else tape.selections)]
+    tape.collocations, tape.passes = [*left.collocations], [*left.passes]
     return tape
 
 
@@ -398,6 +399,8 @@ def _hand_over(engine: Engine, tape: Tape) -> Handover:
         tape.rows[: n[m.N_RECORDED]].copy(),
         tape.events[: n[m.N_EVENTS]].copy(),
         tuple(tape.selections),
+        tuple(tape.collocations),
+        tuple(tape.passes),
     )
 
 
