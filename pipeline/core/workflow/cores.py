@@ -81,12 +81,10 @@ class _GivenUpError(Exception):
 def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
     """Meanwhile a thread does some work that is mostly compiled code; gives what waits for its result.
 
-    work: is given a progress to call now and then, which ends it when what goes on beside it has failed.  Where no
-    processor is free it is done when its result is asked for.  What waits raises what the work raised.
+    work: is given a progress to call now and then, and while it waits, which ends it when what goes on beside it has
+    failed.  Where no processor is free, or no thread is to be had, it is done when its result is asked for.  What waits
+    raises what the work raised.
     """
-    if not free():
-        yield lambda: work(silent)
-        return
     given_up, results, errors = Event(), list[Result](), list[BaseException]()
 
     def alive(fraction: float | None, text: str) -> None:
@@ -99,7 +97,7 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
         except BaseException as error:
             errors.append(error)
 
-    def ended() -> None:
+    def ended() -> None:  # also where Ctrl-C came while it was being started
         while thread.is_alive():
             thread.join(TICK)
 
@@ -110,12 +108,20 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
         return results[0]
 
     thread = Thread(target=copy_context().run, args=(do,))
-    thread.start()
     try:
-        yield result
+        yield result if free() and _started(thread) else lambda: work(silent)
     except BaseException as error:
         if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves what it has in good order
             given_up.set()
         raise
     finally:
         ended()
+
+
+def _started(thread: Thread) -> bool:
+    """Whether the system lets this process have another thread."""
+    try:
+        thread.start()
+    except RuntimeError:
+        return False
+    return True

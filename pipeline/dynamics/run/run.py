@@ -156,7 +156,7 @@ def integrate(
     from flexclear.pipeline.dynamics.run.sensitivity import Pair
 
     pair = Pair(engine)
-    with meanwhile(lambda alive: pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, *told))) as twin:
+    with meanwhile(lambda alive: pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, *told), alive)) as twin:
         done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, *told)))
         try:
             return replace(done, twin=twin())
