@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from flexclear.pipeline.core.errors import StoppedError
 from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.system import cores
+from flexclear.pipeline.core.system import cores, started
 
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
 
@@ -109,19 +109,10 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
 
     thread = Thread(target=copy_context().run, args=(do,))
     try:
-        yield result if free() and _started(thread) else lambda: work(silent)
+        yield result if free() and started(thread) else lambda: work(silent)
     except BaseException as error:
         if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves what it has in good order
             given_up.set()
         raise
     finally:
         ended()
-
-
-def _started(thread: Thread) -> bool:
-    """Whether the system lets this process have another thread."""
-    try:
-        thread.start()
-    except RuntimeError:
-        return False
-    return True
