@@ -48,7 +48,6 @@ def test_all_beginnings_fit_into_one_folder(tmp_path: Path) -> None:
     assert len({path.name for path in written}) == len(written)
 
 
-
 def test_a_hundred_typical_mistakes_are_all_in_the_table():
     assert len(MISTAKES) >= 100
     assert set(TOLD) == set(MISTAKES)
